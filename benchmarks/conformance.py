@@ -24,9 +24,9 @@ from scipy.spatial import cKDTree
 
 from benchmarks.pages import write_page
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.nc import Moves, Program, read_program
 from toolpath_stiff.nc.controller import DIALECTS, Controller
-from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.moves import RAPID, Moves, Program
+from toolpath_stiff.nc.reader import read_program
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.path import sample_moves
 

@@ -40,7 +40,7 @@ from benchmarks.diagnosis_tables import (
     verdicts_table,
 )
 from benchmarks.pages import write_page
-from toolpath_stiff import rig
+from toolpath_stiff.rig import case, exercise
 
 FIRST_SEED = 41_000_000  # chosen once, before the first run
 RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_diagnosis.jsonl"
@@ -74,7 +74,7 @@ def command_record(seed: int, k: int) -> Record:
     with tempfile.TemporaryDirectory() as folder:
         hidden = "none" if k % 2 else "one"
         file = Path(folder) / f"case_{k}.csv"
-        file.write_text(rig.csv_text(rig.make_case(seed + k, "tilted", hidden=hidden)[0]), encoding="utf-8")
+        file.write_text(exercise.csv_text(case.make_case(seed + k, "tilted", hidden=hidden)[0]), encoding="utf-8")
         command = [sys.executable, "-m", "toolpath_stiff", "diagnose", str(file), "--out", f"{folder}/out_{k}"]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL)

@@ -13,18 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from toolpath_stiff import rig
+from toolpath_stiff.diagnosis.diagnose import Diagnosis, diagnose
+from toolpath_stiff.diagnosis.document import DiagnosisDocument, document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import Machine, load_machine
-from toolpath_stiff.rig import read_plan
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.planning.document import plan_csv, plan_rows
+from toolpath_stiff.planning.plan import Plan, plan_measurements, random_visits
+from toolpath_stiff.planning.rivals import rivals_of
+from toolpath_stiff.planning.visits import Costs, Menu
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.rig import case as case_module
+from toolpath_stiff.rig import exercise
 from toolpath_stiff.rig.case import again
-from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
-from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument, document
-from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits
-from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
-from toolpath_stiff.updating.planning.rivals import rivals_of
-from toolpath_stiff.updating.planning.visits import Costs, Menu
+from toolpath_stiff.rig.exercise import read_plan
 
 LAYOUTS = ("tilted", "paper")
 POSES = (2, 4, 6)  # planned poses after which the verdict is asked again
@@ -68,7 +70,7 @@ def make_jobs(
     jobs = []
     for layout in layouts:
         start = first_seed + LAYOUT_SEEDS * LAYOUTS.index(layout)
-        groups = [("one", name, each) for name in rig.effects_of_layout(layout)]
+        groups = [("one", name, each) for name in case_module.effects_of_layout(layout)]
         for number, (group, hidden, count) in enumerate(groups):
             jobs += [Job(group, layout, start + GROUP_SEEDS * number + k, hidden) for k in range(count)]
         for number, (hidden, count) in enumerate((("none", none), ("outside", outside), ("two", two)), 20):
@@ -102,7 +104,7 @@ def _heading(job: Job) -> dict[str, Any]:
 
 def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     """Draw, diagnose, compare with the truth."""
-    rows, truth = rig.make_case(job.seed, job.layout, hidden=job.hidden)
+    rows, truth = case_module.make_case(job.seed, job.layout, hidden=job.hidden)
     if job.factor != 1.0:
         rows["sd_N_per_mm"] = rows["sd_N_per_mm"] * job.factor
     return _heading(job) | judged(rows, truth, folder)[0]
@@ -113,7 +115,7 @@ def judged(
 ) -> tuple[dict[str, Any], DiagnosisDocument]:
     """Truth, verdict and probabilities of a case as a record, and the whole document; `stated` goes to `diagnose`."""
     file = folder / "measurements.csv"
-    file.write_text(rig.csv_text(rows), encoding="utf-8")
+    file.write_text(exercise.csv_text(rows), encoding="utf-8")
     start = time.process_time()
     diagnosis = diagnose(machine(), read_measurements(file, machine()), plan_next=False, **stated)
     found = document(diagnosis)
@@ -178,9 +180,9 @@ def interval_checks(fitted: dict[str, Any], true: dict[str, Any]) -> list[dict[s
 
 def _planned(job: Job, folder: Path) -> dict[str, Any]:
     """An ambiguous case: plan, measure the same hidden machine, diagnose all data; the same with random poses."""
-    case = rig.draw_case(job.seed, job.layout, hidden=job.hidden)
+    case = case_module.draw_case(job.seed, job.layout, hidden=job.hidden)
     file = folder / "measurements.csv"
-    file.write_text(rig.csv_text(case.rows), encoding="utf-8")
+    file.write_text(exercise.csv_text(case.rows), encoding="utf-8")
     before = diagnose(machine(), read_measurements(file, machine()), plan_next=False)
     truth = case.truth["hidden"][0]
     record = _heading(job) | {"truth": [truth], "effects": case.truth["effects"], "plausible": list(before.plausible)}
@@ -238,7 +240,7 @@ def settleable(plan: Plan, truth: str) -> bool:
 
 
 def _measured(
-    case: rig.Case, before: Diagnosis, plan: Plan, visits: Sequence[int], file: Path, seed: Sequence[int]
+    case: case_module.Case, before: Diagnosis, plan: Plan, visits: Sequence[int], file: Path, seed: Sequence[int]
 ) -> dict[str, Any]:
     """What the hidden machine shows at these visits; clamps are numbered on."""
     file.write_text(plan_csv(plan_rows(plan.visits, visits, set(before.data.point.tolist()))), encoding="utf-8")
@@ -250,4 +252,4 @@ def _measured(
 def _rows_of_clamps(table: dict[str, Any], clamps: Sequence[int]) -> str:
     """CSV of the readings of some clampings, numbered from 0 in measuring order."""
     kept = [i for i, clamp in enumerate(table["clamp"]) if clamp - CLAMPS_LATER - 1 in clamps]
-    return rig.csv_text({name: [values[i] for i in kept] for name, values in table.items()})
+    return exercise.csv_text({name: [values[i] for i in kept] for name, values in table.items()})

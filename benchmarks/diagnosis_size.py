@@ -25,7 +25,7 @@ import numpy as np
 
 from benchmarks.pages import write_page
 from benchmarks.processes import describe_machine, whole_command
-from toolpath_stiff import rig
+from toolpath_stiff.rig import case, exercise
 
 SIZES = (288, 1000, 5000, 10_000)
 COMMANDS = {"diagnose": (), "compare": (), "update": ("--add", "weak_strut")}
@@ -51,14 +51,14 @@ def campaign(readings: int) -> str:
     """A measurement file of so many readings of one machine."""
     tables, poses = [], 0
     for seed in range(1000, 1000 + readings // 288 + 1):
-        rows, _ = rig.make_case(seed, hidden="none")
+        rows, _ = case.make_case(seed, hidden="none")
         rows["clamp"] = np.asarray(rows["clamp"]) + 2 * poses
         rows["point"] = np.asarray(rows["point"]) + poses
         poses += len(set(np.asarray(rows["point"]).tolist()))
         tables.append({name: column for name, column in rows.items() if name != "stiffness_N_per_mm"})
     plan = {name: np.concatenate([np.asarray(one[name]) for one in tables])[:readings] for name in tables[0]}
     plan |= {name: plan[name].tolist() for name in ("direction", "setup")}
-    return rig.csv_text(rig.make_case(SEED, "campaign", HIDDEN, plan=plan, size=HIDDEN_SIZE)[0])
+    return exercise.csv_text(case.make_case(SEED, "campaign", HIDDEN, plan=plan, size=HIDDEN_SIZE)[0])
 
 
 def run(command: str, readings: int, file: Path, out: Path) -> Run:

@@ -30,17 +30,18 @@ from benchmarks.diagnosis_bars import Figure, share
 from benchmarks.diagnosis_cases import machine
 from benchmarks.diagnosis_tables import bars_table, summary
 from benchmarks.pages import write_page
-from toolpath_stiff import rig
-from toolpath_stiff.rig import UNKNOWNS
+from toolpath_stiff.diagnosis.diagnose import diagnose
+from toolpath_stiff.drafting.draft import draft
+from toolpath_stiff.inference.candidates import testable_effects
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.judgement import judge
+from toolpath_stiff.inference.noise import noise_models
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.rig import case as case_module
+from toolpath_stiff.rig import exercise
 from toolpath_stiff.rig.hidden import Nuisances
-from toolpath_stiff.updating.diagnosis import diagnose
-from toolpath_stiff.updating.drafting import draft
-from toolpath_stiff.updating.inference import judge
-from toolpath_stiff.updating.inference.candidates import testable_effects
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.noise import noise_models
-from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.measurements import read_measurements
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 FIRST_SEED = 83_000_000
 NOISE_SEEDS = 1_000_000  # distance of the seeds of the cases without anything hidden
@@ -78,14 +79,14 @@ def run(job: Job) -> dict[str, Any]:
 def _drafted(job: Job, folder: Path) -> dict[str, Any]:
     """Draft from every other clamping, judge with all readings; the links that hold the truth and what was drafted."""
     noise = STATED if job.hidden == NOISE else None
-    case = rig.draw_case(job.seed, "tilted", "none" if job.hidden == NOISE else job.hidden)
+    case = case_module.draw_case(job.seed, "tilted", "none" if job.hidden == NOISE else job.hidden)
     tables = {"same": case.rows}
     if job.hidden != NOISE:
         # The same seed: the same poses, struts, joints and scatter.
-        tables["gone"] = rig.draw_case(job.seed, "tilted", "none", nuisances=Nuisances()).rows
+        tables["gone"] = case_module.draw_case(job.seed, "tilted", "none", nuisances=Nuisances()).rows
     old = np.asarray(case.rows["clamp"]) % 2 == 0
     file = folder / "old.csv"
-    file.write_text(rig.csv_text({name: np.asarray(values)[old] for name, values in case.rows.items()}))
+    file.write_text(exercise.csv_text({name: np.asarray(values)[old] for name, values in case.rows.items()}))
     before = diagnose(machine(), read_measurements(file, machine()), noise=noise, plan_next=False)
     made = draft(before, "missing.py")
     links = [] if not made.text or before.portrait is None else [one.term.link for one in before.portrait.terms]
@@ -97,7 +98,7 @@ def _drafted(job: Job, folder: Path) -> dict[str, Any]:
     for what, table in tables.items():
         mixed = {n: np.where(old, np.asarray(case.rows[n]), np.asarray(table[n])) for n in case.rows}
         file = folder / f"{what}.csv"
-        file.write_text(rig.csv_text(mixed))
+        file.write_text(exercise.csv_text(mixed))
         record["judged"][what] = _judged(file, str(folder / "missing.py"), noise)
     return record
 

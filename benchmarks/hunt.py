@@ -24,10 +24,11 @@ from benchmarks.hunt_programs import Cam, Harsh, Parametric, Zeros
 from benchmarks.pages import write_page
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
-from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
-from toolpath_stiff.nc.codes import code_name
+from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
-from toolpath_stiff.nc.linuxcnc import refusal
+from toolpath_stiff.nc.linuxcnc.reader import refusal
+from toolpath_stiff.nc.moves import MOTION_NAMES, Program
+from toolpath_stiff.nc.reader import read_program
 from toolpath_stiff.nc.words import split_lines
 
 TOLERANCE = 0.01  # mm and degrees

@@ -32,16 +32,16 @@ from toolpath_stiff.api.machines import machine_from_linuxcnc, machine_template
 from toolpath_stiff.api.poses import read_poses
 from toolpath_stiff.cli.main import main as tps
 from toolpath_stiff.errors import EffectFault, InputError, InputErrors
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import parse_program
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.controller import DIALECTS, Controller, read_controller
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.readings.raw import reduce
 from toolpath_stiff.results_folder import check_folder
-from toolpath_stiff.rig import read_plan
-from toolpath_stiff.rig.structure import load_nominal
-from toolpath_stiff.stiffness.effects import effects_from_file
-from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.raw import reduce
+from toolpath_stiff.rig.exercise import read_plan
+from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.stiffness.catalogue import effects_from_file
 
 PROGRAMS = Path(__file__).parent.parent / "programs"
 LINES = (30, 90)  # of the openings that are mutated: the later part is met as well

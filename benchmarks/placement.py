@@ -21,14 +21,15 @@ import numpy as np
 from benchmarks.pages import write_page
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.errors import UnreachableError
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.controller import read_controller
 from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.placement import FIGURES, Placed, Task, place_program
+from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
+from toolpath_stiff.placement.document import FIGURES
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import representative_path, work_path
+from toolpath_stiff.placement.placing import Placed, Task, place_program
 from toolpath_stiff.placement.search import SearchRules
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import closed_form

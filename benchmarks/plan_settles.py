@@ -21,15 +21,15 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.pages import write_page
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.rig import csv_text, read_plan
+from toolpath_stiff.diagnosis.diagnose import diagnose
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.planning.document import plan_csv, plan_rows
+from toolpath_stiff.planning.gaps import SETTLED, plan_minutes
+from toolpath_stiff.planning.next_visit import TABLES, next_visit, tables_of
+from toolpath_stiff.planning.plan import Plan, plan, random_visits
+from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig.case import Case, again, draw_case
-from toolpath_stiff.updating.diagnosis import diagnose
-from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.planning import Plan, plan, random_visits
-from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
-from toolpath_stiff.updating.planning.gaps import SETTLED, plan_minutes
-from toolpath_stiff.updating.planning.next_visit import TABLES, next_visit, tables_of
+from toolpath_stiff.rig.exercise import csv_text, read_plan
 
 POSES = 6
 FIRST_SEED = 70_000

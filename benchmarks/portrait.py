@@ -22,7 +22,7 @@ from benchmarks.diagnosis_tables import bars_table, summary
 from benchmarks.pages import write_page
 from benchmarks.portrait_bars import calibration_table, failures_table, figures, kinds_table
 from benchmarks.portrait_cases import LAYOUTS, make_jobs, run
-from toolpath_stiff.rig import UNKNOWNS
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 FIRST_SEED = 63_000_000  # chosen once, before the first run
 RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_portrait.jsonl"

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.diagnosis_cases import judged
-from toolpath_stiff import rig
-from toolpath_stiff.rig import UNKNOWNS
+from toolpath_stiff.rig import case as rig
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 LAYOUTS = ("tilted", "paper")
 # Columns that the paper's layout lacks.

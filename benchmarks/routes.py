@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.analysis.poses import evaluate
-from toolpath_stiff.machine import Machine, load_machine
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness import truss as reference

@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks.case_loop import Record
 from benchmarks.diagnosis_bars import JUST_SEEN, Figure, holds_truth, mean, named, share
 from benchmarks.several_cases import FACTORS, MANY_OUTLIERS, WAYS
-from toolpath_stiff.rig import VISIBLE
+from toolpath_stiff.rig.slips import VISIBLE
 
 COST_OF_OUTLIERS = 3.0  # percentage points
 

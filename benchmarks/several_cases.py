@@ -13,10 +13,10 @@ from typing import Any
 
 from benchmarks.diagnosis_cases import judged
 from benchmarks.several_seen import shows_beside
-from toolpath_stiff import rig
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.rig import SLIPS, slipped_case, with_stated_noise
+from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.hidden import Nuisances
+from toolpath_stiff.rig.slips import SLIPS, slipped_case, with_stated_noise
 
 GROUPS = ("pair", "three", "outliers", "stated", "slip")
 SIZES = {"pair": (0.10, 0.05), "three": (0.10, 0.07, 0.05), "one": None, "none": None}

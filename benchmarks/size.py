@@ -27,7 +27,7 @@ from pathlib import Path
 from benchmarks.pages import write_page
 from benchmarks.processes import describe_machine, whole_command
 from benchmarks.size_programs import KINDS, program
-from toolpath_stiff.nc import parse_program
+from toolpath_stiff.nc.reader import parse_program
 
 FASTER, FLAT, CPU_SECONDS, GIGABYTES, COLUMNAR = 12.0, 1.5, 12.0, 1.0, 0.8
 LENGTHS = (10_000, 30_000, 100_000, 300_000, 1_000_000)
@@ -94,9 +94,10 @@ def reading(report: Report, lines: int, rounds: int) -> None:
 
 def one_by_one(text: str) -> None:
     """Our reader without its fast way."""
-    from toolpath_stiff.nc import ZERO
+    from toolpath_stiff.nc.frames import Frames
     from toolpath_stiff.nc.interpreter import ProgramRun
-    from toolpath_stiff.nc.state import Frames, State
+    from toolpath_stiff.nc.reader import ZERO
+    from toolpath_stiff.nc.state import State
     from toolpath_stiff.nc.tables import Offsets
     from toolpath_stiff.nc.words import split_lines
 
@@ -159,7 +160,7 @@ def writing(report: Report, lines: int, rounds: int) -> None:
 
     from toolpath_stiff.analysis import analyze
     from toolpath_stiff.analysis.statistics import sample_columns, samples_csv, samples_frame, samples_parquet
-    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.machine.file import load_machine
 
     analysis = analyze(load_machine("nist"), parse_program(program("5-axis", lines)), origin=(0, 0, 0.8, 0, 0, 0))
     rows = len(analysis.samples)

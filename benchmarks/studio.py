@@ -80,7 +80,7 @@ def many_readings(folder: Path, count: int) -> Path:
     """Readings of an exercise, repeated under other numbers of clampings and repeats."""
     import pandas as pd
 
-    from toolpath_stiff import rig
+    from toolpath_stiff.rig import case as rig
 
     rows, _ = rig.make_case(7, layout="tilted")
     frame = pd.DataFrame(rows)

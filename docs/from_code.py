@@ -19,9 +19,10 @@ if __name__ == "__main__":
 
 import toolpath_stiff
 from toolpath_stiff.nc.codes.registry import codes_table
-from toolpath_stiff.nc.cutter_location import words_table
-from toolpath_stiff.rig import UNKNOWNS
-from toolpath_stiff.stiffness.effects import LINKS, Effect, Parameter, packaged_effects
+from toolpath_stiff.nc.cutter_location.vocabulary import words_table
+from toolpath_stiff.rig.unknowns import UNKNOWNS
+from toolpath_stiff.stiffness.catalogue import packaged_effects
+from toolpath_stiff.stiffness.contract import LINKS, Effect, Parameter
 
 DOCS = Path(__file__).parent
 API = DOCS / "api"  # one page for each public name, made and git-ignored

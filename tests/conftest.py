@@ -16,14 +16,14 @@ from hypothesis import HealthCheck, settings
 
 if TYPE_CHECKING:
     from toolpath_stiff.arrays import FloatArray
-    from toolpath_stiff.machine import Machine
-    from toolpath_stiff.stiffness.effects import Effect
+    from toolpath_stiff.inference.evidence import Problem
+    from toolpath_stiff.inference.judgement import Judgement
+    from toolpath_stiff.inference.noise import Noise
+    from toolpath_stiff.inference.prediction import Predictor
+    from toolpath_stiff.machine.model import Machine
+    from toolpath_stiff.readings.measurements import Measurements
+    from toolpath_stiff.stiffness.contract import Effect
     from toolpath_stiff.stiffness.model import StiffnessModel
-    from toolpath_stiff.updating.inference import Judgement
-    from toolpath_stiff.updating.inference.evidence import Problem
-    from toolpath_stiff.updating.inference.noise import Noise
-    from toolpath_stiff.updating.inference.prediction import Predictor
-    from toolpath_stiff.updating.measurements import Measurements
 
 # No result depends on the clock: on a busy machine examples are drawn and run slowly. The `timeout` in pyproject.toml
 # ends a test that does not end by itself.
@@ -128,10 +128,11 @@ def predictors_are_shared() -> Iterator[None]:
     """The nist machine's answers to campaigns of one design are worked out once a process."""
     from tests.stiffness.cases import nist
     from tests.updating.cases import predictor_for
-    from toolpath_stiff.machine import machine_toml
-    from toolpath_stiff.updating import comparison, diagnosis
-    from toolpath_stiff.updating.correction import ladder
-    from toolpath_stiff.updating.inference.prediction import Predictor
+    from toolpath_stiff.comparison import compare as comparison
+    from toolpath_stiff.correction import ladder
+    from toolpath_stiff.diagnosis import diagnose as diagnosis
+    from toolpath_stiff.inference.prediction import Predictor
+    from toolpath_stiff.machine.writer import machine_toml
 
     plain = machine_toml(nist())
 
@@ -150,9 +151,9 @@ def predictors_are_shared() -> Iterator[None]:
 def joint_columns_are_shared() -> Iterator[None]:
     """What displaced joints do to readings hangs on the machine and on how they are taken: once a process for each."""
     from tests.updating.cases import joint_columns_once
-    from toolpath_stiff.stiffness.effects.guard import is_foreign
-    from toolpath_stiff.updating.inference.prediction import Predictor
-    from toolpath_stiff.updating.planning import rivals
+    from toolpath_stiff.inference.prediction import Predictor
+    from toolpath_stiff.planning import rivals
+    from toolpath_stiff.stiffness.guard import is_foreign
 
     of_readings, of_plan = Predictor.joint_columns, rivals.joint_columns
 
@@ -179,7 +180,8 @@ def judgements_are_shared(predictors_are_shared: None) -> Iterator[None]:
     A test of the judgement's own repeatability begins with an empty `cases.JUDGEMENTS`.
     """
     from tests.updating import cases
-    from toolpath_stiff.updating import diagnosis, planning
+    from toolpath_stiff.diagnosis import diagnose as diagnosis
+    from toolpath_stiff.planning import plan as planning
 
     def shared(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) -> Judgement:
         """`judge(...)`, of the caller's own problem and noise."""

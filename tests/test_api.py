@@ -352,7 +352,7 @@ def test_a_machine_and_a_program_travel_to_another_process():
 
 
 def test_a_diagnosis_is_not_made_again_for_the_plan(monkeypatch):
-    from toolpath_stiff.updating import planning
+    from toolpath_stiff.inference import judgement as planning
 
     data = tps.Measurements.read("nist-table1")
     found = tps.diagnose("nist", data, noise_percent=10)

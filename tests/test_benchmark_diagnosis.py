@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from benchmarks.diagnosis import FIRST_SEED, report
 from benchmarks.diagnosis_bars import floor_ratio, holds_truth, mean, middle_of, misnamed, named, share, wilson
 from benchmarks.diagnosis_cases import Job, choice_is_right, interval_checks, make_jobs, run, settleable
-from toolpath_stiff import rig
+from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.effects import at_strength, draw_shape
-from toolpath_stiff.stiffness.effects import known_effects
+from toolpath_stiff.stiffness.catalogue import known_effects
 
 
 # Newcombe (1998), Statistics in Medicine 17, 857: Table I, method 3 (score, without continuity correction).

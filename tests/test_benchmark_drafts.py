@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.drafts import FIRST_SEED, NOISE, confirmed, figures, make_jobs, report
 from benchmarks.pages import write_page
-from toolpath_stiff.rig import UNKNOWNS
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 
 def record(

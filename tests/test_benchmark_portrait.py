@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks.portrait import FIRST_SEED, report
 from benchmarks.portrait_bars import figures, first_right, ratio, right_set
 from benchmarks.portrait_cases import in_short, kinds_of_layout, make_jobs
-from toolpath_stiff.rig import UNKNOWNS
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 TERM = {"link": "table", "where": None, "direction": "X", "variable": "y", "shape": "square", "size": 3.0,
         "unit": "nm/N", "interval": [2.0, 4.0], "rms_percent": 8.0, "words": "the table gives along X"}  # fmt: skip

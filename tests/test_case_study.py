@@ -12,7 +12,7 @@ import pytest
 import toolpath_stiff as tps
 from toolpath_stiff.analysis import analyze
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.placement.case_study import LOW_MM, case_study_program, origin_of, run_case_study
 from toolpath_stiff.stiffness.model import build_model
 

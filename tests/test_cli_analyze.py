@@ -121,13 +121,13 @@ def test_compare_with_another_machine(part, capsys):
 
 
 def _nist() -> str:
-    from toolpath_stiff.machine import packaged_machines
+    from toolpath_stiff.machine.file import packaged_machines
 
     return packaged_machines()["nist"].read_text()
 
 
 def _keys(effect: str) -> list[str]:
-    from toolpath_stiff.stiffness.effects import find_effect
+    from toolpath_stiff.stiffness.catalogue import find_effect
 
     return [parameter.key for parameter in find_effect(effect).parameters]
 

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from tests.effects.cases import BENCH_FILE
-from toolpath_stiff import rig
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.report.diagnose import names
+from toolpath_stiff.report.diagnose.page import names
 from toolpath_stiff.results_folder import MANIFEST
+from toolpath_stiff.rig import case, exercise
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +27,8 @@ def files(tmp_path_factory):
     """A campaign with a weak strut, and one with a spindle that 42 untilted readings cannot tell from a table."""
     folder = tmp_path_factory.mktemp("campaigns")
     for name, hidden in (("strut", "weak_strut"), ("spindle", "spindle_compliance")):
-        rows, _ = rig.make_case(7, layout="paper", hidden=hidden, size=0.1)
-        (folder / f"{name}.csv").write_text(rig.csv_text(rows), encoding="utf-8")
+        rows, _ = case.make_case(7, layout="paper", hidden=hidden, size=0.1)
+        (folder / f"{name}.csv").write_text(exercise.csv_text(rows), encoding="utf-8")
     return folder
 
 

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.machine import load_machine, parse_machine
-from toolpath_stiff.stiffness import effects as registry
+from toolpath_stiff.machine.file import load_machine, parse_machine
+from toolpath_stiff.stiffness import catalogue as registry
+from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
+from toolpath_stiff.stiffness.contract import LINKS
 from toolpath_stiff.stiffness.core import tip_compliance
-from toolpath_stiff.stiffness.effects import LINKS, find_effect, known_effects
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model
 
 

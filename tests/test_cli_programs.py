@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from toolpath_stiff.cli.program import ANALYZE_EPILOG as EPILOG
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.report.batch import RESERVED, Found, endings, find_programs, report_folders
+from toolpath_stiff.report.batch.programs import RESERVED, Found, endings, find_programs, report_folders
 
 
 @pytest.fixture

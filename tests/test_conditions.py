@@ -6,11 +6,13 @@ import json
 
 import pytest
 
-from toolpath_stiff import rig
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.machine import load_machine, machine_toml, parse_machine
+from toolpath_stiff.machine.file import load_machine, parse_machine
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.stiffness.effects import Conditions
+from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.rig import case
+from toolpath_stiff.rig import exercise as exercise_module
+from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import acting_names, build_model, condition_warnings, idle_effects
 
 RISER = {"setup": "riser", "x_nm_per_N": 8.0, "y_nm_per_N": 5.0, "z_nm_per_N": 2.0}
@@ -252,8 +254,8 @@ def test_a_parameter_of_an_effect_that_does_not_act_has_no_band(here, capsys):
 def exercise(tmp_path_factory):
     """The paper's points measured on a machine of independent code that hides a riser."""
     folder = tmp_path_factory.mktemp("riser")
-    rows, _ = rig.make_case(3, layout="paper", hidden="setup_compliance", noise=0.01)
-    (folder / "data.csv").write_text(rig.csv_text(rows))
+    rows, _ = case.make_case(3, layout="paper", hidden="setup_compliance", noise=0.01)
+    (folder / "data.csv").write_text(exercise_module.csv_text(rows))
     return folder
 
 
@@ -294,8 +296,8 @@ def test_readings_without_the_column_are_told_of_it(exercise, here, capsys):
 def test_how_much_a_choice_matters_is_asked_in_the_set_up_that_it_belongs_to():
     from types import SimpleNamespace
 
+    from toolpath_stiff.diagnosis.diagnose import choice_on_path
     from toolpath_stiff.placement.case_study import case_study_program
-    from toolpath_stiff.updating.diagnosis import choice_on_path
 
     machine = load_machine("nist")
     riser = build_model(with_effects(("setup_compliance", RISER))).effects

@@ -9,13 +9,15 @@ import pytest
 import toolpath_stiff
 from toolpath_stiff import errors
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.machine import forward_kinematics, load_machine, machine_toml, parse_machine
-from toolpath_stiff.nc import parse_program
+from toolpath_stiff.machine.file import load_machine, parse_machine
+from toolpath_stiff.machine.kinematics import forward_kinematics
+from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.controller import read_controller
-from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.tables import Columns, parse_table
-from toolpath_stiff.updating.measurements import read_measurements
 
 CLASSES = [value for value in vars(errors).values() if isinstance(value, type) and issubclass(value, errors.TpsError)]
 

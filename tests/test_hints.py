@@ -14,10 +14,10 @@ import pytest
 import toolpath_stiff
 from tests.effects.cases import BENCH_FILE
 from tests.machine.test_machine_files import HAL
-from toolpath_stiff import rig
 from toolpath_stiff.cli.main import COMMANDS, main
+from toolpath_stiff.diagnosis.words import next_steps
 from toolpath_stiff.hints import ARGUMENTS, Asked, command_line, hint, parted
-from toolpath_stiff.updating.diagnosis.words import next_steps
+from toolpath_stiff.rig import case, exercise
 
 PACKAGE = Path(toolpath_stiff.__file__).parent
 DRAWING = ("diagnose", "compare", "update", "plan", "map")
@@ -79,15 +79,15 @@ def test_from_an_exercise_to_the_machine_that_explains_it(here, capsys):
 
 
 def test_what_the_data_leave_open_is_planned(here, capsys):
-    rows, _ = rig.make_case(7, layout="paper", hidden="spindle_compliance", size=0.1)
-    (here / "a spindle.csv").write_text(rig.csv_text(rows), encoding="utf-8")
+    rows, _ = case.make_case(7, layout="paper", hidden="spindle_compliance", size=0.1)
+    (here / "a spindle.csv").write_text(exercise.csv_text(rows), encoding="utf-8")
     done = follow("tps diagnose 'a spindle.csv' --noise 2,1", capsys)
     assert done[1:] == ["tps plan 'a spindle.csv' --noise 2,1"]
 
 
 def test_what_nothing_explains_is_written_and_tried(here, capsys):
-    rows, _ = rig.make_case(7, layout="paper", hidden="weak_strut", size=0.1)
-    (here / "data.csv").write_text(rig.csv_text(rows), encoding="utf-8")
+    rows, _ = case.make_case(7, layout="paper", hidden="weak_strut", size=0.1)
+    (here / "data.csv").write_text(exercise.csv_text(rows), encoding="utf-8")
     asked = Asked(("data.csv",), effects=(), noise=0.03)
     said = SimpleNamespace(verdict="unexplained", best=None, main=SimpleNamespace(question=""), portrait=None)
     lines = [line for _, line in map(parted, next_steps(said, asked))]
@@ -105,8 +105,8 @@ def test_what_nothing_explains_is_written_and_tried(here, capsys):
 
 
 def test_a_draft_is_written_and_its_commands_run(here, capsys):
-    rows, _ = rig.make_case(7, layout="paper", hidden="saddle_overhang", size=0.1)
-    (here / "a saddle.csv").write_text(rig.csv_text(rows), encoding="utf-8")
+    rows, _ = case.make_case(7, layout="paper", hidden="saddle_overhang", size=0.1)
+    (here / "a saddle.csv").write_text(exercise.csv_text(rows), encoding="utf-8")
     first = "tps effects draft 'a saddle.csv' -o missing.py"
     printed = run(first, capsys)
     assert [shlex.split(line)[1] for line in printed] == ["effects", "diagnose", "plan"]

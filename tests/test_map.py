@@ -12,7 +12,7 @@ import pytest
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.poses import evaluate_poses, map_stiffness, turning_points
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.stiffness.model import build_model
 
 MODEL = build_model(load_machine("nist"))

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from toolpath_stiff import rig
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import check_outputs, keep_old
-from toolpath_stiff.machine import load_machine, machine_toml
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.rig import case, exercise
 
 PART = "G21 G90 G94\nG0 X0 Y0 Z20\nG1 Z0 F600\nG1 X30 F1200\nM30\n"
 RAW = (
@@ -24,8 +25,8 @@ RAW = (
 def here(tmp_path, monkeypatch):
     """Inputs of every kind, and folders in which names of results are taken by inputs."""
     monkeypatch.chdir(tmp_path)
-    rows, _ = rig.make_case(7, layout="paper", hidden="weak_strut", size=0.1)
-    data = rig.csv_text(rows)
+    rows, _ = case.make_case(7, layout="paper", hidden="weak_strut", size=0.1)
+    data = exercise.csv_text(rows)
     machine = machine_toml(load_machine("nist"))
     for name, text in {
         "part.nc": PART, "machine.toml": machine, "data.csv": data, "raw.csv": RAW, "kins.hal": "# pins\n",

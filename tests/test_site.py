@@ -16,8 +16,8 @@ import pytest
 import toolpath_stiff
 from toolpath_stiff.cli.main import COMMANDS
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
-from toolpath_stiff.nc.cutter_location import WORDS
-from toolpath_stiff.stiffness.effects import packaged_effects
+from toolpath_stiff.nc.cutter_location.vocabulary import WORDS
+from toolpath_stiff.stiffness.catalogue import packaged_effects
 
 pytest.importorskip("sphinx")
 ROOT = Path(__file__).parent.parent

@@ -10,25 +10,26 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
-from toolpath_stiff import rig
 from toolpath_stiff.analysis.checks import check_machine
 from toolpath_stiff.analysis.results import analyze, assumptions
+from toolpath_stiff.comparison.compare import compare
+from toolpath_stiff.correction.strut_law import minimise_mean_error
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import Machine, load_machine, machine_toml, packaged_machines, parse_machine
-from toolpath_stiff.machine.model import with_parameter
-from toolpath_stiff.nc import parse_program
-from toolpath_stiff.report.compare import text as compare_text
+from toolpath_stiff.inference.prediction import Predictor, at_both_ends, scaled_law
+from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
+from toolpath_stiff.machine.model import Machine, with_parameter
+from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.report.compare.page import text as compare_text
 from toolpath_stiff.report.machine import machine_figures
-from toolpath_stiff.report.update import text as update_text
+from toolpath_stiff.report.update.page import text as update_text
+from toolpath_stiff.rig import case, exercise
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.structure import parse_nominal
+from toolpath_stiff.rig.nominal import parse_nominal
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import compiled, core, truss
 from toolpath_stiff.stiffness.model import build_model, with_parameter_moved
-from toolpath_stiff.updating.comparison import compare
-from toolpath_stiff.updating.correction import minimise_mean_error
-from toolpath_stiff.updating.inference.prediction import Predictor, at_both_ends, scaled_law
-from toolpath_stiff.updating.measurements import Measurements, read_measurements
 
 NIST = packaged_machines()["nist"].read_text()
 LAW = "length_mm = [2561.6, 3213.2]\nstiffness_N_per_um = [46.5, 32.5]"
@@ -233,8 +234,8 @@ def test_a_parameter_of_a_constant_law():
 @cache
 def campaign(law: str) -> tuple[str, Measurements]:
     """The paper's poses on a rig machine of that law, as text and as read."""
-    rows, _ = rig.make_case(5, "paper", "none", 0.01, parse_nominal(text_with(law), "mine.toml"))
-    text = rig.csv_text(rows)
+    rows, _ = case.make_case(5, "paper", "none", 0.01, parse_nominal(text_with(law), "mine.toml"))
+    text = exercise.csv_text(rows)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "measurements.csv"
         file.write_text(text)
@@ -245,7 +246,7 @@ def campaign(law: str) -> tuple[str, Measurements]:
 def test_the_rig_reads_the_law_by_itself(law):
     """Readings of the nominal machine are those of the model: two programs that share no stiffness code."""
     machine, (data, nominal) = machine_with(law), (campaign(law)[1], parse_nominal(text_with(law), "mine.toml"))
-    rows = rig.case.rows_of(rig.case.paper_campaign())
+    rows = exercise.case.rows_of(exercise.case.paper_campaign())
     plain = readings(nominal, HiddenMachine(), rows)
     modelled = np.exp(Predictor(machine, data).log_stiffness())
     np.testing.assert_allclose(plain, modelled, rtol=1e-9)

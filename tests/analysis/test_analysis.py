@@ -11,8 +11,8 @@ from toolpath_stiff.analysis.poses import evaluate_poses
 from toolpath_stiff.analysis.results import required_stiffness_missed
 from toolpath_stiff.analysis.statistics import weakest_places
 from toolpath_stiff.errors import InputError, UnreachableError
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import parse_program
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.stiffness.model import build_model
 
 MACHINE = load_machine("nist")

@@ -13,8 +13,8 @@ from tests.report.factory import make_analysis, spiral
 from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.loads import PLUNGES_ONLY
 from toolpath_stiff.analysis.statistics import FIGURES, weighted_figures
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import parse_program
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 
 TWO = """(PLATE)

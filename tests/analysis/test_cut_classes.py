@@ -14,8 +14,8 @@ from toolpath_stiff.analysis import LOADS, analyze, parse_load
 from toolpath_stiff.analysis.loads import along_tool_axis, headline_rows, plunging_rows
 from toolpath_stiff.analysis.results import required_stiffness_missed
 from toolpath_stiff.analysis.statistics import FIGURES, stiffness_figures, weakest_places
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.case_study import case_study_program, wavy_program
 
 TANGENTIAL = parse_load("tangential")

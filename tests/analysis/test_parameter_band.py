@@ -9,9 +9,9 @@ import pytest
 
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty
-from toolpath_stiff.nc import read_program
+from toolpath_stiff.nc.reader import read_program
 from toolpath_stiff.stiffness.model import build_model, with_parameter_moved
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from toolpath_stiff.analysis import poses
 from toolpath_stiff.analysis.loads import parse_load
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.stiffness.model import build_model
 
 NIST = build_model(load_machine("nist"))

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from tests.effects.cases import CATALOGUE, all_effects, model_with, neutral_values, readings
 from tests.stiffness.cases import nist, random_poses
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import parse_machine
+from toolpath_stiff.machine.file import parse_machine
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.effects import Effect
+from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model, load_path
 
 NIST_TEXT = (resources.files("toolpath_stiff") / "data" / "machines" / "nist.toml").read_text("utf-8")

@@ -12,7 +12,7 @@ import pytest
 
 from tests.effects.cases import model_with, paper_design, readings
 from tests.stiffness.cases import nist
-from toolpath_stiff.machine import StrutLaw
+from toolpath_stiff.machine.model import StrutLaw
 
 # effect, values, force in N, raw, after refit, relative tolerance
 CASES = [

@@ -11,13 +11,13 @@ from scipy.linalg import eigh
 from tests.effects.cases import model_with, readings
 from tests.stiffness.cases import nist, orthogonal_hexapod, random_poses
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import parse_machine
+from toolpath_stiff.machine.file import parse_machine
 from toolpath_stiff.machine.kinematics import solve_struts
+from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
 from toolpath_stiff.stiffness.model import build_model, load_path
-from toolpath_stiff.updating.measurements import read_measurements
 
 NIST_TEXT = (resources.files("toolpath_stiff") / "data" / "machines" / "nist.toml").read_text("utf-8")
 

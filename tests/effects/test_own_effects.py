@@ -11,10 +11,10 @@ import pytest
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import EffectFault, InputError
+from toolpath_stiff.stiffness.catalogue import MOST_FILES, _loaded, effects_from_file, known_effects
 from toolpath_stiff.stiffness.core import tip_compliance
-from toolpath_stiff.stiffness.effects import MOST_FILES, _loaded, effects_from_file, known_effects
-from toolpath_stiff.stiffness.effects.trial import try_effect, unit_in_si
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.stiffness.trial import try_effect, unit_in_si
 
 SOURCE = """\
 import sys
@@ -159,7 +159,7 @@ def test_wrong_declarations_are_refused_when_the_file_is_loaded(tmp_path, capsys
 
 
 def with_machine(tmp_path: Path, kind: str = "effect", entry: str = "c_nm_per_N = 2.0") -> Path:
-    from toolpath_stiff.machine import packaged_machines
+    from toolpath_stiff.machine.file import packaged_machines
 
     machine = tmp_path / "m.toml"
     machine.write_text(packaged_machines()["nist"].read_text() + f'\n[[{kind}]]\nname = "mine"\n{entry}\n')

@@ -17,13 +17,13 @@ from toolpath_stiff.analysis.poses import evaluate, evaluate_poses
 from toolpath_stiff.analysis.results import required_stiffness_missed
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, PoseError, TpsError
-from toolpath_stiff.nc import parse_program
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.stiffness import core
+from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.core import compliance_along
-from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.frame_compliance import FrameCompliance
-from toolpath_stiff.stiffness.effects.guard import is_compliance
 from toolpath_stiff.stiffness.effects.joint_compliance import JointCompliance
+from toolpath_stiff.stiffness.guard import is_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model
 
 PART = "G21 G90\nG0 X0 Y0 Z0\nG1 X10 F100\nM2\n"

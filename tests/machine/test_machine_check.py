@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from toolpath_stiff.analysis.checks import check_machine
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.machine import load_machine, packaged_machines, parse_machine
-from toolpath_stiff.machine.kinematics import find_symmetry
+from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
+from toolpath_stiff.machine.symmetry import find_symmetry
 from toolpath_stiff.stiffness.model import build_model
 
 NIST = packaged_machines()["nist"].read_text()
@@ -157,7 +157,7 @@ def test_a_bad_entry_names_file_and_line(check, entries, line, told):
 
 def test_entries_from_no_file_still_say_whose_they_are():
     from toolpath_stiff.errors import InputError
-    from toolpath_stiff.machine import EffectEntry
+    from toolpath_stiff.machine.model import EffectEntry
 
     machine = parse_machine(NIST).with_changes(effects=(EffectEntry("joint_compliance", {"x": 1.0}),))
     with pytest.raises(InputError, match=r"machine nist, \[\[effect\]\]: effect joint_compliance: unknown key x"):

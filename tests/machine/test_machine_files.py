@@ -12,17 +12,12 @@ from hypothesis import strategies as st
 
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import (
-    EffectEntry,
-    load_machine,
-    machine_toml,
-    packaged_machines,
-    parse_machine,
-    reach,
-    singularity_index,
-    solve_struts,
-)
+from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
+from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
+from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.linuxcnc import machine_from_hal
+from toolpath_stiff.machine.model import EffectEntry
+from toolpath_stiff.machine.writer import machine_toml
 
 NIST = packaged_machines()["nist"].read_text()
 

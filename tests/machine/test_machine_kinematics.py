@@ -8,20 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import (
-    Limits,
-    Machine,
-    StrutLaw,
+from toolpath_stiff.machine.file import load_machine, packaged_machines
+from toolpath_stiff.machine.kinematics import (
     forward_kinematics,
     joint_angles,
-    load_machine,
-    machine_limits,
-    packaged_machines,
-    reach,
     singularity_index,
     solve_struts,
+    solve_struts_at,
 )
-from toolpath_stiff.machine.kinematics import solve_struts_at
+from toolpath_stiff.machine.limits import machine_limits, reach
+from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
 from toolpath_stiff.rotations import rotation_about_z, rotation_matrices
 
 NIST = load_machine("nist")

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine, machine_toml, parse_machine
+from toolpath_stiff.machine.file import load_machine, parse_machine
 from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty, with_parameter
+from toolpath_stiff.machine.writer import machine_toml
 
 RADIAL = "spindle_compliance.radial_nm_per_N"
 COVARIANCE = np.array([[0.25, 0.03, -0.04], [0.03, 0.16, 0.01], [-0.04, 0.01, 0.09]])

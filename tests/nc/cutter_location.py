@@ -9,7 +9,8 @@ import pytest
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import Program, parse_program
+from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.reader import parse_program
 
 MM = 1e-3
 START = "UNITS/MM\nFEDRAT/600,MMPM\n"

@@ -5,8 +5,8 @@ import pytest
 from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import TABLE_RS274, assert_same_path
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.reader import parse_program, read_program
 
 HEAD = "G90 G17 F10\n"
 runs_rs274 = pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")

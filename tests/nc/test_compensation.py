@@ -11,13 +11,13 @@ from benchmarks import hunt
 from benchmarks.hunt_compensation import Beside, Tolerances
 from tests.nc import rs274
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.compensation import CORNER
 from toolpath_stiff.nc.controller import DIALECTS, Controller
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.path import sample_moves
-from toolpath_stiff.rewriting import rewrite_program
+from toolpath_stiff.rewriting.program import rewrite_program
 
 LINUXCNC = Controller(DIALECTS["linuxcnc"])
 TOOLS = {1: ToolEntry(1, 50.0, 6.0), 2: ToolEntry(2, 50.0, -6.0), 3: ToolEntry(3, 50.0)}

@@ -9,8 +9,9 @@ import pytest
 from benchmarks import conformance
 from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import assert_same_path, debian_programs
-from toolpath_stiff.nc import Program, parse_program
 from toolpath_stiff.nc.controller import Controller
+from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.reader import parse_program
 
 ARC = "G1 X10 F100\nG2 X30 I10\nG1 X40 A5\n"
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from tests.nc import rs274
 from tests.nc.cutter_location import MM, START, leaning, read, tilt
 from tests.nc.test_nc_against_rs274 import assert_same_path
-from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.moves import CYCLE
+from toolpath_stiff.nc.reader import parse_program
 
 
 @pytest.mark.parametrize(

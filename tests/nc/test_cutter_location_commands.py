@@ -12,14 +12,15 @@ import pytest
 
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import cutter_location, parse_program, read_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import DIALECTS, Controller
+from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.nc.operations import operations
+from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.words import looks_like_cutter_location
-from toolpath_stiff.rewriting import offset_blocks
+from toolpath_stiff.rewriting.program import offset_blocks
 from toolpath_stiff.rotations import rotation_matrices
 
 FOLDER = Path(__file__).parents[2] / "programs"

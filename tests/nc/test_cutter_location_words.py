@@ -9,7 +9,7 @@ import pytest
 
 from tests.nc.cutter_location import MM, START, read, refused
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.cutter_location import WORDS, table
+from toolpath_stiff.nc.cutter_location.vocabulary import WORDS, table
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.tables import ToolEntry
 

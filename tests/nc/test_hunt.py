@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks import hunt
 from tests.nc import rs274
-from toolpath_stiff.nc import parse_program
+from toolpath_stiff.nc.reader import parse_program
 
 pytestmark = pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
 

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import linuxcnc, parse_program, read_program
-from toolpath_stiff.nc.linuxcnc import Limits
+from toolpath_stiff.nc.linuxcnc import inputs, reader, runner
+from toolpath_stiff.nc.linuxcnc.runner import Limits
+from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.tables import Offsets
 
 INSTALLED = shutil.which("rs274") is not None
@@ -92,9 +93,9 @@ def started(monkeypatch):
         runs.append(program)
         raise InputError("started")
 
-    monkeypatch.setattr(linuxcnc, "run_rs274", run)
-    monkeypatch.setattr(linuxcnc, "find_rs274", lambda path=None, unconfined=False: "/usr/bin/rs274")
-    monkeypatch.setattr(linuxcnc, "find_rs274", lambda path=None, unconfined=False: "/usr/bin/rs274")
+    monkeypatch.setattr(reader, "run_rs274", run)
+    monkeypatch.setattr(reader, "find_rs274", lambda path=None, unconfined=False: "/usr/bin/rs274")
+    monkeypatch.setattr(reader, "find_rs274", lambda path=None, unconfined=False: "/usr/bin/rs274")
     return runs
 
 
@@ -210,7 +211,7 @@ def test_no_file_appears(tmp_path, monkeypatch):
     text = marker_program(marker)
     with pytest.raises(InputError):
         parse_program(text, interpreter="linuxcnc")
-    monkeypatch.setattr(linuxcnc, "refuse_other_programs", lambda lines, name: None)
+    monkeypatch.setattr(reader, "refuse_other_programs", lambda lines, name: None)
     parse_program(text, interpreter="linuxcnc")
     program = parse_program(f"(LOGOPEN,{log})\n(LOG,hello)\n(PROBEOPEN {log})\nG1 X1 F100\nM2", interpreter="linuxcnc")
     assert [(note.line, note.reason) for note in program.unsupported] == [
@@ -253,16 +254,16 @@ def test_a_program_is_not_changed_and_a_run_leaves_no_trace_in_the_next(tmp_path
     assert file.read_bytes() == before and list(tmp_path.iterdir()) == [file]
 
 
-def read_limited(text: str, limits: Limits, unconfined: bool = False) -> linuxcnc.Reading:
+def read_limited(text: str, limits: Limits, unconfined: bool = False) -> reader.Reading:
     lines = text.split("\n")
-    return linuxcnc.read(lines, "part.nc", None, ZERO, Offsets(), None, False, limits=limits, unconfined=unconfined)
+    return reader.read(lines, "part.nc", None, ZERO, Offsets(), None, False, limits=limits, unconfined=unconfined)
 
 
 @needs_rs274
 @pytest.mark.parametrize("confined", [True, False])
 def test_an_endless_loop_ends(confined, monkeypatch):
     if not confined:
-        monkeypatch.setattr(linuxcnc, "_bubblewrap", lambda: None)
+        monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
     with pytest.raises(InputError, match=r"part\.nc.*after 1 s of processor time.*endless loop"):
         read_limited("G1 X1 F100\no100 while [1]\n#1 = 1\no100 endwhile\nM2", Limits(seconds=1), not confined)
 
@@ -280,13 +281,13 @@ def test_an_endless_loop_is_named():
 def test_it_starts_no_process(confined, monkeypatch, tmp_path):
     """A stand-in for rs274 that tries; what it is itself, it still does."""
     if not confined:
-        monkeypatch.setattr(linuxcnc, "_bubblewrap", lambda: None)
+        monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
     fake = tmp_path / "rs274"
     fake.write_text(
         "#!/bin/sh\necho alive > canon.txt\n/bin/true && echo started >> canon.txt\necho late >> canon.txt\n"
     )
     fake.chmod(0o755)
-    assert linuxcnc.run_rs274("M2\n", "", "", rs274=str(fake)).canon == "alive\n"
+    assert runner.run_rs274("M2\n", "", "", rs274=str(fake)).canon == "alive\n"
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="root alone may become another user")
@@ -294,7 +295,7 @@ def test_a_user_without_the_filter_starts_no_process_either(tmp_path):
     """The limit on processes holds for everyone but root, for whom the filter is."""
     script, limit = tmp_path / "limiter.py", "    resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))\n"
     with_filter = limit + "    start_nothing()\n"
-    text = linuxcnc.LIMITER.read_text()
+    text = runner.LIMITER.read_text()
     assert with_filter in text
     script.write_text(text.replace(with_filter, "    os.setuid(65534)\n" + limit))
     limits = ["10", str(1 << 30), "1000000"]
@@ -315,7 +316,7 @@ def test_endless_recursion_ends():
         read_limited("o100 sub\no100 call\no100 endsub\nG1 X1 F100\no100 call\nM2", Limits(seconds=5))
 
 
-@pytest.mark.skipif(linuxcnc._bubblewrap() is None, reason="bubblewrap is not installed, or may not work here")
+@pytest.mark.skipif(runner._bubblewrap() is None, reason="bubblewrap is not installed, or may not work here")
 def test_in_bubblewrap_nothing_else_can_be_written_and_there_is_no_network(tmp_path):
     """A stand-in for rs274 that tries."""
     outside = tmp_path / "outside"
@@ -324,7 +325,7 @@ def test_in_bubblewrap_nothing_else_can_be_written_and_there_is_no_network(tmp_p
         f"#!/bin/sh\necho x > {outside}\nwhile read line; do echo $line; done < /proc/net/dev > canon.txt\n"
     )
     fake.chmod(0o755)
-    run = linuxcnc.run_rs274("M2\n", "", "", rs274=str(fake))
+    run = runner.run_rs274("M2\n", "", "", rs274=str(fake))
     assert not outside.exists()
     interfaces = [line.split(":")[0].strip() for line in run.canon.splitlines() if ":" in line]
     assert interfaces == ["lo"]
@@ -335,8 +336,8 @@ def test_it_is_started_without_a_shell_in_a_home_of_its_own(tmp_path, monkeypatc
     fake = tmp_path / "rs; touch x"
     fake.write_text("#!/bin/sh\nexport -p > canon.txt\npwd >> canon.txt\n")
     fake.chmod(0o755)
-    monkeypatch.setattr(linuxcnc, "_bubblewrap", lambda: None)
-    run = linuxcnc.run_rs274("M2\n", "", "", rs274=str(fake))
+    monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
+    run = runner.run_rs274("M2\n", "", "", rs274=str(fake))
     home = next(line for line in run.canon.splitlines() if line.startswith("export HOME=")).split("=")[1].strip("'")
     assert run.canon.splitlines()[-1] == home and home != os.environ.get("HOME")
     assert "SECRET" not in run.canon
@@ -349,9 +350,9 @@ def test_its_end_is_noticed_whether_the_kernel_tells_or_not(handles, monkeypatch
         monkeypatch.delattr(os, "pidfd_open", raising=False)
     process = subprocess.Popen(["cat"], stdin=subprocess.PIPE)  # it ends with its input
     try:
-        assert not linuxcnc._ended(process, 0.01)
+        assert not runner._ended(process, 0.01)
         process.stdin.close()
-        assert linuxcnc._ended(process, 60)
+        assert runner._ended(process, 60)
         assert process.wait() == 0
     finally:
         process.kill()

@@ -13,8 +13,9 @@ from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import TABLE_OURS, Writer, cycle_program
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import Moves, parse_program, read_program
-from toolpath_stiff.nc import linuxcnc as runner
+from toolpath_stiff.nc.linuxcnc import runner
+from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, WorkOffset, read_tool_table
 
 needs_rs274 = pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")

@@ -13,7 +13,8 @@ import pytest
 
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
-from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
+from toolpath_stiff.nc.moves import MOTION_NAMES, Program
+from toolpath_stiff.nc.reader import read_program
 
 pytestmark = pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
 

@@ -14,9 +14,9 @@ from tests.nc.test_nc_against_rs274 import TOOLS, Writer, cycle_program
 from toolpath_stiff.analysis.checks import extents, figures, machine_findings, radii_findings
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import parse_program
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.path import sample_moves
 

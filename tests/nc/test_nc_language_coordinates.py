@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.reader import parse_program
 
 ROUNDING_M = 1e-12  # sums and cosines of numbers up to 1 m
 

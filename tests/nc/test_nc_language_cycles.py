@@ -10,8 +10,8 @@ import pytest
 from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import assert_same_path
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.controller import DIALECTS, Controller
+from toolpath_stiff.nc.reader import parse_program, read_program
 
 LINUXCNC = Controller(DIALECTS["linuxcnc"])
 

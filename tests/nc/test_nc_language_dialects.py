@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import DIALECTS, Controller, read_controller
-from toolpath_stiff.rewriting import rewrite_program
+from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.rewriting.program import rewrite_program
 
 PLAIN, LINUXCNC, FANUC, HAAS = (Controller(DIALECTS[name]) for name in ("generic", "linuxcnc", "fanuc", "haas"))
 
@@ -281,7 +281,7 @@ def test_other_languages_are_refused_by_name(text, language, line):
 
 @given(st.text("GXYZABCIJKRLMFSTN0123456789.+- ()=;%/:", max_size=30))
 def test_plain_g_code_is_not_taken_for_another_language(noise):
-    from toolpath_stiff.nc import language_of
+    from toolpath_stiff.nc.reader import language_of
 
     for line in ("N10 G1 X+10. Y-5. F100", "(L X+10 FMAX)", "; MSG(", "%", "O1234 (DEF REAL)", "T1 M6", "S1000 M3"):
         assert language_of(line) is None

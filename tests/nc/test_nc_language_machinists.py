@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
+from toolpath_stiff.nc.reader import parse_program
 
 
 def ends_mm(text: str, **options) -> list[tuple[float, ...]]:

@@ -8,8 +8,8 @@ import pytest
 
 from tests.placement.rewriting import assert_same_path
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program
-from toolpath_stiff.rewriting import rewrite_program
+from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.rewriting.program import rewrite_program
 
 HERE = (0.0,) * 6
 THERE = [

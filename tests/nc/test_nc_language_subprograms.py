@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import assert_same_path
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.nc.reader import parse_program, read_program
 
 BODIES = {
     1000: ["G91 G1 X1 Y2", "G90"],

@@ -10,7 +10,7 @@ import pytest
 from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import TABLE_OURS, TABLE_RS274, assert_same_path
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import read_program
+from toolpath_stiff.nc.reader import read_program
 
 REFUSED = {
     "G43.1 moves to its Z too": ("F100\nG43.1 Z5 G1\nX1", "both use the axis words"),

@@ -8,12 +8,12 @@ import pytest
 from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import TABLE_OURS, TABLE_RS274, assert_same_path
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.codes.registry import would_change
 from toolpath_stiff.nc.controller import Controller, dialect_named
 from toolpath_stiff.nc.lathes import lathe_program
 from toolpath_stiff.nc.moves import FEED, RAPID
+from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.words import read_block, read_lines
 
 HEAD = "G21 G90 F600.\nG0 Z5.\n"

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolpath_stiff.nc import MOTION_NAMES, parse_program, read_program
+from toolpath_stiff.nc.moves import MOTION_NAMES
+from toolpath_stiff.nc.reader import parse_program, read_program
 
 
 def moves_of(text: str, **options):

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from tests.nc import emission, rs274
 from tests.nc.emission import Style, Writer
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import Moves, parse_program
+from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 
 TOOLS = {number: ToolEntry(number, length, 6.0) for number, length in emission.TOOLS.items()}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.nc.reader import parse_program, read_program
 
 REFUSALS = [
     ("G77 X1", 1, 1, "not a G code"),

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.nc import rs274
-from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.operations import MOST_OPERATIONS, Operations, find_operations, headings, operations, plain_name
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 
 needs_rs274 = pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")

@@ -14,10 +14,10 @@ from benchmarks.hunt import OTHER, hunt_one
 from benchmarks.hunt_programs import Parametric
 from tests.nc import rs274
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, dialect_named
 from toolpath_stiff.nc.moves import FEED, RAPID
+from toolpath_stiff.nc.reader import parse_program
 
 LINUXCNC, FANUC = Controller(dialect_named("linuxcnc")), Controller(dialect_named("fanuc"))
 
@@ -286,16 +286,16 @@ def test_check_goes_on_behind_a_loop_without_its_end(loop, leave):
     ],
 )
 def test_a_loop_in_which_nothing_changes_is_refused_at_once(text, controller, line, monkeypatch):
-    monkeypatch.setattr("toolpath_stiff.nc.parametric.MOST_STEPS", 200)
+    monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_STEPS", 200)
     error = refusal(text, controller)
     assert "never ends" in error.found and error.line == line
 
 
 def test_a_loop_without_an_end_is_stopped(monkeypatch):
-    monkeypatch.setattr("toolpath_stiff.nc.parametric.MOST_IDLE", 500)
+    monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_IDLE", 500)
     error = refusal("#1=0\no1 while [1]\n#1=[#1+1]\no1 endwhile\n", LINUXCNC)
     assert "500 blocks of loops" in error.found and error.line == 4
-    monkeypatch.setattr("toolpath_stiff.nc.parametric.MOST_STEPS", 900)
+    monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_STEPS", 900)
     error = refusal("F9\n#1=0\no1 while [1]\nG1 X#1\n#1=[#1+1]\no1 endwhile\n", LINUXCNC)
     assert "900 blocks" in error.found
 

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import geometry, interpreter, plain_lines, plain_words
-from toolpath_stiff.nc import state as frames
+from toolpath_stiff.nc import frames
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.codes import modes, points
 from toolpath_stiff.nc.controller import DIALECTS, Controller
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
-from toolpath_stiff.nc.state import Frames, State
+from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.nc.words import read_lines, split_lines
 

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from tests.nc import rs274
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import Program, parse_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import Controller, read_controller
 from toolpath_stiff.nc.geometry import move_lengths
-from toolpath_stiff.nc.moves import ARC, RAPID
+from toolpath_stiff.nc.moves import ARC, RAPID, Program
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path import move_durations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 
@@ -299,7 +299,7 @@ def test_divided_moves_of_heads_stay_within_the_tolerance_too(tmp_path_factory, 
 def test_moves_recovered_in_portions_are_the_same(control, monkeypatch):
     text = hemisphere_program(40, 4).replace("M30", "G4 P1\nG93\nC900 F2\nG94\nG0 X20 Y-5 A0\nG93 G1 C0 F2\nX9 F3\nM30")
     whole = parse_program(text, controller=control(AC)).moves
-    monkeypatch.setattr("toolpath_stiff.nc.posted.MOVES_AT_A_TIME", 1)
+    monkeypatch.setattr("toolpath_stiff.nc.recovery.MOVES_AT_A_TIME", 1)
     portions = parse_program(text, controller=control(AC)).moves
     for name in ("line", "motion", "start", "end", "feed", "dwell", "tool"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(portions, name))

@@ -9,9 +9,9 @@ import pytest
 
 from tests.nc.test_compensation import distance_to
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import Program, parse_program
 from toolpath_stiff.nc.controller import Controller, dialect_named
-from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.moves import RAPID, Program
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.path import sample_moves
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolpath_stiff.nc import Program
-from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.moves import RAPID, Program
 from toolpath_stiff.path import place, place_orientations
 from toolpath_stiff.rotations import rotation_matrices
 

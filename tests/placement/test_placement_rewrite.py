@@ -15,12 +15,12 @@ from tests.placement.rewriting import assert_same_path
 from toolpath_stiff.analysis import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.path import place
-from toolpath_stiff.placement import rewriting_differences
-from toolpath_stiff.rewriting import rewrite_program
+from toolpath_stiff.placement.placing import rewriting_differences
+from toolpath_stiff.rewriting.program import rewrite_program
 
 PROGRAMS = Path(__file__).parents[2] / "programs"
 # A program with a controller file is posted for another machine, and not rewritten.

@@ -11,8 +11,8 @@ import pytest
 from tests.placement.test_placement_search import headline_figures
 from toolpath_stiff.analysis import analyze
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import read_program
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.reader import read_program
 
 PROGRAMS = Path(__file__).parents[2] / "programs"
 FIXED = ["--x", "30", "--y=-45", "--z", "900", "--rotate", "37", "--no-plots", "--step", "2"]

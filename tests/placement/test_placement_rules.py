@@ -19,11 +19,12 @@ from toolpath_stiff.analysis import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import UnreachableError
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import parse_program
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path import place
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, least_costs
+from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
 from toolpath_stiff.placement.evaluator import Evaluator, Keepout
+from toolpath_stiff.placement.linear_programmes import least_costs
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
 from toolpath_stiff.stiffness.model import build_model
@@ -388,7 +389,7 @@ def earlier(searched_folder, tmp_path, monkeypatch):
 
 
 def test_pick_takes_a_point_of_the_front_without_a_search(earlier, monkeypatch, capsys):
-    from toolpath_stiff import placement
+    from toolpath_stiff.placement import search as placement
 
     def never(*_, **__):
         raise AssertionError("searched again")

@@ -20,14 +20,14 @@ from toolpath_stiff.analysis import analyze, parse_load
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import parse_program, read_program
-from toolpath_stiff.placement import nothing_better_words
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, front_rows, thin
+from toolpath_stiff.placement.document import nothing_better_words
 from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures
 from toolpath_stiff.placement.paths import placed_path, representative_path, work_path
 from toolpath_stiff.placement.search import SearchRules, search_placements
-from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.moves_factory import make_moves
 from toolpath_stiff.analysis import Analysis, analyze
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.moves import RAPID, Program, ToolUse, Unsupported
 
 

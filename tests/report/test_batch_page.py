@@ -11,8 +11,9 @@ import pytest
 
 from tests.browser import needs_browser, run_in
 from tests.report.test_report_page import EVIL, Page
-from toolpath_stiff.report import script_hash
-from toolpath_stiff.report.batch import Outcome, batch_page, summary_csv, terminal_summary
+from toolpath_stiff.report.batch.index import batch_page
+from toolpath_stiff.report.batch.programs import Outcome, summary_csv, terminal_summary
+from toolpath_stiff.report.pages import script_hash
 
 
 def outcome(name, low, mean, high, **more):

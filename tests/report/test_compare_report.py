@@ -16,12 +16,13 @@ from matplotlib.image import imread
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, readings_by_hand, table_1
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.comparison.compare import Comparison, compare
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.report.compare import QUESTIONS, compare_html, compare_pictures, load_path_png, residuals_csv
-from toolpath_stiff.report.compare import text as terminal_text
-from toolpath_stiff.updating.comparison import Comparison, compare
-from toolpath_stiff.updating.measurements import Measurements
+from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.report.compare.page import QUESTIONS, compare_html, compare_pictures, residuals_csv
+from toolpath_stiff.report.compare.page import text as terminal_text
+from toolpath_stiff.report.compare.variables import load_path_png
 
 NASTY = '<script>alert("1")</script>$x^2$'
 

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.image import imread
 
 from tests.report import diagnose_documents as documents
-from toolpath_stiff.report.diagnose import diagnose_html
+from toolpath_stiff.report.diagnose.page import diagnose_html
 from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, ladder_png
 from toolpath_stiff.report.explanations import headline
 

@@ -16,23 +16,24 @@ from tests.report.factory import short
 from tests.stiffness.cases import nist
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.poses import map_stiffness
+from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
-from toolpath_stiff.report import asset, case_study, figure, machine, measuring
+from toolpath_stiff.planning.document import MOST_LEVELS, group_of, height_groups
+from toolpath_stiff.planning.visits import Visits
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.report import case_study, figure, machine, measuring
 from toolpath_stiff.report import map as map_report
-from toolpath_stiff.report.analysis import summary_with_options
 from toolpath_stiff.report.analysis.page import page
-from toolpath_stiff.report.batch import batch_page
+from toolpath_stiff.report.analysis.summary import summary_with_options
+from toolpath_stiff.report.batch.index import batch_page
 from toolpath_stiff.report.compare import pictures as compare_pictures
-from toolpath_stiff.report.diagnose import diagnose_html
 from toolpath_stiff.report.diagnose import pictures as diagnose_pictures
+from toolpath_stiff.report.diagnose.page import diagnose_html
 from toolpath_stiff.report.figure import INK, page_colours
 from toolpath_stiff.report.map import map_page
+from toolpath_stiff.report.pages import asset
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.updating.comparison import compare
-from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.planning.document import MOST_LEVELS, group_of, height_groups
-from toolpath_stiff.updating.planning.visits import Visits
 
 TOUCH = 1.5  # pixels that boxes may share: they are a little larger than the letters
 

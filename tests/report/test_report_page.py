@@ -12,10 +12,11 @@ import pytest
 from tests.browser import needs_browser, opened, run_in
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.nc.moves import ToolUse, Unsupported
-from toolpath_stiff.report import json_for_script, number
 from toolpath_stiff.report.analysis import page as page_module
-from toolpath_stiff.report.analysis import summary_with_options
 from toolpath_stiff.report.analysis.page import NONE, OUT_OF_REACH, PLUNGE, page, page_rows
+from toolpath_stiff.report.analysis.summary import summary_with_options
+from toolpath_stiff.report.pages import json_for_script
+from toolpath_stiff.report.words import number
 
 EVIL = "</script><script>alert(1)</script>"
 VOID = {"meta", "input", "br", "hr", "img", "link"}

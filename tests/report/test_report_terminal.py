@@ -5,8 +5,8 @@ import copy
 import pytest
 
 from tests.report.factory import make_analysis, short, spiral
-from toolpath_stiff.report import WIDTH, duration, number
-from toolpath_stiff.report.analysis import MOST_OPERATIONS, compare_summaries, comparison_table, terminal_table
+from toolpath_stiff.report.analysis.summary import MOST_OPERATIONS, compare_summaries, comparison_table, terminal_table
+from toolpath_stiff.report.words import WIDTH, duration, number
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ import pytest
 
 from tests.report.factory import make_analysis, short
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.report.analysis import files, names
 from toolpath_stiff.report.analysis import page as page_module
+from toolpath_stiff.report.analysis.summary import files, names
 from toolpath_stiff.results_folder import MANIFEST, write_folder
 
 PLOTS = {"samples.csv", "summary.json", "path.png", "profile.png", "report.html"}

@@ -9,11 +9,11 @@ import pytest
 
 from tests.conftest import seeds
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.rig import CATALOGUE, OUTSIDE, Nuisances, csv_text, draw_case, effects_of_layout, make_case
-from toolpath_stiff.rig.case import clamp_of, rows_of
-from toolpath_stiff.rig.effects import Covariance
-from toolpath_stiff.rig.hidden import disturb_readings
-from toolpath_stiff.rig.structure import load_nominal, reachable
+from toolpath_stiff.rig.case import clamp_of, draw_case, effects_of_layout, make_case, rows_of
+from toolpath_stiff.rig.effects import CATALOGUE, Covariance
+from toolpath_stiff.rig.exercise import csv_text
+from toolpath_stiff.rig.hidden import OUTSIDE, Nuisances, disturb_readings
+from toolpath_stiff.rig.nominal import load_nominal, reachable
 
 NIST = load_nominal("nist")
 
@@ -177,7 +177,7 @@ def test_wrong_arguments_are_named(arguments, message):
 def test_a_machine_that_already_carries_effects_is_refused():
     text = NIST.text + '\n[[effect]]\nname = "weak_strut"\nstrut = 1\nfactor = 0.5\n'
     with pytest.raises(InputError, match="effect"):
-        from toolpath_stiff.rig.structure import parse_nominal
+        from toolpath_stiff.rig.nominal import parse_nominal
 
         parse_nominal(text, "mine.toml")
 

@@ -9,8 +9,9 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from toolpath_stiff.rig.hidden import HiddenMachine, Oddity, Rows, readings, true_stiffness
-from toolpath_stiff.rig.structure import commanded_lengths, load_nominal, rotations, true_poses
+from toolpath_stiff.rig.hidden import HiddenMachine, Oddity, readings, true_stiffness
+from toolpath_stiff.rig.nominal import commanded_lengths, load_nominal, rotations, true_poses
+from toolpath_stiff.rig.rows import Rows
 
 NIST = load_nominal("nist")
 AXES = np.eye(3)

@@ -9,11 +9,15 @@ import pytest
 
 from tests.rig.test_rig_mechanics import NIST, rows_at
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.rig import CATALOGUE, OUTSIDE, UNKNOWNS, draw_case, make_case, score, seal, unseal
-from toolpath_stiff.rig.case import BLIND
-from toolpath_stiff.rig.hidden import HiddenMachine, Unknown, readings
-from toolpath_stiff.rig.structure import Rows, commanded_lengths, rotations
-from toolpath_stiff.rig.unknowns import LINKS, SOUND_BAR, VARIABLES
+from toolpath_stiff.rig.case import BLIND, draw_case, make_case
+from toolpath_stiff.rig.effects import CATALOGUE
+from toolpath_stiff.rig.exercise import score, seal, unseal
+from toolpath_stiff.rig.hidden import OUTSIDE, HiddenMachine, readings
+from toolpath_stiff.rig.nominal import commanded_lengths, rotations
+from toolpath_stiff.rig.rows import Rows
+from toolpath_stiff.rig.unknown import LINKS, VARIABLES, Unknown
+from toolpath_stiff.rig.unknown_struts import SOUND_BAR
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 FEW = rows_at([[100, -200, 800], [-150, 260, 1100]], [[10, -15, 20], [0, 12, -5]])
 FEW = dataclasses.replace(FEW, setup=np.array(["riser"] * 3 + ["table"] * 3), temperature=np.full(6, 21.0))

@@ -8,7 +8,8 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.machine import Machine, StrutLaw, load_machine
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.rotations import rotation_matrices
 
 FloatArray = NDArray[np.float64]

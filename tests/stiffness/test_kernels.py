@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toolpath_stiff.machine import Limits, Machine, StrutLaw, load_machine, singularity_index, solve_struts
-from toolpath_stiff.machine.kinematics import solve_struts_at
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.machine.kinematics import singularity_index, solve_struts, solve_struts_at
+from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
 from toolpath_stiff.rotations import rotation_about_z, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import build_model

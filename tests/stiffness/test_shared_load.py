@@ -17,11 +17,11 @@ from tests.stiffness.cases import nist, random_poses
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.poses import evaluate, evaluate_poses
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import core, exact
-from toolpath_stiff.stiffness.effects import Effect, find_effect
-from toolpath_stiff.stiffness.effects.contract import Parameter
+from toolpath_stiff.stiffness.catalogue import find_effect
+from toolpath_stiff.stiffness.contract import Effect, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, load_path
 
 POSITION, ROTATION = random_poses(40, seed=11)

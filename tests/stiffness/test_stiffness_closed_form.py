@@ -14,7 +14,7 @@ from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness import truss as reference
-from toolpath_stiff.stiffness.effects import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model, load_path
 
 ORIGIN = np.zeros((1, 3))

@@ -10,10 +10,11 @@ import pytest
 
 from tests.stiffness.cases import nist, random_poses
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import parse_machine
-from toolpath_stiff.stiffness import effects as registry
+from toolpath_stiff.machine.file import parse_machine
+from toolpath_stiff.stiffness import catalogue as registry
+from toolpath_stiff.stiffness.catalogue import effects_from_file, known_effects
+from toolpath_stiff.stiffness.contract import LINKS
 from toolpath_stiff.stiffness.core import tip_compliance
-from toolpath_stiff.stiffness.effects import LINKS, effects_from_file, known_effects
 from toolpath_stiff.stiffness.model import build_model, load_path
 
 NIST_TEXT = (resources.files("toolpath_stiff") / "data" / "machines" / "nist.toml").read_text("utf-8")

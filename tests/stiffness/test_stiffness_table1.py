@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.stiffness.cases import nist, table_1_positions, table_1_stiffness
-from toolpath_stiff.machine import solve_struts
+from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import truss as reference
 from toolpath_stiff.stiffness.core import tip_compliance

@@ -13,8 +13,8 @@ import subprocess
 import pytest
 
 import toolpath_stiff as tps
-from toolpath_stiff.api.case_results import sha256
 from toolpath_stiff.api.trust import agree
+from toolpath_stiff.case.files import sha256
 from toolpath_stiff.cli.main import main
 
 SEED = 9006  # hides a weak strut

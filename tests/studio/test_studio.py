@@ -19,9 +19,9 @@ import pytest
 
 import toolpath_stiff as tps
 from tests.browser import BROWSER
-from toolpath_stiff import rig
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.studio import ask_for_effects
+from toolpath_stiff.rig import exercise as rig
+from toolpath_stiff.studio.run import ask_for_effects
 
 SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nG1 Y30\nM2\n"
 SEED, LAYOUT = 9006, "paper"

@@ -15,8 +15,8 @@ from openpyxl import Workbook
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.tables import Columns, parse_table, read_table
-from toolpath_stiff.updating.measurements import read_measurements
 
 COLUMNS = Columns(
     numbers=("x_mm", "y_mm", "z_mm", "stiffness_N_per_mm", "force_N", "temperature_C", "displacement_um"),

@@ -18,19 +18,22 @@ from numpy.typing import ArrayLike, NDArray
 from tests.conftest import as_written
 from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist
-from toolpath_stiff import rig
-from toolpath_stiff.machine import Machine, machine_toml
-from toolpath_stiff.stiffness.effects import Effect, find_effect
+from toolpath_stiff.diagnosis.diagnose import Diagnosis, diagnose
+from toolpath_stiff.inference import judgement as inference
+from toolpath_stiff.inference.candidates import testable_effects
+from toolpath_stiff.inference.covariances import Covariance, Groups
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.judgement import Judgement, judge
+from toolpath_stiff.inference.noise import Noise, noise_models
+from toolpath_stiff.inference.prediction import Predictor, idle_on
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.rig import case, exercise
+from toolpath_stiff.rig import hidden as hidden_module
+from toolpath_stiff.stiffness.catalogue import find_effect
+from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating import inference
-from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
-from toolpath_stiff.updating.inference import Judgement, judge
-from toolpath_stiff.updating.inference.candidates import testable_effects
-from toolpath_stiff.updating.inference.covariances import Covariance, Groups
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.noise import Noise, noise_models
-from toolpath_stiff.updating.inference.prediction import Predictor, idle_on
-from toolpath_stiff.updating.measurements import Measurements, read_measurements
 
 FloatArray = NDArray[np.float64]
 
@@ -54,11 +57,11 @@ def campaign(
     layout: str = "tilted",
     hidden: str = "none",
     size: float | None = None,
-    nuisances: rig.Nuisances | None = None,
+    nuisances: hidden_module.Nuisances | None = None,
 ) -> tuple[Measurements, dict[str, Any]]:
     """A blind campaign on the NIST machine and its truth."""
-    rows, truth = rig.make_case(seed, layout=layout, hidden=hidden, size=size, nuisances=nuisances)
-    return read_text(rig.csv_text(rows)), truth
+    rows, truth = case.make_case(seed, layout=layout, hidden=hidden, size=size, nuisances=nuisances)
+    return read_text(exercise.csv_text(rows)), truth
 
 
 @cache

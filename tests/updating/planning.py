@@ -12,12 +12,12 @@ from scipy.optimize import least_squares
 
 from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist
-from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.inference.candidates import Component
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.planning.rivals import Rival
+from toolpath_stiff.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.inference.candidates import Component
-from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.measurements import Measurements, read_measurements
-from toolpath_stiff.updating.planning.rivals import Rival
 
 FloatArray = NDArray[np.float64]
 

@@ -12,9 +12,8 @@ from scipy.integrate import quad
 from tests.effects.cases import all_effects
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, readings_by_hand, simple_noise, table_1
-from toolpath_stiff.stiffness.effects.contract import Parameter
-from toolpath_stiff.updating.inference import candidates
-from toolpath_stiff.updating.inference.candidates import (
+from toolpath_stiff.inference import candidates
+from toolpath_stiff.inference.candidates import (
     EXPECTED,
     VISIBLE,
     Candidate,
@@ -24,8 +23,9 @@ from toolpath_stiff.updating.inference.candidates import (
     candidates_of,
     tabulate,
 )
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.stiffness.contract import Parameter
 
 EFFECTS = all_effects()
 REAL = [(name, p.name) for name, effect in EFFECTS.items() for p in effect.parameters if not p.discrete]

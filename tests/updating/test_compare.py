@@ -11,15 +11,15 @@ import pytest
 from tests.conftest import seeds
 from tests.stiffness.cases import nist, orthogonal_hexapod
 from tests.updating.cases import active, campaign, read_text, readings_by_hand, table_1
-from toolpath_stiff import rig
+from toolpath_stiff.comparison.compare import Comparison, compare
+from toolpath_stiff.comparison.principles import load_path_shares
+from toolpath_stiff.comparison.residuals import directions, planes, radius, zones
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.inference.fits import error_figures
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.rig import case, exercise
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.updating.comparison import Comparison, compare
-from toolpath_stiff.updating.comparison.principles import load_path_shares
-from toolpath_stiff.updating.comparison.residuals import directions, planes, radius, zones
-from toolpath_stiff.updating.inference.fits import error_figures
-from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.measurements import Measurements, read_measurements
 
 FEW = 300  # simulated sets of readings: enough to tell 5 % from 1 %
 
@@ -213,12 +213,12 @@ def test_one_reading_again_and_again():
 
 
 def test_the_order_of_files_is_kept_and_a_file_that_is_off_is_named(tmp_path):
-    rows = rig.make_case(49, layout="tilted", hidden="none")[0]
+    rows = case.make_case(49, layout="tilted", hidden="none")[0]
     files = [tmp_path / "first.csv", tmp_path / "second.csv"]
     for file, chosen, factor in zip(files, (slice(0, 150), slice(150, 288)), (1.0, 0.85), strict=True):
         part = {name: np.asarray(values)[chosen] for name, values in rows.items()}
         part["stiffness_N_per_mm"] = factor * part["stiffness_N_per_mm"]
-        file.write_text(rig.csv_text(part))
+        file.write_text(exercise.csv_text(part))
     found = quick(read_measurements([str(file) for file in files], nist())).document
     assert found["data"] == [str(file) for file in files]
     first = found["findings"][0]

@@ -9,10 +9,10 @@ import pytest
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, correlated_covariance, readings_by_hand, simple_noise, table_1
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.updating.comparison.principles import assess, model_free_checks, symmetries
-from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.measurements import Measurements
+from toolpath_stiff.comparison.principles import assess, model_free_checks, symmetries
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.readings.measurements import Measurements
 
 ROUND = 1e-6  # relative: joints of the packaged machine are given to 1e-7 m of some metres
 

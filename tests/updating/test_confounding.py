@@ -14,11 +14,8 @@ from scipy.stats import norm
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, simple_noise, table_1
 from tests.updating.test_evidence import by_hand, logs_by_hand, one_table, scatter
-from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.stiffness.effects.contract import Effect
-from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.hypotheses import (
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.hypotheses import (
     CONFOUNDED,
     Confounding,
     Detectable,
@@ -28,7 +25,10 @@ from toolpath_stiff.updating.inference.hypotheses import (
     detectable_sizes,
     score_families,
 )
-from toolpath_stiff.updating.measurements import Measurements
+from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.stiffness.catalogue import find_effect
+from toolpath_stiff.stiffness.contract import Effect
+from toolpath_stiff.stiffness.model import ActiveEffect
 
 FloatArray = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
 from tests.updating.cases import campaign, predictor_for, simple_noise
-from toolpath_stiff.updating.comparison.structure import EXCESSES, Scattering, _Fit
-from toolpath_stiff.updating.inference.covariances import Covariance, Groups, Widening, inverse_root
-from toolpath_stiff.updating.inference.gates import discrepancy_forms
-from toolpath_stiff.updating.inference.noise import Scatter
+from toolpath_stiff.comparison.structure import EXCESSES, Scattering, _Fit
+from toolpath_stiff.inference.covariances import Covariance, Groups, Widening, inverse_root
+from toolpath_stiff.inference.gates import discrepancy_forms
+from toolpath_stiff.inference.noise import Scatter
 
 FloatArray = NDArray[np.float64]
 
@@ -153,7 +153,7 @@ def test_features_of_a_form_are_those_of_its_covariance():
 @pytest.mark.parametrize("wide", [60, 3])  # every group of more than 3 readings, or none, as one more shared column
 def test_residuals_are_weighed_as_by_the_whole_covariance(wide, monkeypatch):
     """By t = x' V^-1 r / sqrt(x' V^-1 x) with V = S + tau^2 Z Z' written out; x free of a column found before."""
-    monkeypatch.setattr("toolpath_stiff.updating.comparison.structure.WIDE", wide)
+    monkeypatch.setattr("toolpath_stiff.comparison.structure.WIDE", wide)
     rng = np.random.default_rng(4)
     n = 24
     clamp, place = np.repeat(np.arange(6), 4).astype(str), np.tile(np.repeat(np.arange(6), 2), 2)

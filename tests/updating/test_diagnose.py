@@ -14,10 +14,10 @@ from tests.effects.cases import CATALOGUE
 from tests.stiffness.cases import nist
 from tests.updating import cases
 from tests.updating.cases import campaign, diagnosed, examined, readings_by_hand, table_1
+from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis.document import document
-from toolpath_stiff.updating.inference.prediction import scaled_law
+from toolpath_stiff.inference.prediction import scaled_law
+from toolpath_stiff.stiffness.catalogue import find_effect
 
 # One of each verdict, of the paper's layout.
 CASES = {
@@ -30,7 +30,7 @@ CASES = {
 # y^2, along X: what the rig calls an overhanging saddle and no effect of the catalogue describes.
 SADDLE = '''
 import numpy as np
-from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
+from toolpath_stiff.stiffness.effects import Effect, Parameter
 
 
 class Saddle(Effect):

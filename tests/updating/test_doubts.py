@@ -9,20 +9,14 @@ import pytest
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, examined, judged_once, predictor_for, simple_noise
-from toolpath_stiff.rig import Nuisances
-from toolpath_stiff.updating.inference import candidates
-from toolpath_stiff.updating.inference.doubts import (
-    alone,
-    mended,
-    noise_doubt,
-    slips_that_show,
-    suspect_entries,
-    suspect_rows,
-)
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
-from toolpath_stiff.updating.inference.noise import from_repeats, noise_models, repeat_groups
-from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.inference import candidates
+from toolpath_stiff.inference.doubts import alone, mended, noise_doubt, slips_that_show, suspect_entries, suspect_rows
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.inference.noise import noise_models
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.repeats import from_repeats, repeat_groups
+from toolpath_stiff.rig.hidden import Nuisances
 
 DATA = campaign(78, "tilted", "none")[0]
 

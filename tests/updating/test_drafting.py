@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from tests.updating.cases import campaign, predictor_for
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.drafting.draft import Description, Origin, draft_source, effect_names
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.portrait.columns import Ground
+from toolpath_stiff.portrait.dictionary import dictionary_of
+from toolpath_stiff.portrait.terms import Factor, Term, effect_of
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness.effects import effects_from_file
-from toolpath_stiff.stiffness.effects.contract import Effect
-from toolpath_stiff.stiffness.effects.trial import try_effect
+from toolpath_stiff.stiffness.catalogue import effects_from_file
+from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.model import build_model, load_path
-from toolpath_stiff.updating.drafting import Description, Origin, draft_source, effect_names
-from toolpath_stiff.updating.portrait.dictionary import Ground, dictionary_of
-from toolpath_stiff.updating.portrait.terms import Factor, Term, effect_of
+from toolpath_stiff.stiffness.trial import try_effect
 
 ORIGIN = Origin(
     ("data.csv",), "24" * 32, 12, "nist", ("0123456789",) * 12, "tps effects draft data.csv", ("a", "b", "c")

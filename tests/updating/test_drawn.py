@@ -13,20 +13,20 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, read_text
 from tests.updating.test_diagnose import SADDLE
-from toolpath_stiff import rig
+from toolpath_stiff.correction.document import document as update_document
+from toolpath_stiff.correction.update import update
+from toolpath_stiff.diagnosis.diagnose import common_verdict, diagnose
+from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.stiffness.effects import effects_from_file, find_effect
-from toolpath_stiff.updating.correction import update
-from toolpath_stiff.updating.correction.document import document as update_document
-from toolpath_stiff.updating.diagnosis import common_verdict, diagnose
-from toolpath_stiff.updating.diagnosis.document import document
-from toolpath_stiff.updating.inference import judge
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.fits import held_out
-from toolpath_stiff.updating.inference.gates import CONFIRMS, foretold
-from toolpath_stiff.updating.inference.noise import noise_models
-from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.measurements import reading_marks
+from toolpath_stiff.inference.drawn import CONFIRMS, foretold
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.fits import held_out
+from toolpath_stiff.inference.judgement import judge
+from toolpath_stiff.inference.noise import noise_models
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.readings.measurements import reading_marks
+from toolpath_stiff.rig import case, exercise
+from toolpath_stiff.stiffness.catalogue import effects_from_file, find_effect
 
 CASE = (7, "paper", "saddle_overhang", 0.1)
 DATA = campaign(*CASE)[0]
@@ -126,8 +126,8 @@ def test_what_is_foretold_is_the_normal_distribution_given_the_other_readings(de
 
 
 def test_a_reading_is_known_again_however_its_file_is_laid_out():
-    rows, _ = rig.make_case(*CASE[:1], layout=CASE[1], hidden=CASE[2], size=CASE[3])
-    table = list(csv.DictReader(io.StringIO(rig.csv_text(rows))))
+    rows, _ = case.make_case(*CASE[:1], layout=CASE[1], hidden=CASE[2], size=CASE[3])
+    table = list(csv.DictReader(io.StringIO(exercise.csv_text(rows))))
     columns = list(table[0])[::-1]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, columns)

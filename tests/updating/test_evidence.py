@@ -27,10 +27,10 @@ from tests.updating.cases import (
     readings_by_hand,
     simple_noise,
 )
-from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.inference.candidates import Table, candidates_of, tabulate
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
-from toolpath_stiff.updating.inference.hypotheses import probabilities, score_families, score_family
+from toolpath_stiff.inference.candidates import Table, candidates_of, tabulate
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Problem
+from toolpath_stiff.inference.hypotheses import probabilities, score_families, score_family
+from toolpath_stiff.stiffness.catalogue import find_effect
 
 FloatArray = NDArray[np.float64]
 
@@ -51,8 +51,8 @@ def scatter(seed: int) -> FloatArray:
 
 def by_hand(logs: FloatArray, outliers: float = 0.0, scale: float = 1.0) -> Problem:
     """The problem of explaining readings (24,) of ln k; `scale`: of the scatter that it reckons with."""
-    from toolpath_stiff.updating.inference.noise import Scatter
-    from toolpath_stiff.updating.inference.prediction import Predictor
+    from toolpath_stiff.inference.noise import Scatter
+    from toolpath_stiff.inference.prediction import Predictor
 
     predictor = Predictor(orthogonal_hexapod(), readings_by_hand(np.exp(logs), direction=DIRECTION))
     spread = correlated_covariance(np.full(COUNT, (scale * 0.02) ** 2), scale * SHARED)

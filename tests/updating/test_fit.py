@@ -13,14 +13,14 @@ from scipy.optimize import least_squares
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, make_problem, simple_noise
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.machine import Machine
-from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.diagnosis.document import parameters
+from toolpath_stiff.inference.candidates import Candidate, candidates_of
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.fits import fit_effects
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.diagnosis.document import parameters
-from toolpath_stiff.updating.inference.candidates import Candidate, candidates_of
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
-from toolpath_stiff.updating.inference.fits import fit_effects
-from toolpath_stiff.updating.inference.prediction import Predictor
 
 FloatArray = NDArray[np.float64]
 

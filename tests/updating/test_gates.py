@@ -12,9 +12,8 @@ from scipy.stats import binom, chi2, kstest
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, correlated_covariance, make_problem, simple_noise
-from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.inference.evidence import Fit, Problem
-from toolpath_stiff.updating.inference.gates import (
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.gates import (
     DRAWS,
     Forms,
     Gate,
@@ -25,8 +24,9 @@ from toolpath_stiff.updating.inference.gates import (
     largest_gain,
     set_wild_aside,
 )
-from toolpath_stiff.updating.inference.hypotheses import score_families, signatures
-from toolpath_stiff.updating.inference.noise import Noise
+from toolpath_stiff.inference.hypotheses import score_families, signatures
+from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.stiffness.catalogue import find_effect
 
 FloatArray = NDArray[np.float64]
 
@@ -197,6 +197,6 @@ def test_the_gain_of_the_best_of_many_is_judged_against_the_best_of_many():
 
 def test_draws_resolve_the_levels_that_are_used():
     """The smallest probability that the bootstrap can give lies below the level at which explanations are dropped."""
-    from toolpath_stiff.updating.inference import ADEQUATE
+    from toolpath_stiff.inference.judgement import ADEQUATE
 
     assert 0.5 / DRAWS < ADEQUATE / 2.0

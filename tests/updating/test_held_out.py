@@ -11,12 +11,12 @@ from scipy.stats import ttest_1samp
 from tests.conftest import seeds
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, simple_noise
-from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.inference.candidates import candidates_of
-from toolpath_stiff.updating.inference.covariances import Covariance, Groups
-from toolpath_stiff.updating.inference.evidence import Fit, Problem
-from toolpath_stiff.updating.inference.fits import fit_effects, gain_in_standard_errors, held_out, products_without
-from toolpath_stiff.updating.inference.noise import Scatter
+from toolpath_stiff.inference.candidates import candidates_of
+from toolpath_stiff.inference.covariances import Covariance, Groups
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import fit_effects, gain_in_standard_errors, held_out, products_without
+from toolpath_stiff.inference.noise import Scatter
+from toolpath_stiff.stiffness.catalogue import find_effect
 
 DATA = campaign(21, "paper", "weak_strut", 0.06)[0]
 NOISE = simple_noise(len(DATA), 0.02, 0.01, 0.01, 0.5e-3)
@@ -27,7 +27,7 @@ def fit(problem: Problem, name: str | None = "weak_strut") -> Fit:
     if name is None:
         return fit_effects(problem, (), (), (), np.zeros(2))
     base = problem.score_base()
-    from toolpath_stiff.updating.inference.hypotheses import score_family
+    from toolpath_stiff.inference.hypotheses import score_family
 
     best = score_family(problem, find_effect(name), base).best
     return fit_effects(problem, best.candidates, best.sizes, best.free, best.law)

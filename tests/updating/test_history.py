@@ -13,13 +13,13 @@ import toolpath_stiff as tps
 from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.report.compare import text
-from toolpath_stiff.report.readings import history_png
-from toolpath_stiff.updating.comparison import compare
-from toolpath_stiff.updating.dates import date_text, day_of
-from toolpath_stiff.updating.history import DRAWS, Readings, history
-from toolpath_stiff.updating.measurements import read_measurements
+from toolpath_stiff.readings.dates import date_text, day_of
+from toolpath_stiff.readings.history import DRAWS, Readings, history
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.report.compare.page import text
+from toolpath_stiff.report.history import history_png
 
 DATES = ("2018-03-01", "2018-09-10", "2019-04-02", "2019-06-11", "2020-01-15", "2020-08-03", "2021-02-11")
 DAYS = np.array([day_of(text) for text in DATES])

@@ -10,13 +10,13 @@ from scipy.stats import norm
 
 from tests.conftest import seeds
 from tests.updating.cases import campaign, predictor_for
-from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis.document import parameters
-from toolpath_stiff.updating.inference.candidates import likely_interval
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.fits import refine
-from toolpath_stiff.updating.inference.hypotheses import averaged_interval, score_family
-from toolpath_stiff.updating.inference.noise import noise_models
+from toolpath_stiff.diagnosis.document import parameters
+from toolpath_stiff.inference.candidates import likely_interval
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.fits import refine
+from toolpath_stiff.inference.hypotheses import averaged_interval, score_family
+from toolpath_stiff.inference.noise import noise_models
+from toolpath_stiff.stiffness.catalogue import find_effect
 
 
 def normal_scan(mean: float, sd: float, low: float, high: float) -> np.ndarray:

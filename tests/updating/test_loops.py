@@ -8,28 +8,30 @@ from scipy.stats import multivariate_normal
 
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.comparison.compare import compare
+from toolpath_stiff.correction.document import document as update_document
+from toolpath_stiff.correction.document import residuals_csv
+from toolpath_stiff.correction.update import update
+from toolpath_stiff.diagnosis.diagnose import diagnose
+from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.report.compare import text
-from toolpath_stiff.rig import csv_text
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.planning.document import plan_csv, plan_rows, rows_of
+from toolpath_stiff.planning.next_visit import TABLES, Tables, Taken, conditioned, next_visit, tables_of
+from toolpath_stiff.planning.plan import plan
+from toolpath_stiff.readings.measurements import measured_path, model_stiffness, read_measurements
+from toolpath_stiff.report.compare.page import text
 from toolpath_stiff.rig.case import again, draw_case
-from toolpath_stiff.rig.hidden import HiddenMachine, Rows, true_displacements
-from toolpath_stiff.rig.structure import load_nominal
+from toolpath_stiff.rig.exercise import csv_text
+from toolpath_stiff.rig.hidden import HiddenMachine
+from toolpath_stiff.rig.loops import true_displacements
+from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.stiffness.effects.contract import MeasuringLoop, measuring_loop
-from toolpath_stiff.stiffness.exact import loop_compliance
+from toolpath_stiff.stiffness.catalogue import find_effect
+from toolpath_stiff.stiffness.loop_response import loop_compliance
+from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop, measuring_loop
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model
-from toolpath_stiff.updating.comparison import compare
-from toolpath_stiff.updating.correction import update
-from toolpath_stiff.updating.correction.document import document as update_document
-from toolpath_stiff.updating.correction.document import residuals_csv
-from toolpath_stiff.updating.diagnosis import diagnose
-from toolpath_stiff.updating.diagnosis.document import document
-from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.measurements import measured_path, model_stiffness, read_measurements
-from toolpath_stiff.updating.planning import plan
-from toolpath_stiff.updating.planning.document import plan_csv, plan_rows, rows_of
-from toolpath_stiff.updating.planning.next_visit import TABLES, Tables, Taken, conditioned, next_visit, tables_of
 
 POSES = np.array([[0.05, -0.1, 0.6, 0.1, -0.2, 0.05], [-0.2, 0.15, 1.1, -0.3, 0.1, 0.0], [0.0, 0.0, 0.8, 0, 0, 0]])
 DIRECTIONS = np.array([[1.0, 0, 0], [0, 0.6, 0.8], [0, 0, 1.0]])

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from tests.effects.cases import model_with, readings
 from tests.stiffness.cases import nist, table_1_positions, table_1_stiffness
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.stiffness.effects import find_effect, known_effects
+from toolpath_stiff.readings.measurements import model_stiffness, read_measurements
+from toolpath_stiff.readings.raw_records import COLUMNS, read_raw
+from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.tables import parse_table
-from toolpath_stiff.updating.measurements import model_stiffness, read_measurements
-from toolpath_stiff.updating.raw_records import COLUMNS, read_raw
 
 SHORT = "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm\n"
 FULL = (

@@ -7,7 +7,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.optimize import lsq_linear, minimize_scalar
 
-from toolpath_stiff.updating.inference.covariances import Spline, bounded_minimum, bounded_step
+from toolpath_stiff.inference.minima import bounded_minimum, bounded_step
+from toolpath_stiff.inference.splines import Spline
 
 
 @pytest.mark.parametrize("seed", range(5))

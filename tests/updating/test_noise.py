@@ -13,15 +13,10 @@ from tests.conftest import seeds
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, correlated_covariance, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.rig import Nuisances
-from toolpath_stiff.updating.inference.noise import (
-    Scatter,
-    covariance,
-    from_repeats,
-    noise_models,
-    repeat_groups,
-)
-from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.inference.noise import Scatter, covariance, noise_models
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.repeats import from_repeats, repeat_groups
+from toolpath_stiff.rig.hidden import Nuisances
 
 REPEAT, CLAMPING = 0.02, 0.03
 

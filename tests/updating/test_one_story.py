@@ -17,29 +17,31 @@ import pytest
 from tests.effects.cases import CATALOGUE
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, examined, table_1
+from toolpath_stiff.comparison.compare import Comparison, compare
+from toolpath_stiff.correction.additions import parse_addition
+from toolpath_stiff.correction.document import document as update_document
+from toolpath_stiff.correction.document import residuals_csv
+from toolpath_stiff.correction.ladder import _Work, build_ladder
+from toolpath_stiff.correction.update import Correction
+from toolpath_stiff.diagnosis import words as verdict_words
+from toolpath_stiff.diagnosis.document import document as diagnosis_document
+from toolpath_stiff.diagnosis.words import next_steps, verdict_text, why, words
 from toolpath_stiff.hints import Asked, parted
-from toolpath_stiff.report import compare as compare_report
-from toolpath_stiff.report import diagnose as diagnose_report
-from toolpath_stiff.report import update as update_report
-from toolpath_stiff.report.compare import QUESTIONS as COMPARE_QUESTIONS
-from toolpath_stiff.report.compare import compare_html, stiffness_deviation_percent
-from toolpath_stiff.report.diagnose import diagnose_html
+from toolpath_stiff.inference.fits import raised_text, scatter_text
+from toolpath_stiff.inference.judgement import NONE
+from toolpath_stiff.inference.noise import noise_models
+from toolpath_stiff.planning.rivals import errors_so_far, rivals_of
+from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.report import explanations as diagnose_report
+from toolpath_stiff.report.compare import page as compare_report
+from toolpath_stiff.report.compare.page import QUESTIONS as COMPARE_QUESTIONS
+from toolpath_stiff.report.compare.page import compare_html
+from toolpath_stiff.report.compare.variables import stiffness_deviation_percent
+from toolpath_stiff.report.diagnose.page import diagnose_html
 from toolpath_stiff.report.explanations import explanations, headline, is_plausible, model_rows
-from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
-from toolpath_stiff.updating.comparison import Comparison, compare
-from toolpath_stiff.updating.correction import Correction
-from toolpath_stiff.updating.correction.document import document as update_document
-from toolpath_stiff.updating.correction.document import residuals_csv
-from toolpath_stiff.updating.correction.ladder import _Work, build_ladder, parse_addition
-from toolpath_stiff.updating.diagnosis import words as verdict_words
-from toolpath_stiff.updating.diagnosis.document import document as diagnosis_document
-from toolpath_stiff.updating.diagnosis.words import next_steps, verdict_text, why, words
-from toolpath_stiff.updating.inference import NONE
-from toolpath_stiff.updating.inference.fits import raised_text, scatter_text
-from toolpath_stiff.updating.inference.noise import noise_models
-from toolpath_stiff.updating.measurements import Measurements
-from toolpath_stiff.updating.planning.rivals import errors_so_far, rivals_of
+from toolpath_stiff.report.update import page as update_report
+from toolpath_stiff.stiffness.catalogue import find_effect
+from toolpath_stiff.stiffness.contract import Effect, Parameter
 
 # Seed, layout, what is hidden, its size: one of each verdict.
 CASES = {

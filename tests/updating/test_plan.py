@@ -16,17 +16,17 @@ from scipy.stats import norm
 from tests.stiffness.cases import nist
 from tests.updating.planning import READING_SD, active, rival, rivals, table_1_design
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.inference.judgement import NAMED
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.planning.document import plan_document
+from toolpath_stiff.planning.gaps import ReadingNoise, expected_outcome, pair_shares
+from toolpath_stiff.planning.plan import Plan, plan_measurements, random_visits
+from toolpath_stiff.planning.rivals import Forecast, Rival, forecast_all, joint_columns
+from toolpath_stiff.planning.visits import Costs, Matters, Menu, possible_visits
 from toolpath_stiff.report.measuring import text
-from toolpath_stiff.rig.structure import load_nominal
-from toolpath_stiff.rig.structure import reachable as rig_reachable
-from toolpath_stiff.updating.inference import NAMED
-from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits
-from toolpath_stiff.updating.planning.document import plan_document
-from toolpath_stiff.updating.planning.gaps import ReadingNoise, expected_outcome, pair_shares
-from toolpath_stiff.updating.planning.rivals import Forecast, Rival, forecast_all, joint_columns
-from toolpath_stiff.updating.planning.visits import Costs, Matters, Menu, possible_visits
+from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.nominal import reachable as rig_reachable
 
 
 def menu(**changes) -> Menu:

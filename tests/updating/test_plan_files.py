@@ -13,19 +13,19 @@ import pytest
 
 from tests.stiffness.cases import nist
 from tests.updating.planning import rivals, table_1_design
-from toolpath_stiff import rig
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.rig.structure import load_nominal
-from toolpath_stiff.rig.structure import reachable as rig_reachable
-from toolpath_stiff.stiffness.effects import known_effects
-from toolpath_stiff.updating.inference.noise import repeat_groups
-from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.planning import plan_measurements
-from toolpath_stiff.updating.planning.campaign import Campaign, first_campaign
-from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
-from toolpath_stiff.updating.planning.visits import Menu
+from toolpath_stiff.inference.repeats import repeat_groups
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.planning.campaign import Campaign, first_campaign
+from toolpath_stiff.planning.document import plan_csv, plan_rows
+from toolpath_stiff.planning.plan import plan_measurements
+from toolpath_stiff.planning.visits import Menu
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.rig import exercise as rig
+from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.nominal import reachable as rig_reachable
+from toolpath_stiff.stiffness.catalogue import known_effects
 
 MACHINES = ("nist", "genhexkins", "nategh_agheli")
 

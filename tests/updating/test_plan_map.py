@@ -7,10 +7,10 @@ import pytest
 
 from tests.stiffness.cases import nist
 from tests.updating.planning import rivals, table_1_design
+from toolpath_stiff.planning.document import gap_map, top_pair
+from toolpath_stiff.planning.plan import plan_measurements
+from toolpath_stiff.planning.visits import Menu
 from toolpath_stiff.report.measuring import plan_picture
-from toolpath_stiff.updating.planning import plan_measurements
-from toolpath_stiff.updating.planning.document import gap_map, top_pair
-from toolpath_stiff.updating.planning.visits import Menu
 
 
 @pytest.fixture(scope="module")

@@ -9,27 +9,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toolpath_stiff import rig
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.inference import candidates
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.fits import fit_effects
+from toolpath_stiff.inference.noise import noise_models
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.portrait.alike import looks_the_same
+from toolpath_stiff.portrait.columns import Ground
+from toolpath_stiff.portrait.dictionary import crossed, dictionary_of
+from toolpath_stiff.portrait.document import alike_entry, portrait_entry
+from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
+from toolpath_stiff.portrait.terms import LINKS, SHAPES, VARIABLES, Term, effect_of
+from toolpath_stiff.portrait.words import term_words
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.rig import case, exercise
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.inference import candidates
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.fits import fit_effects
-from toolpath_stiff.updating.inference.noise import noise_models
-from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.portrait import Portrait, alike_entry, draw_portrait, portrait_entry, term_words
-from toolpath_stiff.updating.portrait.choice import looks_the_same
-from toolpath_stiff.updating.portrait.dictionary import Ground, crossed, dictionary_of
-from toolpath_stiff.updating.portrait.terms import LINKS, SHAPES, VARIABLES, Term, effect_of
 
 
 @cache
 def sound(seed: int, folder: str) -> Predictor:
     """A campaign of the rig on a machine that hides nothing."""
-    rows, _ = rig.make_case(seed, layout="tilted", hidden="none")
+    rows, _ = case.make_case(seed, layout="tilted", hidden="none")
     file = Path(folder) / f"sound_{seed}.csv"
-    file.write_text(rig.csv_text(rows), encoding="utf-8")
+    file.write_text(exercise.csv_text(rows), encoding="utf-8")
     nist = load_machine("nist")
     found = Predictor(nist, read_measurements(file, nist))
     found.joint_columns()

@@ -19,11 +19,11 @@ from tests.updating.cases import (
     table_1,
 )
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.inference.prediction import JOINT_STEP, Predictor
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.rig.case import rows_of, tilted_campaign
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.structure import load_nominal
-from toolpath_stiff.updating.inference.prediction import JOINT_STEP, Predictor
+from toolpath_stiff.rig.nominal import load_nominal
 
 NOMINAL = load_nominal("nist")
 

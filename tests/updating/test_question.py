@@ -9,13 +9,13 @@ import pytest
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, examined, predictor_for, table_1
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.updating.comparison import compare
-from toolpath_stiff.updating.correction import update
-from toolpath_stiff.updating.correction.document import document
-from toolpath_stiff.updating.diagnosis.document import document as diagnosis_document
-from toolpath_stiff.updating.inference import question
-from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.comparison.compare import compare
+from toolpath_stiff.correction.document import document
+from toolpath_stiff.correction.update import update
+from toolpath_stiff.diagnosis.document import document as diagnosis_document
+from toolpath_stiff.inference.judgement import question
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.file import load_machine
 
 ASKED = "Are these readings of this machine?"
 TABLE = table_1()

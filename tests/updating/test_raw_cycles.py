@@ -12,7 +12,7 @@ import pytest
 import toolpath_stiff as tps
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.updating.raw import turns_of
+from toolpath_stiff.readings.raw_cycles import turns_of
 
 K = 40e6  # N/m
 PEAK = 1000.0  # N

@@ -8,8 +8,8 @@ import pytest
 
 import toolpath_stiff as tps
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.updating.dates import day_of, read_dates
-from toolpath_stiff.updating.raw_labels import strut_label
+from toolpath_stiff.readings.dates import day_of, read_dates
+from toolpath_stiff.readings.raw_labels import strut_label
 
 STRUTS = range(1, 7)
 DATES = ("2019-04-02", "2021-09-16")

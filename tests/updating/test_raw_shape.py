@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolpath_stiff.updating.raw_records import shape_of
+from toolpath_stiff.readings.raw_shape import shape_of
 
 UP = np.linspace(0.0, 1000.0, 9)
 FORCE = np.concatenate([UP, np.linspace(1000.0, -1000.0, 17)[1:], -UP[::-1][1:]])

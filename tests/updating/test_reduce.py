@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.readings.raw import reduce_loop
+from toolpath_stiff.readings.raw_records import COLUMNS, read_raw
 from toolpath_stiff.tables import parse_table
-from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.raw import reduce_loop
-from toolpath_stiff.updating.raw_records import COLUMNS, read_raw
 
 HEADING = "x_mm,y_mm,z_mm,direction,point,jog_um,force_N,displacement_um\n"
 JOGS = (0.0, 100.0, 200.0, 100.0, 0.0, -100.0, -200.0, -100.0, 0.0)

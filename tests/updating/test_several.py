@@ -9,11 +9,11 @@ from scipy.optimize import lsq_linear
 from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, make_problem, predictor_for, simple_noise
-from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.inference.candidates import LIKELY, candidates_of
-from toolpath_stiff.updating.inference.fits import fit_effects
-from toolpath_stiff.updating.inference.hypotheses import MATTERS, Family, not_excluded, tables_of
-from toolpath_stiff.updating.inference.several import LinearSearch, search_pairs, search_triples
+from toolpath_stiff.inference.candidates import LIKELY, candidates_of
+from toolpath_stiff.inference.fits import fit_effects
+from toolpath_stiff.inference.hypotheses import MATTERS, Family, not_excluded, tables_of
+from toolpath_stiff.inference.several import LinearSearch, search_pairs, search_triples
+from toolpath_stiff.stiffness.catalogue import find_effect
 
 NAMES = ("weak_strut", "table_compliance", "spindle_compliance", "frame_compliance", "thermal_drift", "gauge_scale")
 DATA = campaign(77, "tilted", "none")[0]

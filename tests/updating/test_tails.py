@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from toolpath_stiff.updating.inference.covariances import normal_below, surprise
+from toolpath_stiff.inference.tails import normal_below, surprise
 
 
 def test_surprise_is_the_tail_of_chi_square_even_where_it_underflows():

@@ -10,13 +10,16 @@ import pytest
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, table_1
+from toolpath_stiff.correction.additions import parse_addition
+from toolpath_stiff.correction.document import document, residuals_csv
+from toolpath_stiff.correction.ladder import build_ladder
+from toolpath_stiff.correction.strut_law import update_by_mean_error
+from toolpath_stiff.correction.update import Correction
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import machine_toml, parse_machine
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.file import parse_machine
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.updating.correction import Correction, update_by_mean_error
-from toolpath_stiff.updating.correction.document import document, residuals_csv
-from toolpath_stiff.updating.correction.ladder import build_ladder, parse_addition
-from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.machine.writer import machine_toml
 
 MEAN_OVER_SD = np.sqrt(2.0 / np.pi)
 PROVENANCE = {"data": ["a.csv"], "data_sha256": "0" * 64, "command": "tps update a.csv"}
@@ -24,7 +27,7 @@ PAPER = campaign(12, "paper")[0]
 MODEL = Predictor(nist(), PAPER)
 OWN_EFFECT = '''
 import numpy as np
-from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
+from toolpath_stiff.stiffness.effects import Effect, Parameter
 
 class HeadCompliance(Effect):
     """The head gives way along X."""

@@ -10,9 +10,9 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, table_1
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.report.update import update_html
-from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.report.update.page import update_html
 
 WEAK = ("--add", "weak_strut:strut=3", "--strut-law")
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from toolpath_stiff.correction.strut_law import bar_curve, bar_curve_csv, mean_error, minimise_mean_error
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.updating.correction import bar_curve, bar_curve_csv, mean_error, minimise_mean_error
-from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.measurements import read_measurements
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.readings.measurements import read_measurements
 
 
 @pytest.fixture(scope="module")

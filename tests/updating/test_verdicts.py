@@ -16,8 +16,10 @@ from scipy.stats import binom
 from tests.conftest import seeds
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
-from toolpath_stiff.updating.diagnosis import common_verdict
-from toolpath_stiff.updating.inference import (
+from toolpath_stiff.diagnosis.diagnose import common_verdict
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.inference.judgement import (
     FALSE_ALARM,
     NONE,
     OUTSIDE,
@@ -27,9 +29,7 @@ from toolpath_stiff.updating.inference import (
     decide,
     unexcluded,
 )
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
-from toolpath_stiff.updating.inference.noise import Scatter, covariance
+from toolpath_stiff.inference.noise import Scatter, covariance
 
 STRONG = 0.1
 SEEDS = seeds(100, 104)

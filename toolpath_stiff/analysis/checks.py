@@ -15,16 +15,17 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.poses import PoseReport, evaluate_poses
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.machine import TEMPLATE_REMARK
-from toolpath_stiff.machine.kinematics import Symmetry, describe_stray, find_symmetry, solve_struts
+from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.nc import ZERO
+from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
+from toolpath_stiff.machine.writer import TEMPLATE_REMARK
 from toolpath_stiff.nc.checking import ERROR, WARNING, Checked, Finding, check_by
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches
 from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.nc.operations import find_operations
+from toolpath_stiff.nc.reader import ZERO
 from toolpath_stiff.path import BLOCK, Samples, move_durations, place, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import FolderResult, Progress, Result, machine_by_name, one_of, teller
 from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
 from toolpath_stiff.api.inputs import FARTHEST_MM, positive
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.results import FolderResult, Progress, Result, machine_by_name, one_of, teller
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import options
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.updating.correction import Correction
-    from toolpath_stiff.updating.planning import Proposal
-    from toolpath_stiff.updating.raw import Reduction as Reduced
+    from toolpath_stiff.correction.update import Correction
+    from toolpath_stiff.planning.plan import Proposal
+    from toolpath_stiff.readings.raw import Reduction as Reduced
 
 STEEPEST_TILT_DEG = 90.0
 COSTS = ("reading", "pose", "tool", "setup", "indicator")
@@ -62,7 +62,7 @@ class Reduction(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """One entry a loop, under "loops"; struts measured alone over their dates, under "history"."""
-        from toolpath_stiff.updating.raw import document
+        from toolpath_stiff.readings.raw import document
 
         return {"loops": document(self.reduced), "history": dict(self.reduced.history)}
 
@@ -74,8 +74,8 @@ class Reduction(Result):
 
     def plot(self) -> Figure:
         """Force against deflection of each loop; without records the struts over their dates."""
+        from toolpath_stiff.report.history import dated, history_png
         from toolpath_stiff.report.measuring import loops_png, recorded
-        from toolpath_stiff.report.readings import dated, history_png
 
         loops, figures = recorded(self.reduced)
         if loops:
@@ -85,8 +85,8 @@ class Reduction(Result):
         return history_png.figure(self.reduced.history)
 
     def __str__(self) -> str:
+        from toolpath_stiff.report.history import history_text
         from toolpath_stiff.report.measuring import loops_text
-        from toolpath_stiff.report.readings import history_text
 
         pairs = zip(self.to_dict()["loops"], self.reduced.loops, strict=True)
         recorded = [entry for entry, loop in pairs if len(loop.force)]
@@ -101,7 +101,7 @@ class Reduction(Result):
         return f"{name} and {others} more" if others else name
 
     def _short(self) -> str:
-        from toolpath_stiff.report import counted
+        from toolpath_stiff.report.words import counted
 
         return f"{self._title}, {counted(len(self.reduced.loops), 'loop')}"
 
@@ -153,9 +153,9 @@ def reduce(
     >>> found.to_frame()["stiffness_N_per_mm"].tolist()
     [50000.0]
     """
-    from toolpath_stiff.updating.dates import order_of
-    from toolpath_stiff.updating.raw import reduce as reduce_records
-    from toolpath_stiff.updating.raw import units_of
+    from toolpath_stiff.readings.dates import order_of
+    from toolpath_stiff.readings.raw import reduce as reduce_records
+    from toolpath_stiff.readings.raw import units_of
 
     if not raw:
         raise InputError("no raw records", expected="a file or several")
@@ -203,7 +203,7 @@ class Update(FolderResult):
     command: ClassVar[str] = "update"
 
     def __init__(self, correction: Correction, asked: Question) -> None:
-        from toolpath_stiff.updating.correction.document import document
+        from toolpath_stiff.correction.document import document
 
         self.correction, self._asked, self.inputs = correction, asked, asked.inputs
         self._document = document(correction)
@@ -245,12 +245,13 @@ class Update(FolderResult):
 
     def plot(self) -> Figure:
         """What each step does to the error."""
-        from toolpath_stiff.report.update import error_ladder_png, ladder
+        from toolpath_stiff.report.update.page import ladder
+        from toolpath_stiff.report.update.pictures import error_ladder_png
 
         return error_ladder_png.figure(*ladder(self._document))
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.update import text
+        from toolpath_stiff.report.update.page import text
 
         return text(self._document)
 
@@ -260,8 +261,8 @@ class Update(FolderResult):
 
     def machine_text(self) -> str:
         """The new machine file, with where its fitted values come from; raises `InputError` where it was refused."""
-        from toolpath_stiff.machine import machine_toml
-        from toolpath_stiff.report.update import machine_heading
+        from toolpath_stiff.machine.writer import machine_toml
+        from toolpath_stiff.report.update.page import machine_heading
 
         model = self.machine.model
         return machine_toml(model.given or model.machine, machine_heading(self._document))
@@ -274,7 +275,7 @@ class Update(FolderResult):
 
     def files(self, *, plots: bool = True, machine: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps update`; the machine file too, unless it is said not."""
-        from toolpath_stiff.report.update import files
+        from toolpath_stiff.report.update.page import files
 
         found = self.correction
         return files(
@@ -334,8 +335,8 @@ def update(
     >>> found.to_frame()["name"].tolist()
     ['as given', 'strut law refitted']
     """
-    from toolpath_stiff.updating.correction import OBJECTIVES
-    from toolpath_stiff.updating.correction import update as update_machine
+    from toolpath_stiff.correction.update import OBJECTIVES
+    from toolpath_stiff.correction.update import update as update_machine
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
     found = update_machine(
@@ -368,7 +369,7 @@ class Plan(FolderResult):
     command: ClassVar[str] = "plan"
 
     def __init__(self, proposal: Proposal, asked: Question, line: str) -> None:
-        from toolpath_stiff.updating.planning.document import document
+        from toolpath_stiff.planning.document import document
 
         self.proposal, self.inputs = proposal, asked.inputs
         self._document = document(proposal, line)
@@ -381,7 +382,7 @@ class Plan(FolderResult):
         """One row a reading, as in `plan.csv`: a measurement file with the stiffness left empty."""
         import pandas as pd
 
-        from toolpath_stiff.updating.planning.document import rows_of
+        from toolpath_stiff.planning.document import rows_of
 
         return pd.DataFrame(rows_of(self.proposal))
 
@@ -397,7 +398,7 @@ class Plan(FolderResult):
         return text(self._document)
 
     def _short(self) -> str:
-        from toolpath_stiff.report import counted
+        from toolpath_stiff.report.words import counted
 
         return f"{self._document['kind']}, {counted(len(self._document['visits']), 'clamping')}"
 
@@ -467,8 +468,8 @@ def plan(
     >>> list(found.files(plots=False))
     ['plan.csv', 'plan.json', 'plan_tables.npz']
     """
-    from toolpath_stiff.updating.planning import plan as plan_visits
-    from toolpath_stiff.updating.planning.visits import Costs
+    from toolpath_stiff.planning.plan import plan as plan_visits
+    from toolpath_stiff.planning.visits import Costs
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
     costs = _costs(minutes or {})

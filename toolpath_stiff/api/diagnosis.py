@@ -1,7 +1,4 @@
-"""The model against measurements: where it fails (compare), which physical effect it lacks (diagnose).
-
-At the machine: one pose after another of a plan, each chosen from the readings before it.
-"""
+"""The model against measurements: where it fails (compare), which physical effect it lacks (diagnose)."""
 
 from __future__ import annotations
 
@@ -10,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import FolderResult, Progress, Result, machine_by_name, teller
 from toolpath_stiff.api.inputs import Program, origin_word, pose_si, program_from, whole
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.api.results import FolderResult, Progress, machine_by_name, teller
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
@@ -22,14 +19,16 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from toolpath_stiff.comparison.compare import Comparison as Compared
+    from toolpath_stiff.diagnosis.diagnose import Diagnosis as Diagnosed
     from toolpath_stiff.machine.model import Machine as MachineModel
-    from toolpath_stiff.nc import Program as NcProgram
-    from toolpath_stiff.updating.comparison import Comparison as Compared
-    from toolpath_stiff.updating.diagnosis import Diagnosis as Diagnosed
-    from toolpath_stiff.updating.measurements import Measurements as Readings
-    from toolpath_stiff.updating.planning.next_visit import NextVisit as Found
+    from toolpath_stiff.nc.moves import Program as NcProgram
+    from toolpath_stiff.readings.measurements import Measurements as Readings
+
 
 Noise = float | tuple[float, float] | None
+
+
 LARGEST_SPREAD_PERCENT = 50.0
 
 
@@ -87,7 +86,7 @@ class Measurements:
         >>> len(readings), readings.position.shape
         (42, (42, 3))
         """
-        from toolpath_stiff.updating.measurements import read_measurements
+        from toolpath_stiff.readings.measurements import read_measurements
 
         model = machine.model.given or machine.model.machine
         if self._last is None or self._last[0] is not model:
@@ -105,7 +104,7 @@ class Measurements:
         """
         import pandas as pd
 
-        from toolpath_stiff.updating.measurements import reading_columns
+        from toolpath_stiff.readings.measurements import reading_columns
 
         return pd.DataFrame(reading_columns(self.on(machine_from(machine))))
 
@@ -119,7 +118,7 @@ class Measurements:
         >>> found["files"], found["readings"][0]["stiffness_N_per_mm"]
         (['nist-table1'], 56813.0)
         """
-        from toolpath_stiff.updating.measurements import reading_columns
+        from toolpath_stiff.readings.measurements import reading_columns
 
         columns = reading_columns(self.on(machine_from(machine)))
         cells = ([None if _is_nan(one) else one for one in values.tolist()] for values in columns.values())
@@ -230,7 +229,7 @@ class Comparison(FolderResult):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a reading, as in `residuals.csv`: measured, modelled, deviation, and what it may vary with."""
-        from toolpath_stiff.report.compare import residuals_csv
+        from toolpath_stiff.report.compare.page import residuals_csv
 
         return _table(residuals_csv(self.compared))
 
@@ -241,7 +240,7 @@ class Comparison(FolderResult):
         return measured_modelled_png.figure(self.compared)
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.compare import text
+        from toolpath_stiff.report.compare.page import text
 
         return "\n".join([text(self.compared.document), *self.compared.document["next"]])
 
@@ -251,7 +250,7 @@ class Comparison(FolderResult):
 
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps compare`."""
-        from toolpath_stiff.report.compare import files
+        from toolpath_stiff.report.compare.page import files
 
         return files(self.compared, plots=plots)
 
@@ -293,7 +292,7 @@ def compare(
     >>> tps.compare("nist", "nist-table1", noise_percent=5)
     <Comparison: nist, mean error 9.62 %>
     """
-    from toolpath_stiff.updating.comparison import compare as compare_readings
+    from toolpath_stiff.comparison.compare import compare as compare_readings
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
     teller(progress)("comparing")
@@ -312,7 +311,7 @@ class Diagnosis(FolderResult):
     command: ClassVar[str] = "diagnose"
 
     def __init__(self, diagnosed: Diagnosed, inputs: tuple[str, ...]) -> None:
-        from toolpath_stiff.updating.diagnosis.document import document
+        from toolpath_stiff.diagnosis.document import document
 
         self.diagnosed, self.inputs = diagnosed, inputs
         self._document = document(diagnosed)
@@ -349,7 +348,7 @@ class Diagnosis(FolderResult):
         return ladder_png.figure(self._document)
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.diagnose import text
+        from toolpath_stiff.report.explanations import text
 
         return text(self._document)
 
@@ -359,7 +358,7 @@ class Diagnosis(FolderResult):
 
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps diagnose`."""
-        from toolpath_stiff.report.diagnose import files
+        from toolpath_stiff.report.diagnose.page import files
 
         return files(self.diagnosed, self._document, plots=plots)
 
@@ -406,7 +405,7 @@ def diagnose(
     >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
     (['diagnose.json', 'residuals.csv'], 6)
     """
-    from toolpath_stiff.updating.diagnosis import diagnose as diagnose_readings
+    from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
     part = None if program is None else program_from(program)
@@ -450,93 +449,3 @@ def _table(csv: str) -> pd.DataFrame:
     import pandas as pd
 
     return pd.read_csv(io.StringIO(csv))
-
-
-class NextVisit(Result):
-    """Where a plan stands, and the visit to make next.
-
-    Attributes
-    ----------
-    probability
-        Explanation -> probability, the likeliest first.
-    settled
-        Whether one of them has 95 %.
-    """
-
-    command: ClassVar[str] = "plan"
-
-    def __init__(self, found: Found, folder: str) -> None:
-        from toolpath_stiff.updating.planning.next_visit import next_document
-
-        self.folder = folder
-        self._document = next_document(found)
-        self.probability = {one["name"]: one["probability"] for one in self._document["rivals"]}
-        self.settled = found.settled
-
-    def to_dict(self) -> dict[str, Any]:
-        """Probabilities, the next visit and its rows."""
-        return dict(self._document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a reading of the next visit, the stiffness left empty; none where there is no next visit."""
-        import pandas as pd
-
-        return pd.DataFrame(self._document["rows"])
-
-    def save(self) -> list[Path]:
-        """Write the next visit's rows, a measurement file to fill in, as next_1.csv (2, 3...) into the plan's folder.
-
-        A file that is there already stays: it is the same visit, perhaps filled in.
-        """
-        from toolpath_stiff.files import write_atomically
-        from toolpath_stiff.updating.planning.document import plan_csv
-
-        rows = self._document["rows"]
-        file = Path(self.folder) / f"next_{rows[0]['clamp']}.csv" if rows else None
-        return [] if file is None or file.exists() else [write_atomically(file, plan_csv(rows))]
-
-    def __str__(self) -> str:
-        return "\n".join([*self._document["text"], *(f"note: {note}" for note in self._document["notes"])])
-
-    def _short(self) -> str:
-        from toolpath_stiff.report import counted
-
-        return f"{counted(self._document['readings'], 'reading')}, {'settled' if self.settled else 'open'}"
-
-
-def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ()) -> NextVisit:
-    """Which pose of a plan to go to next, after the readings so far.
-
-    Parameters
-    ----------
-    folder
-        Where `plan` has been saved; a plan between explanations, not a first campaign.
-    data
-        Measurement files with the plan's readings taken so far, rows still empty among them; unless given, the
-        folder's own plan.csv and next_1.csv, next_2.csv ... Readings from before the plan are in it already.
-
-    Raises
-    ------
-    InputError, InputErrors
-        The folder holds no plan between explanations; a file cannot be read, every bad row.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> import toolpath_stiff as tps
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = tps.plan("nist", between=("spindle_compliance", "none"), n=2).save(folder, plots=False)
-    ...     found = tps.next_visit(folder)
-    ...     [file.name for file in found.save()]
-    ['next_1.csv']
-    >>> found
-    <NextVisit: 0 readings, open>
-    >>> found.probability, found.settled
-    ({'spindle_compliance': 0.5, 'none': 0.5}, False)
-    >>> len(found.to_frame()) == len(found.to_dict()["rows"])
-    True
-    """
-    from toolpath_stiff.updating.planning.next_visit import next_visit as choose_next
-
-    files = (data,) if isinstance(data, str | Path) else tuple(data)
-    return NextVisit(choose_next(folder, tuple(map(str, files))), str(folder))

@@ -1,4 +1,4 @@
-"""The physical effects that a machine can carry: the catalogue, one's own, and effects set by hand on measurements."""
+"""The physical effects that a machine can carry: the catalogue, and one's own."""
 
 from __future__ import annotations
 
@@ -6,20 +6,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import Progress, Result, machine_by_name, teller
 from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.api.results import Progress, Result, machine_by_name, teller
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
-from toolpath_stiff.stiffness.effects.contract import Effect
+from toolpath_stiff.stiffness.contract import Effect
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from toolpath_stiff.machine.model import EffectEntry, StrutLaw
-    from toolpath_stiff.stiffness.effects.trial import Trial
-    from toolpath_stiff.updating.drafting import Draft
-    from toolpath_stiff.updating.inference.evidence import Fit
+    from toolpath_stiff.drafting.draft import Draft
+    from toolpath_stiff.stiffness.trial import Trial
 
 
 class EffectCatalogue(Result):
@@ -72,7 +70,7 @@ class EffectCatalogue(Result):
         return effects_table(self.effects, self.broken)
 
     def _short(self) -> str:
-        from toolpath_stiff.report import counted
+        from toolpath_stiff.report.words import counted
 
         return counted(len(self.effects), "effect")
 
@@ -91,7 +89,7 @@ def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
     >>> tps.effects()["weak_strut"].title
     'one strut is weak'
     """
-    from toolpath_stiff.stiffness.effects import installed_effects, known_effects
+    from toolpath_stiff.stiffness.catalogue import installed_effects, known_effects
 
     return EffectCatalogue(list(known_effects(list(map(str, files))).values()), installed_effects()[1])
 
@@ -163,8 +161,8 @@ def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> E
     ...     tps.check_effects(file).passed
     True
     """
-    from toolpath_stiff.stiffness.effects import effects_from_file, known_effects
-    from toolpath_stiff.stiffness.effects.trial import try_effect
+    from toolpath_stiff.stiffness.catalogue import effects_from_file, known_effects
+    from toolpath_stiff.stiffness.trial import try_effect
 
     on = machine_from(machine)
     model = on.model.given or on.model.machine
@@ -322,9 +320,9 @@ def draft_effect(
     >>> found.to_dict()["effect"] is None, found.text  # `found.save(FILE)` raises InputError then
     (True, '')
     """
-    from toolpath_stiff.stiffness.effects import known_effects
-    from toolpath_stiff.updating.diagnosis import diagnose
-    from toolpath_stiff.updating.drafting import draft
+    from toolpath_stiff.diagnosis.diagnose import diagnose
+    from toolpath_stiff.drafting.draft import draft
+    from toolpath_stiff.stiffness.catalogue import known_effects
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
     name = effect_name(file)
@@ -359,134 +357,3 @@ def next_of_draft(asked: Asked, file: str) -> list[str]:
         hint("let it compete with the catalogue", asked.command("diagnose", effects=[file])),
         hint("measure where it would show, or fail", asked.command("plan", effects=[file])),
     ]
-
-
-class Preview:
-    """The error at every reading with effects of any size, at once: what a slider moves; `preview` makes one.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> hand = tps.preview("nist", "nist-table1", noise_percent=5)
-    >>> sorted(hand.at({}))
-    ['bias_percent', 'deviation_percent', 'mean_abs_error_percent', 'modelled_N_per_mm', 'rms_percent']
-    >>> hand.machine({"weak_strut": {"strut": 4, "factor": 0.8}})
-    <Machine nist: 6 struts, weak_strut>
-    """
-
-    def __init__(self, asked: Question) -> None:
-        from toolpath_stiff.updating.comparison import ByHand
-
-        self._hand = ByHand(
-            asked.model,
-            asked.readings,
-            noise=asked.noise,
-            strut_spread=asked.strut_spread,
-            effect_files=asked.on.effect_files,
-        )
-        self._on = asked.on
-        self._near: tuple[Mapping[str, Mapping[str, Any]], Fit] | None = None
-
-    def machine(self, effects: Mapping[str, Mapping[str, Any]]) -> Machine:
-        """The machine with these effects and the strut law refitted beside them; arguments and errors as of `at`."""
-        from toolpath_stiff.updating.inference.prediction import scaled_law
-
-        given = self._on.model.given or self._on.model.machine
-        return with_effects(self._on, effects, scaled_law(given.strut_law, self._hand.fit(_entries(effects)).law))
-
-    def at(
-        self,
-        effects: Mapping[str, Mapping[str, Any]] | None = None,
-        *,
-        strut_law: bool = True,
-        near: Mapping[str, Mapping[str, Any]] | None = None,
-    ) -> dict[str, Any]:
-        """Errors in per cent with these effects beside those of the machine file.
-
-        Parameters
-        ----------
-        effects
-            Name -> the keys of its entry in a machine file: {"weak_strut": {"strut": 4, "factor": 0.8}}.
-        strut_law
-            Refit the strut law beside them; otherwise it stays that of the machine file.
-        near
-            Effects of other sizes, whose wild readings are taken for wild here too: quicker, for thousands of readings
-            while a slider moves. Unless given, wild readings are found anew.
-
-        Returns
-        -------
-        dict
-            "mean_abs_error_percent", "bias_percent", "rms_percent"; "deviation_percent", one a reading, of
-            (measured - modelled) / modelled; "modelled_N_per_mm", one a reading.
-
-        Raises
-        ------
-        InputError
-            An effect is unknown, or cannot have such values.
-        """
-        import numpy as np
-
-        from toolpath_stiff.units import n_per_mm_from_n_per_m
-        from toolpath_stiff.updating.inference.fits import deviation_percent, error_figures
-
-        fit = self._hand.fit(_entries(effects or {}), strut_law, None if near is None else self._fit_near(near))
-        modelled = n_per_mm_from_n_per_m(np.exp(self._hand.problem.observed - fit.residual))
-        return {
-            **error_figures(fit.residual),
-            "deviation_percent": deviation_percent(fit.residual).tolist(),
-            "modelled_N_per_mm": modelled.tolist(),
-        }
-
-    def _fit_near(self, effects: Mapping[str, Mapping[str, Any]]) -> Fit:
-        """The fit beside these effects; the last one is kept."""
-        asked = {name: dict(keys) for name, keys in effects.items()}
-        if self._near is None or self._near[0] != asked:
-            self._near = (asked, self._hand.fit(_entries(asked)))
-        return self._near[1]
-
-
-def with_effects(
-    machine: Machine, effects: Mapping[str, Mapping[str, Any]], strut_law: StrutLaw | None = None
-) -> Machine:
-    """A machine with further effects, name -> the keys of its entry in a machine file, and with another strut law."""
-    from dataclasses import replace
-
-    from toolpath_stiff.stiffness.effects import find_effect
-    from toolpath_stiff.stiffness.model import build_model
-
-    entries, given = _entries(effects), machine.model.given or machine.model.machine
-    read = [one for one in entries if find_effect(one.name, machine.effect_files).is_instrument]
-    added = given.with_changes(
-        strut_law=strut_law or given.strut_law,
-        effects=(*given.effects, *(one for one in entries if one not in read)),
-        instruments=(*given.instruments, *read),
-    )
-    model = build_model(added, machine.effect_files, conditions=machine.model.conditions)
-    return replace(machine, model=replace(model, unchecked=machine.model.unchecked))
-
-
-def _entries(effects: Mapping[str, Mapping[str, Any]]) -> list[EffectEntry]:
-    """Effects as a machine file would have them."""
-    from toolpath_stiff.machine.model import EffectEntry
-
-    return [EffectEntry(name, dict(keys)) for name, keys in effects.items()]
-
-
-@machine_by_name
-def preview(
-    machine: Machine | str | Path, data: Data, *, noise_percent: Noise = None, strut_spread_percent: float = 1.0
-) -> Preview:
-    """Set effects by hand and see the error of every reading: made once, then some milliseconds a setting.
-
-    Arguments and errors as of `compare`.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> hand = tps.preview("nist", "nist-table1", noise_percent=5)
-    >>> round(hand.at(strut_law=False)["mean_abs_error_percent"], 2)
-    9.62
-    >>> round(hand.at({"weak_strut": {"strut": 4, "factor": 0.8}})["mean_abs_error_percent"], 2)
-    10.04
-    """
-    return Preview(Question(machine, data, noise_percent, strut_spread_percent, 0))

@@ -247,7 +247,7 @@ class Program:
         >>> len(read.moves), read.unsupported
         (1, ())
         """
-        from toolpath_stiff.nc import parse_program, read_program
+        from toolpath_stiff.nc.reader import parse_program, read_program
 
         key = (origin, tuple(default_origin))
         if self._last.get("key") != key:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import Result, TextResult, notebook_text, one_of
 from toolpath_stiff.api.inputs import Program, pose_si, whole
+from toolpath_stiff.api.results import Result, TextResult, notebook_text, one_of
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm, pose_in_si
 
@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.analysis.checks import MachineCheck as Findings
     from toolpath_stiff.arrays import FloatArray
-    from toolpath_stiff.machine import Machine as MachineData
-    from toolpath_stiff.machine import Reach, Struts
-    from toolpath_stiff.stiffness.effects.contract import Conditions
+    from toolpath_stiff.machine.kinematics import Struts
+    from toolpath_stiff.machine.limits import Reach
+    from toolpath_stiff.machine.model import Machine as MachineData
+    from toolpath_stiff.stiffness.contract import Conditions
     from toolpath_stiff.stiffness.model import StiffnessModel
 
 TEMPERATURES_C = (-50.0, 200.0)
@@ -147,7 +148,7 @@ class Machine:
         >>> tps.Machine.names()
         ['genhexkins', 'nategh_agheli', 'nist']
         """
-        from toolpath_stiff.machine import packaged_machines
+        from toolpath_stiff.machine.file import packaged_machines
 
         return list(packaged_machines())
 
@@ -199,7 +200,7 @@ class Machine:
         >>> machine.running().machine.name, machine.running().conditions.setup
         ('nist', None)
         """
-        from toolpath_stiff.stiffness.effects.contract import Conditions
+        from toolpath_stiff.stiffness.contract import Conditions
         from toolpath_stiff.stiffness.model import NO_SETUP, check_setup
 
         model, setup, said_by = self.model, self.setup, f"--setup {self.setup}"
@@ -289,7 +290,8 @@ class Machine:
         """
         import numpy as np
 
-        from toolpath_stiff.machine import reach, solve_struts
+        from toolpath_stiff.machine.kinematics import solve_struts
+        from toolpath_stiff.machine.limits import reach
         from toolpath_stiff.rotations import rotation_matrices
 
         machine = self.model.machine
@@ -408,7 +410,7 @@ class Machine:
         'nist'
         """
         from toolpath_stiff.files import write_atomically
-        from toolpath_stiff.machine import machine_toml
+        from toolpath_stiff.machine.writer import machine_toml
 
         return write_atomically(Path(file), machine_toml(self.model.given or self.model.machine))
 
@@ -431,9 +433,9 @@ def _machine_again(
 
 def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects: bool) -> StiffnessModel:
     """The model of a machine; raises `InputError` for effects that fail, unless they are allowed."""
-    from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.stiffness.effects.trial import failures, own_effects, refuse_failing
+    from toolpath_stiff.machine.file import load_machine
     from toolpath_stiff.stiffness.model import build_model
+    from toolpath_stiff.stiffness.trial import failures, own_effects, refuse_failing
 
     given = load_machine(machine)
     model = build_model(given, files)
@@ -612,7 +614,7 @@ def machine_template(file: str | Path = "mine.toml") -> MachineFile:
     """
     from importlib import resources
 
-    from toolpath_stiff.machine import TEMPLATE_REMARK, toml_text
+    from toolpath_stiff.machine.writer import TEMPLATE_REMARK, toml_text
 
     target = Path(file)
     text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")
@@ -643,8 +645,8 @@ def machine_from_linuxcnc(file: str | Path, units: str | None = None) -> Machine
     toolpath_stiff.errors.FileError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
     """
     from toolpath_stiff.files import read_bytes
-    from toolpath_stiff.machine import machine_toml
     from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
+    from toolpath_stiff.machine.writer import machine_toml
 
     path = Path(file)
     text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
@@ -675,8 +677,8 @@ def recover_geometry(*, starts: int = 20, seed: int = 1) -> TextResult:
     >>> found.to_dict()["starts"]
     1
     """
-    from toolpath_stiff.updating.correction.machines import recover_geometry as recover
-    from toolpath_stiff.updating.correction.machines import recovery_text
+    from toolpath_stiff.correction.machines import recover_geometry as recover
+    from toolpath_stiff.correction.machines import recovery_text
 
     found = recover(starts=whole("starts", starts, 1, 1000), seed=whole("seed", seed, 0))
     return TextResult(recovery_text(found), found, f"the NIST geometry from {starts} starts")

@@ -15,26 +15,24 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import Progress, Result, one_of
 from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import TABLES, analyze, path_options
+from toolpath_stiff.api.results import Progress, Result, one_of
 from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.processes import ProcessDied, ProcessPool
-from toolpath_stiff.report import counted
-from toolpath_stiff.report.batch import (
+from toolpath_stiff.report.batch.index import files, names, text
+from toolpath_stiff.report.batch.programs import (
     Found,
     Listed,
     Outcome,
     columns_of,
     figures_of,
-    files,
     find_programs,
-    names,
     report_folders,
-    text,
 )
+from toolpath_stiff.report.words import counted
 from toolpath_stiff.results_folder import Rules, check_folder, clear_up, write_folder
 
 if TYPE_CHECKING:
@@ -298,7 +296,7 @@ def _found(programs: Iterable[str | Path | Program | Found]) -> tuple[list[Found
 
 def _check_shared(on: Machine, other: Machine | None, programs: Iterable[Program]) -> None:
     """What all programs share, so that a mistake in it is one error. Raises `InputError`."""
-    from toolpath_stiff.nc.linuxcnc import find_rs274
+    from toolpath_stiff.nc.linuxcnc.runner import find_rs274
 
     for program in programs:
         on.running(program, [other] if other else [])

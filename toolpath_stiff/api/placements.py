@@ -1,7 +1,4 @@
-"""Where the work should sit: the search, any placement tried, the program written for a placement.
-
-One tool path in several regions of the workspace: the paper's conclusions checked.
-"""
+"""Where the work should sit: the search, any placement tried, the program written for a placement."""
 
 from __future__ import annotations
 
@@ -11,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.api.inputs import (
     FARTHEST_MM,
     LONGEST_STEP_MM,
@@ -23,6 +19,7 @@ from toolpath_stiff.api.inputs import (
     whole,
 )
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
@@ -36,18 +33,25 @@ if TYPE_CHECKING:
     from toolpath_stiff.analysis.loads import Load
     from toolpath_stiff.machine.model import Machine as MachineModel
     from toolpath_stiff.nc.moves import Program as ReadProgram
-    from toolpath_stiff.placement import Placed, Rewriting
-    from toolpath_stiff.placement.case_study import CaseStudy as Study
-    from toolpath_stiff.placement.case_study import Region
     from toolpath_stiff.placement.climb import Bounds
     from toolpath_stiff.placement.paths import WorkPath
+    from toolpath_stiff.placement.placing import Placed, Rewriting
     from toolpath_stiff.placement.search import SearchRules
     from toolpath_stiff.stiffness.model import StiffnessModel
 
+
 FARTHEST_TURN_DEG = 720.0
+
+
 LONGEST_CHORD_MM = 10.0
+
+
 MOST_FRONT_POINTS = 1000
+
+
 LARGEST_MARGIN_PERCENT = 50.0
+
+
 Range = tuple[float, float] | float
 
 
@@ -135,7 +139,7 @@ class Placement(FolderResult):
 
     @staticmethod
     def _at(row: Mapping[str, Any]) -> tuple[float, ...]:
-        from toolpath_stiff.placement import PLACEMENT
+        from toolpath_stiff.placement.document import PLACEMENT
 
         return tuple(float(row[name]) for name in PLACEMENT)
 
@@ -147,12 +151,12 @@ class Placement(FolderResult):
 
     def plot(self) -> Figure:
         """The front: mean against range, the chosen and the present placement marked."""
-        from toolpath_stiff.report.place import front_picture
+        from toolpath_stiff.report.place.pictures import front_picture
 
         return front_picture.figure(self.placed.summary)
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.place import text
+        from toolpath_stiff.report.place.page import text
 
         return text(self.placed.summary)
 
@@ -162,7 +166,7 @@ class Placement(FolderResult):
 
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """Name -> content of each file that `save` writes."""
-        from toolpath_stiff.report.place import files
+        from toolpath_stiff.report.place.page import files
 
         return files(self.placed, plots=plots)
 
@@ -246,7 +250,7 @@ def place(
     []
     """
     from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.placement import Task, place_again, place_program
+    from toolpath_stiff.placement.placing import Task, place_again, place_program
 
     on, part = machine_from(machine), program_from(program)
     if write is None and (decimals is not None or linearise_mm is not None):
@@ -315,7 +319,7 @@ def _checked_box(box: KeepOut) -> KeepOut:
 
 
 def _rewriting(part: Program, file: str, decimals: int | None, linearise_mm: float | None) -> Rewriting:
-    from toolpath_stiff.placement import Rewriting
+    from toolpath_stiff.placement.placing import Rewriting
 
     chord = None
     if linearise_mm is not None:
@@ -527,134 +531,10 @@ def rewrite(
     G1 X50
     M2
     """
-    from toolpath_stiff.rewriting import rewrite_program
+    from toolpath_stiff.rewriting.program import rewrite_program
 
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(positive("linearise", linearise_mm, "mm", LONGEST_CHORD_MM))
     written = rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
     return RewrittenProgram(part.name, written.content, written.encoding, written.notes)
-
-
-class CaseStudy(FolderResult):
-    r"""One tool path in several regions: the paper's conclusions checked one by one, and where they stop holding.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> study = tps.case_study("nist", slot, {"low": (0, 0, 500), "high": (0, 0, 900)}, step_mm=10)
-    >>> study.to_frame()[["region", "z_mm"]].values.tolist()
-    [['low', 500.0], ['high', 900.0]]
-    """
-
-    command: ClassVar[str] = "case-study"
-
-    def __init__(self, study: Study, inputs: tuple[str, ...]) -> None:
-        self.study, self.inputs = study, inputs
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self.study.summary
-
-    def to_frame(self) -> pd.DataFrame:
-        """The regions, one a row."""
-        import pandas as pd
-
-        return pd.DataFrame(self.study.summary["regions"])
-
-    def plot(self) -> Figure:
-        """The path in its regions, coloured by stiffness."""
-        from toolpath_stiff.report.case_study import regions_picture
-
-        return regions_picture.figure(self.study)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.placement.case_study import study_text
-
-        return study_text(self.study)
-
-    def _short(self) -> str:
-        held = [one["holds"] for one in self.study.summary["conclusions"] if one["holds"] is not None]
-        on = f"{self.study.summary['program']} on " if self.study.is_own else ""
-        verb = "conclusion of the paper holds" if len(held) == 1 else "conclusions of the paper hold"
-        return f"{on}{self.study.summary['machine']}, {sum(held)} of {len(held)} {verb}"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content of each file that `save` writes."""
-        from toolpath_stiff.report.case_study import files
-
-        return files(self.study, plots=plots)
-
-
-def case_study(
-    machine: Machine | str | Path = "nist",
-    program: Program | str | Path | None = None,
-    regions: Mapping[str, Sequence[float]] | str | Path | None = None,
-    *,
-    step_mm: float = 1.0,
-) -> CaseStudy:
-    r"""One tool path in several regions, at several heights, displaced and turned, as the paper's Figure 10.
-
-    Parameters
-    ----------
-    machine
-        A machine, its name or its file.
-    program
-        What runs; unless given, the packaged contour of a 200 mm square.
-    regions
-        Name -> x, y, z of program zero in mm and, if turned, the angle in degrees; or a table with the columns region,
-        x_mm, y_mm, z_mm, rotation_deg. Unless given, four of the reference machine.
-    step_mm
-        Distance of the samples.
-
-    Raises
-    ------
-    InputError
-        Regions or program cannot be read.
-    UnreachableError
-        The machine cannot reach a region.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.case_study("nist")
-    <CaseStudy: nist, 3 of 3 conclusions of the paper hold>
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> tps.case_study("nist", slot, {"left": (-200, 0, 800), "right": (200, 0, 800, 90)}, step_mm=10)
-    <CaseStudy: slot.nc on nist, 1 of 1 conclusion of the paper holds>
-    """
-    from toolpath_stiff.placement.case_study import run_case_study
-
-    on = machine_from(machine)
-    part = None if program is None else program_from(program)
-    model = on.running(part)
-    default = model.machine.default_origin
-    step = m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM))
-    read = None if part is None else lambda origin: part.moves(origin, default)
-    where, files = _regions(regions)
-    study = run_case_study(model, step, read, where)
-    return CaseStudy(study, (*(part.inputs if part else ()), *files, *on.inputs))
-
-
-def _regions(
-    given: Mapping[str, Sequence[float]] | str | Path | None,
-) -> tuple[dict[str, Region] | None, tuple[str, ...]]:
-    """Regions by name in mm and degrees, checked, and the file that they come from."""
-    from toolpath_stiff.placement.case_study import MOST_REGIONS, read_regions
-
-    if given is None:
-        return None, ()
-    files: tuple[str, ...] = (str(given),) if isinstance(given, str | Path) else ()
-    named: Mapping[str, Sequence[float]] = read_regions(files[0]) if isinstance(given, str | Path) else given
-    if not 0 < len(named) <= MOST_REGIONS:
-        raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}", file=files[0] if files else "")
-    found = {}
-    for name, place in named.items():
-        numbers = [float(value) for value in place]
-        if len(numbers) not in (3, 4):
-            raise InputError(f"region {name} of {len(numbers)} numbers", expected="x, y, z in mm, and the turn")
-        x, y, z, turn = [*numbers, 0.0][:4]
-        pose_si(f"region {name}", (x, y, z, 0.0, 0.0, turn))
-        found[str(name)] = (x, y, z, turn)
-    return found, files

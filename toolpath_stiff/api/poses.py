@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import FolderResult, Progress, Result, counter
 from toolpath_stiff.api.inputs import FARTHEST_MM, STRONGEST_N, positive, whole
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.api.results import FolderResult, Progress, Result, counter
 from toolpath_stiff.defaults import FORCE
 from toolpath_stiff.errors import InputError, InputErrors, UnreachableError
 from toolpath_stiff.files import Content

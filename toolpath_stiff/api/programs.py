@@ -7,9 +7,9 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.api.inputs import LONGEST_STEP_MM, STRONGEST_N, Program, pose_si, positive, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
@@ -78,7 +78,7 @@ class Analysis(FolderResult):
 
     @cached_property
     def _document(self) -> dict[str, Any]:
-        from toolpath_stiff.report.analysis import summary_with_options
+        from toolpath_stiff.report.analysis.summary import summary_with_options
 
         return summary_with_options(self.path, self._required, self.on_other)
 
@@ -142,13 +142,13 @@ class Analysis(FolderResult):
         return None if band is None else n_per_mm_from_n_per_m(band.deviation)
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.analysis import text
+        from toolpath_stiff.report.analysis.summary import text
 
         other = None if self.on_other is None else self.on_other.summary()
         return text(self._document, self.path.program.source, other)
 
     def _short(self) -> str:
-        from toolpath_stiff.report import number
+        from toolpath_stiff.report.words import number
 
         found = self._document
         mean, low = (number(found[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))
@@ -176,7 +176,7 @@ class Analysis(FolderResult):
         self, *, plots: bool = True, table: str = "csv", show_plunges: bool = False
     ) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps analyze`; samples as "csv" or "parquet"."""
-        from toolpath_stiff.report.analysis import files
+        from toolpath_stiff.report.analysis.summary import files
 
         return files(
             self.path,
@@ -457,12 +457,12 @@ class ProgramCheck(Result):
         return write_atomically(file, self.to_json())
 
     def __str__(self) -> str:
-        from toolpath_stiff.report import text
+        from toolpath_stiff.report.check import text
 
         return text(self._document)
 
     def _short(self) -> str:
-        from toolpath_stiff.report import counted
+        from toolpath_stiff.report.words import counted
 
         return f"{self._document['program']}, {counted(len(self.errors), 'error') if self.errors else 'no errors'}"
 

@@ -27,9 +27,9 @@ from toolpath_stiff.results_folder import Rules, check_folder, holds_others, inc
 from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:
-    from toolpath_stiff.api import FolderResult, Progress
     from toolpath_stiff.api.inputs import Program, Reading
     from toolpath_stiff.api.machines import Machine
+    from toolpath_stiff.api.results import FolderResult, Progress
 
 SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
 ALL_BLOCKS = "all"
@@ -449,7 +449,7 @@ def show(
 
 def written_text(files: Iterable[Path]) -> str:
     """What was written, a file a line."""
-    from toolpath_stiff.report import plain
+    from toolpath_stiff.report.words import plain
 
     return "\n".join(["written:", *(f"  {plain(str(file))}" for file in files)])
 

@@ -237,8 +237,8 @@ def machine(args: argparse.Namespace) -> int:
 
 
 def _machine_list(args: argparse.Namespace) -> int:
-    from toolpath_stiff.api import json_text
     from toolpath_stiff.api.machines import Machine
+    from toolpath_stiff.api.results import json_text
 
     machines = [Machine.load(name) for name in Machine.names()]
     if args.json:
@@ -249,8 +249,8 @@ def _machine_list(args: argparse.Namespace) -> int:
 
 
 def _machine_show(args: argparse.Namespace) -> int:
-    from toolpath_stiff.api import json_text
     from toolpath_stiff.api.machines import Machine
+    from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
 
     machine = Machine.load(args.machine)
@@ -405,9 +405,9 @@ def _effects_list(args: argparse.Namespace) -> int:
 
 
 def _effects_show(args: argparse.Namespace) -> int:
-    from toolpath_stiff.api import json_text
+    from toolpath_stiff.api.results import json_text
     from toolpath_stiff.report.machine import describe_effect, effect_details
-    from toolpath_stiff.stiffness.effects import find_effect
+    from toolpath_stiff.stiffness.catalogue import find_effect
 
     effect = find_effect(args.name, args.effects)
     sys.stdout.write(json_text(describe_effect(effect)) if args.json else f"{effect_details(effect)}\n")
@@ -480,7 +480,7 @@ def studio_arguments(parser: argparse.ArgumentParser) -> None:
 
 def studio(args: argparse.Namespace) -> int:
     """Open the case and serve it until Ctrl-C."""
-    from toolpath_stiff.studio import ask_for_effects, opened_case, serve
+    from toolpath_stiff.studio.run import ask_for_effects, opened_case, serve
 
     case = opened_case(
         args.case,

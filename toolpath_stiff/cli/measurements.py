@@ -181,8 +181,8 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
 
 def reduce(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
-    from toolpath_stiff.api import json_text
     from toolpath_stiff.api.correction import reduce
+    from toolpath_stiff.api.results import json_text
     from toolpath_stiff.tables import split_name
 
     found = reduce(
@@ -229,7 +229,7 @@ def compare_arguments(parser: argparse.ArgumentParser) -> None:
 
 def compare(args: argparse.Namespace) -> int:
     """Compare, write, say where the model fails."""
-    from toolpath_stiff.report.compare import names
+    from toolpath_stiff.report.compare.page import names
 
     target = destination(args, "compare", args.data, "-compare").check(names(not args.no_plots))
     from toolpath_stiff.api.diagnosis import compare
@@ -272,7 +272,7 @@ def diagnose_arguments(parser: argparse.ArgumentParser) -> None:
 
 def diagnose(args: argparse.Namespace) -> int:
     """Diagnose, write, say what was found. Any verdict is success."""
-    from toolpath_stiff.report.diagnose import names
+    from toolpath_stiff.report.diagnose.page import names
 
     target = destination(args, "diagnose", args.data, "-diagnose").check(names(not args.no_plots))
     from toolpath_stiff.api.diagnosis import diagnose
@@ -341,7 +341,7 @@ def update_arguments(parser: argparse.ArgumentParser) -> None:
 
 def update(args: argparse.Namespace) -> int:
     """Fit, judge, write. Refusal is success as well."""
-    from toolpath_stiff.report.update import MACHINE_FILE, names
+    from toolpath_stiff.report.update.page import MACHINE_FILE, names
 
     args.replace |= args.force
     replaced = check_single(args, args.output, mark=b"# Command: tps update")
@@ -478,7 +478,7 @@ def plan(args: argparse.Namespace) -> int:
 
 def _next(args: argparse.Namespace) -> int:
     """The next visit of a plan: say where, write its rows."""
-    from toolpath_stiff.api.diagnosis import next_visit
+    from toolpath_stiff.api.next_visits import next_visit
 
     found = next_visit(args.next, args.data)
     written = found.save()
@@ -532,7 +532,7 @@ def rig_arguments(parser: argparse.ArgumentParser) -> None:
 
 def rig(args: argparse.Namespace) -> int:
     """Make, measure or reveal."""
-    from toolpath_stiff import rig as exercises
+    from toolpath_stiff.rig import exercise as exercises
 
     if args.action == "new":
         rules = Rules(inputs=tuple(inputs_of(args)), fresh=True, replace=args.replace, kept=tell_kept)

@@ -38,7 +38,7 @@ from toolpath_stiff.hints import both_names
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from toolpath_stiff.report.batch import FolderCount, Found
+    from toolpath_stiff.report.batch.programs import FolderCount, Found
 
 
 # -- tps analyze ------------------------------------------------------------------------------------------------------
@@ -158,7 +158,7 @@ def analyze(args: argparse.Namespace) -> int:
     if len(args.programs) == 1 and os.path.isfile(args.programs[0]) and not args.cluster:  # noqa: PTH113  (false for a name that none can have)
         job_count(args.jobs, 1)
         return _run_single(args, args.programs[0])  # without loading what lists many
-    from toolpath_stiff.report.batch import find_programs
+    from toolpath_stiff.report.batch.programs import find_programs
 
     found, counts = find_programs(args.programs)
     job_count(args.jobs, len(found))
@@ -183,7 +183,7 @@ def _asked(args: argparse.Namespace) -> dict[str, Any]:
 def _run_single(args: argparse.Namespace, file: str) -> int:
     """Analyze, write, print; the exit code."""
     from toolpath_stiff.api.programs import analyze
-    from toolpath_stiff.report.analysis import names
+    from toolpath_stiff.report.analysis.summary import names
 
     target = destination(args, "analyze", [file]).check(names(not args.no_plots, args.format))
     with progress_line(quiet=args.json) as progress:
@@ -197,7 +197,7 @@ def _run_single(args: argparse.Namespace, file: str) -> int:
 def _run_many(args: argparse.Namespace, found: Sequence[Found], counts: Sequence[FolderCount]) -> int:
     """The same of many; nothing is printed before the arguments have been found right."""
     from toolpath_stiff.api.many import analyze_many
-    from toolpath_stiff.report import plain
+    from toolpath_stiff.report.words import plain
 
     def told(text: str, done: int, total: int) -> None:
         if done == 0 and not args.json:
@@ -476,7 +476,7 @@ def _keep_out(text: str) -> tuple[str, list[float]]:
 def place(args: argparse.Namespace) -> int:
     """Search, or take another point of an earlier search; write the files."""
     from toolpath_stiff.api.placements import KeepOut, place
-    from toolpath_stiff.report.place import names
+    from toolpath_stiff.report.place.page import names
 
     replaced = check_single(args, args.write)
     target = destination(args, "place", [args.program], "-place").check(names(not args.no_plots))
@@ -572,7 +572,7 @@ def _region(text: str) -> tuple[str, list[float]]:
 
 def case_study(args: argparse.Namespace) -> int:
     """Analyze the regions and write the files."""
-    from toolpath_stiff.api.placements import case_study
+    from toolpath_stiff.api.case_studies import case_study
     from toolpath_stiff.report.case_study import names
 
     regions = dict(args.region)

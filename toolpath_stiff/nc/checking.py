@@ -13,10 +13,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc import (
+from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.codes.registry import code_meaning, would_change
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, plain, switches_on
+from toolpath_stiff.nc.cutter_location import reader as cutter_location
+from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.interpreter import ProgramRun
+from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.linuxcnc.inputs import split
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
+from toolpath_stiff.nc.reader import (
     INTERPRETERS,
     ZERO,
-    cutter_location,
     feed_assumption,
     foreign_program,
     lathe_warning,
@@ -24,14 +32,7 @@ from toolpath_stiff.nc import (
     parse_program,
     refused_program,
 )
-from toolpath_stiff.nc.codes import code_name
-from toolpath_stiff.nc.codes.registry import code_meaning, would_change
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, plain, switches_on
-from toolpath_stiff.nc.interpreter import ProgramRun
-from toolpath_stiff.nc.kinematics import PostedKinematics
-from toolpath_stiff.nc.linuxcnc.inputs import split
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
-from toolpath_stiff.nc.state import Flow, Frames, State, Then
+from toolpath_stiff.nc.state import Flow, State, Then
 from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
 from toolpath_stiff.nc.words import Block, looks_like_cutter_location
 from toolpath_stiff.units import Pose, m_from_mm, pose_in_mm, pose_in_si
@@ -251,7 +252,7 @@ def _checked_run(
 def _parametric_run(
     state: State, lines: tuple[str, ...], name: str, switches: frozenset[int], subprograms: str | Path | None
 ) -> _CheckingRun:
-    from toolpath_stiff.nc.parametric import ParametricRun
+    from toolpath_stiff.nc.parametric.run import ParametricRun
 
     class CheckingParametricRun(_CheckingRun, ParametricRun):
         """Both: `super()` in the first is the second."""

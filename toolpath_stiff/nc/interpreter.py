@@ -17,7 +17,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.codes import (
+from toolpath_stiff.nc.codes.code import (
     FEED,
     LENGTH,
     MODES,
@@ -31,10 +31,12 @@ from toolpath_stiff.nc.codes import (
     code_name,
 )
 from toolpath_stiff.nc.codes.cutter import check_block
-from toolpath_stiff.nc.codes.motion import CYCLES, begin_cycle, homes_standing
+from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
+from toolpath_stiff.nc.codes.motion import homes_standing
 from toolpath_stiff.nc.codes.offsets import HOLDS_TIP, list_numbers
 from toolpath_stiff.nc.codes.points import read_numbers
-from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, leave_level, m_parameters
+from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_parameters
+from toolpath_stiff.nc.codes.saved import leave_level
 from toolpath_stiff.nc.moves import Jump
 from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD

@@ -1,16 +1,12 @@
-"""Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, S; holes of a cycle; comments.
+"""Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, S, an N word, comments.
 
 Most of a big program is such lines. `plain_words` reads them many times faster than `words.read_block` reads blocks; a
 line that it does not take as a whole is not plain and is left to `read_block`, with every error.
 
-The lines become moves by the codes' own rules (`codes`, `state`) on arrays, digit for digit. Here is only what a mode
+The lines become moves by the codes' own rules (`codes`, `frames`) on arrays, digit for digit. Here is only what a mode
 does along lines: a word holds until the next one. What a number, a feed, a point, an arc means is decided by the
 functions that the interpreter calls. A line about which there is anything to say (a word that nothing takes, an arc
 that does not fit) ends the run before it: the interpreter then executes it and reports it. mm, degrees, mm/min inside.
-
-Holes of a drilling cycle are lines of X and Y alone, each drilled as the line before them was. The interpreter drills
-the first holes; where the last one went straight to its place at the height at which it ended, and in and out along
-the tool, the next ones are the same moves elsewhere, digit for digit.
 """
 
 from __future__ import annotations
@@ -20,20 +16,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.modes import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
-from toolpath_stiff.nc.codes.motion import (
-    ARCS,
-    CYCLES,
-    STILL,
-    center_by_offsets,
-    center_by_radius,
-    note_tool,
-    sweep_about,
-)
+from toolpath_stiff.nc.codes.motion import ARCS, STILL, center_by_offsets, center_by_radius, note_tool, sweep_about
 from toolpath_stiff.nc.codes.points import (
     ANGLES,
     LINEAR,
@@ -44,7 +32,8 @@ from toolpath_stiff.nc.codes.points import (
     watches_points,
 )
 from toolpath_stiff.nc.codes.registry import CODES
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arcs, MovesInMm, Recorder
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arcs, MovesInMm
+from toolpath_stiff.nc.plain_holes import LEAST, drill, rows_of_hole, suits
 from toolpath_stiff.nc.plain_words import (
     BARE,
     FIRST_F,
@@ -63,14 +52,19 @@ from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, read_block
 
-# -- words to moves ----------------------------------------------------------------------------------------------------
-
 FEWEST = 8  # lines; below, one by one is as fast
+
+
 MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_lines` reads
+
+
 MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}
+
+
 NO_MODE = -1
+
+
 CLOCKWISE = MODES[ARCS[0]]
-LEAST = 1e-9  # mm; of a shorter way to the next hole the interpreter decides whether it is one
 
 
 class PlainRun:
@@ -443,67 +437,3 @@ class _Lines:
             state.frames.position = control[self.end].tolist()
             state.length_changed = state.rotation_changed = False
         return self.end
-
-
-def suits(state: State) -> bool:
-    """Whether holes can be drilled so: G17, G90, and no offset whose sums would round."""
-    frames = state.frames
-    offset = frames.offsets.at(frames.active)
-    return (
-        state.plane == "G17"
-        and state.absolute
-        and state.feed_mode == "G94"
-        and not any(offset.axes)
-        and not any(frames.g92)
-        and not any(frames.fix_reference())
-        and not frames.rotated
-    )
-
-
-def rows_of_hole(recorder: Recorder, line: int) -> slice | None:
-    """The rows of the last line's hole in the recorder's lists, if it went there and in and out again; else None."""
-    last = len(recorder.line)
-    first = last
-    while first and recorder.line[first - 1] == line:
-        first -= 1
-    if last - first < 3 or recorder.motion[first] != RAPID:
-        return None
-    begin, place = recorder.start[first], recorder.end[first]
-    if begin[2:] != place[2:] or recorder.end[-1] != place:
-        return None
-    for row in range(first + 1, last):
-        for point in (recorder.start[row], recorder.end[row]):
-            if point[:2] != place[:2] or point[3:] != place[3:]:
-                return None
-    if any(any(flags) for flags in recorder.from_machine[first:last]):
-        return None
-    return slice(first, last)
-
-
-def drill(state: State, hole: slice, line: int, places: FloatArray) -> None:
-    """Add the moves of holes at `places` (m, 2), of the lines from `line` on, like the one in the rows `hole`."""
-    recorder = state.recorder
-    start, end = (np.array(column[hole]) for column in (recorder.start, recorder.end))
-    count, rows = len(places), hole.stop - hole.start
-    starts, ends = (np.tile(points, (count, 1, 1)) for points in (start, end))
-    starts[:, 1:, :2] = ends[:, :, :2] = places[:, None, :]
-    starts[0, 0, :2], starts[1:, 0, :2] = end[0, :2], places[:-1]
-
-    def repeated(column: Sequence[float]) -> NDArray[np.float64]:
-        return np.tile(np.array(column[hole]), count)
-
-    recorder.add_many(
-        MovesInMm(
-            line=np.repeat(np.arange(line, line + count), rows),
-            motion=np.tile(np.array(recorder.motion[hole], dtype=np.int64), count),
-            start=starts.reshape(-1, 6),
-            end=ends.reshape(-1, 6),
-            arcs=Arcs.of({}),
-            feed=repeated(recorder.feed),
-            dwell=repeated(recorder.dwell),
-            tool=np.full(count * rows, state.tool),
-            tool_length=np.full(count * rows, state.tool_length),
-            from_machine=np.zeros((count * rows, 2), dtype=bool),
-        )
-    )
-    state.frames.position[:2] = places[-1].tolist()

@@ -1,52 +1,34 @@
-"""A program posted for another machine: what of it can be known on the part, and what is reported about it. SI.
-
-The tool's moves on the part come from those of the machine's axes by the chain in `kinematics`. Where rotary axes
-turn, a straight move of the axes is a curve on the part: it is divided.
-"""
+"""A program posted for another machine: what of it can be known on the part, and what is reported about it."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
-from toolpath_stiff.nc.kinematics import (
-    HEAD,
-    LETTERS,
-    MACHINE,
-    PROGRAM,
-    TABLE,
-    PostedKinematics,
-    RotaryAxis,
-    line_point,
-    roll_pitch,
-    tool_poses,
-    turned,
-)
-from toolpath_stiff.nc.moves import FEED, RAPID, Moves, Program, ToolUse
-from toolpath_stiff.nc.state import Frames
+from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis, tool_poses
+from toolpath_stiff.nc.moves import RAPID, Moves, Program, ToolUse
+from toolpath_stiff.nc.recovery import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import Pose, deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
 MOST_LINES = 5  # named in one sentence
+
+
 OWN_ZERO = (
     "G54 as the program or the controller file sets it is that of the machine that the program was posted for; it does "
     "not say where the work sits here"
 )
+
+
 OWN_POINTS = (
     "G53, G28 and G30 go to points of the machine that the program was posted for, as it stands about the work; their "
     "place on this machine means nothing"
 )
-AXIS_STEP = rad_from_deg(1.0)  # largest turn of the rotary axes in one piece
-SAME_PLACE = 1e-12  # m and rad: rounding, not motion
-MOST_PIECES = 5_000_000
-MOVES_AT_A_TIME = 50_000  # the columns in between are several times those of the moves
-HALF_TURN = math.pi * (1.0 + 1e-9)
 
 
 @dataclass(frozen=True)
@@ -232,294 +214,3 @@ def _known_points(
         f"was posted for (G53, G28, G30, another tool length while the tool leans) are left out of the path: {reason}"
     )
     return ~fixed, [warning], []
-
-
-def recover_moves(
-    moves: Moves,
-    kinematics: PostedKinematics,
-    tool_lengths: Mapping[int, float],
-    name: str = "program",
-    tip_held: BoolArray | bool = False,
-) -> Moves:
-    """Moves of the tool on the part, from those of the machine that the program was posted for.
-
-    Parameters
-    ----------
-    moves
-        As programmed: X Y Z A B C of the posted machine, relative to G54's zero.
-    kinematics
-        Its tables' points relative to G54's zero, too.
-    tool_lengths
-        Tool number -> m, for moves without a length of their own (G43).
-    name
-        The program's name, for messages.
-    tip_held
-        (n,) or one, whether tool centre point control is on, as in `tool_poses`.
-
-    Returns
-    -------
-    Moves of tip, roll and pitch (yaw 0), in part coordinates: those of G54 with all rotary axes at 0. A move is divided
-    where rotary axes turn, so that straight pieces (arcs under tool centre point control: arcs) stay within
-    `kinematics.tolerance` of the true curve and no piece turns by more than a degree; each keeps its move's line, and
-    their times add up to the move's. Arcs with standing rotary axes are turned as a whole. What moves neither tip nor
-    tool axis has no row; its time is added to the dwell before it. `from_machine` is False throughout.
-
-    Raises
-    ------
-    InputError
-        A letter that the kinematics does not have turns; a head's tool has no length; too many pieces.
-    """
-    if not len(moves):
-        return moves
-    _check_letters(moves, kinematics, name)
-    moves = _shorter_way(moves, kinematics)
-    held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(moves),))
-    length = _lengths_at_heads(moves, kinematics, held, tool_lengths, name)
-    some = [slice(first, first + MOVES_AT_A_TIME) for first in range(0, len(moves), MOVES_AT_A_TIME)]
-    count = np.concatenate([_pieces(moves.take(rows), kinematics, held[rows], length[rows]) for rows in some])
-    _check_pieces(count, moves, kinematics, name)
-    found, filled = _room(moves, int(count.sum())), 0
-    before: FloatArray | None = None
-    for rows in some:
-        part, before, waited = _divided(moves.take(rows), kinematics, held[rows], length[rows], count[rows], before)
-        if filled:  # a pause before the first move is none
-            found.dwell[filled - 1] += waited
-        for column in fields(Moves):
-            getattr(found, column.name)[filled : filled + len(part)] = getattr(part, column.name)
-        filled += len(part)
-    return found.take(slice(0, filled))
-
-
-def _check_pieces(count: IntArray, moves: Moves, kinematics: PostedKinematics, name: str) -> None:
-    if count.sum() > MOST_PIECES:
-        raise ProgramError(
-            f"dividing moves with turning axes within {mm_from_m(kinematics.tolerance):g} mm gives "
-            f"{float(count.sum()):.0f} pieces",
-            expected=f"at most {MOST_PIECES}",
-            hint="give a larger kinematics.tolerance_mm in the controller file",
-            file=name,
-            line=int(moves.line[np.argmax(count)]),
-        )
-
-
-def _divided(
-    moves: Moves,
-    kinematics: PostedKinematics,
-    held: BoolArray,
-    length: FloatArray,
-    count: IntArray,
-    before: FloatArray | None,
-) -> tuple[Moves, FloatArray, float]:
-    """Some moves on the part; the pose at their end, `before` of the next ones; the time before the first one, s."""
-    move = np.repeat(np.arange(len(moves)), count + 1)
-    step = np.arange(len(move)) - np.repeat(np.cumsum(count + 1) - (count + 1), count + 1)
-    u = step / count[move]
-    last = step == count[move]
-    programmed = points_along(moves, move, u)[0]
-    angles = moves.start[move, 3:] + u[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
-    angles[last] = moves.end[:, 3:]
-    found = tool_poses(kinematics, programmed, angles, length[move], held[move])
-    pose = np.zeros((len(move), 6))
-    pose[:, :3] = _without_rounding(found.tip, None if before is None else before[:3])
-    pitch = 0.0 if before is None else float(before[4])
-    pose[:, 3:5] = _without_rounding(roll_pitch(found.axis, pitch), None if before is None else before[3:5])
-    start, end = np.flatnonzero(~last), np.flatnonzero(step > 0)
-    pieces = _on_the_part(moves, kinematics, held, length, move[start], u[start])
-    pieces = replace(pieces, start=pose[start], end=pose[end])
-    part, waited = _with_times(pieces, moves, move[start], count, last[end])
-    return part, pose[-1], waited
-
-
-def turns_far(moves: Moves, kinematics: PostedKinematics) -> list[tuple[int, str, float]]:
-    """Cutting moves in which an axis without roll-over turns by more than half a turn: line, letter, degrees."""
-    found = []
-    for rotary in kinematics.axes:
-        turn = np.abs(moves.end[:, 3 + rotary.column] - moves.start[:, 3 + rotary.column])
-        far = np.flatnonzero((turn > HALF_TURN) & (moves.motion != RAPID) & (not rotary.rollover))
-        found += [(int(moves.line[i]), rotary.letter, deg_from_rad(float(turn[i]))) for i in far]
-    return sorted(found)
-
-
-def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> None:
-    letters = [axis.letter for axis in kinematics.axes]
-    for column, letter in enumerate(LETTERS):
-        used = (moves.start[:, 3 + column] != 0.0) | (moves.end[:, 3 + column] != 0.0)
-        if letter not in letters and used.any():
-            raise ProgramError(
-                f"{letter} turns, and the kinematics that the program was posted for has {' and '.join(letters)} alone",
-                expected=f"no {letter} words",
-                hint="see [kinematics] of the controller file",
-                file=name,
-                line=int(moves.line[np.argmax(used)]),
-            )
-
-
-def _shorter_way(moves: Moves, kinematics: PostedKinematics) -> Moves:
-    """Axes with roll-over go to their angle the shorter way; where they stand then is the same."""
-    rolling = [3 + axis.column for axis in kinematics.axes if axis.rollover]
-    if not rolling:
-        return moves
-    end = moves.end.copy()
-    for column in rolling:
-        turn = end[:, column] - moves.start[:, column]
-        far = np.abs(turn) > math.pi
-        end[far, column] -= (2.0 * math.pi * np.round(turn / (2.0 * math.pi)))[far]
-    return replace(moves, end=end)
-
-
-def _turning(moves: Moves) -> FloatArray:
-    """(n, 3) rad, how far each rotary axis turns within each move."""
-    return np.asarray(np.abs(moves.end[:, 3:] - moves.start[:, 3:]))
-
-
-def _lengths_at_heads(
-    moves: Moves, kinematics: PostedKinematics, held: BoolArray, tool_lengths: Mapping[int, float], name: str
-) -> FloatArray:
-    """(n,) m, gauge line to tip: G43's, else the tool table's; needed wherever a head is tilted."""
-    length = moves.tool_length.copy()
-    for tool in np.unique(moves.tool[np.isnan(length)]):
-        length[np.isnan(length) & (moves.tool == tool)] = tool_lengths.get(int(tool), math.nan)
-    heads = [3 + axis.column for axis in kinematics.axes if axis.turns == HEAD]
-    if kinematics.tcp or not heads:
-        return length
-    tilted = (moves.start[:, heads] != 0.0).any(axis=1) | (moves.end[:, heads] != 0.0).any(axis=1)
-    missing = tilted & ~held & np.isnan(length)
-    if missing.any():
-        first = int(np.argmax(missing))
-        raise ProgramError(
-            f"the head is tilted, and the length of tool {moves.tool[first]} is not known: the pivot is the pivot "
-            "length and the tool's length above the tip",
-            expected="the tool's length from the gauge line to the tip",
-            hint="add it to the tool table (--tools FILE, or [[tools]] of the controller file)",
-            file=name,
-            line=int(moves.line[first]),
-        )
-    return length
-
-
-def _pieces(moves: Moves, kinematics: PostedKinematics, held: BoolArray, length: FloatArray) -> IntArray:
-    """(n,) into how many pieces each move is divided.
-
-    A curve with |q''| <= a (per share of the move) is within a / (8 m^2) of m equal chords. A turn at the rate w about
-    a line at the distance r adds 2 w |q'| + w^2 r to the bound of |q''|, and w r to that of |q'|.
-    """
-    turning = _turning(moves)
-    used = [axis.column for axis in kinematics.axes]
-    count = np.ceil(turning[:, used].sum(axis=1) / AXIS_STEP - 1e-9)
-    if not kinematics.tcp:
-        bent = ~held & (turning[:, used] > 0.0).any(axis=1)
-        bend = np.where(bent, _bend(moves, kinematics, length), 0.0)
-        count = np.maximum(count, np.ceil(np.sqrt(bend / (8.0 * kinematics.tolerance)) - 1e-9))
-    return np.asarray(np.maximum(count, 1.0), dtype=np.int64)
-
-
-def _bend(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> FloatArray:
-    """(n,) m, a bound of the tip's |q''| over a move that runs from 0 to 1."""
-    turning = _turning(moves)
-    linear, bend = _linear_bounds(moves)
-    ends = [np.array(pose[:, :3]) for pose in (moves.start, moves.end)]
-    rides = [np.zeros_like(point) for point in ends]  # of the tip from X, by the heads so far
-    speed, ride_speed = linear, np.zeros(len(moves))
-    for rotary in kinematics.from_tool_to_work:
-        rate = turning[:, rotary.column]
-        head = rotary.turns == HEAD
-        points = rides if head else ends
-        reach, there = np.zeros(len(moves)), []
-        for point, pose in zip(points, (moves.start, moves.end), strict=True):
-            center = line_point(rotary, np.zeros_like(point) if head else pose[:, :3], length)
-            turns = (rate != 0.0) | (pose[:, 3 + rotary.column] != 0.0)
-            # A head that stands upright may have a tool of unknown length.
-            out = np.where(turns[:, None], point - center, 0.0)
-            reach = np.maximum(reach, np.linalg.norm(np.cross(rotary.direction, out), axis=1))  # from the line
-            there.append(np.where(turns[:, None], center + turned(out, rotary, pose[:, 3 + rotary.column]), point))
-        # No point of the move is farther than half of it from one of its ends.
-        reach = reach + (ride_speed if head else speed) / 2.0
-        bend = bend + 2.0 * rate * (ride_speed if head else speed) + rate**2 * reach
-        if head:
-            rides, ride_speed = there, ride_speed + rate * reach
-            ends = [pose[:, :3] + ride for pose, ride in zip((moves.start, moves.end), rides, strict=True)]
-            speed = linear + ride_speed
-        else:
-            ends, speed = there, speed + rate * reach
-    return bend
-
-
-def _linear_bounds(moves: Moves) -> tuple[FloatArray, FloatArray]:
-    """(n,) m, bounds of |X'| and |X''| of the linear axes over a move that runs from 0 to 1."""
-    speed, bend = move_lengths(moves), np.zeros(len(moves))
-    arcs = np.flatnonzero(moves.arc_sweep != 0.0)
-    if len(arcs):
-        frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
-        radius = np.maximum(frame.radius_start, frame.radius_end)
-        growth = np.abs(frame.radius_end - frame.radius_start)
-        bend[arcs] = radius * sweep**2 + 2.0 * growth * sweep
-        speed[arcs] = np.sqrt((radius * sweep) ** 2 + growth**2 + frame.climb**2)
-    return speed, bend
-
-
-def _without_rounding(points: FloatArray, before: FloatArray | None) -> FloatArray:
-    """Points (n, k) in which a step below `SAME_PLACE` is none: the point before stands in its place."""
-    points = np.concatenate([points[:1] if before is None else before[None], points])
-    moved = np.ones(len(points), dtype=bool)
-    moved[1:] = (np.abs(np.diff(points, axis=0)) > SAME_PLACE).any(axis=1)
-    return points[np.maximum.accumulate(np.where(moved, np.arange(len(points)), 0))[1:]]
-
-
-def _on_the_part(
-    moves: Moves,
-    kinematics: PostedKinematics,
-    held: BoolArray,
-    length: FloatArray,
-    move: IntArray,
-    share: FloatArray,
-) -> Moves:
-    """One row a piece, which begins at its share of its move; arcs that stay arcs; the ends are still the moves'."""
-    arc = moves.arc_sweep != 0.0
-    turning = (_turning(moves) > 0.0).any(axis=1)
-    stays = arc & (~turning | held)
-    center, normal = moves.arc_center, moves.arc_normal
-    rows = np.flatnonzero(stays & ~held)
-    if len(rows):
-        # Turned as a whole: the centre as a point of the linear axes, the normal as the way to another one.
-        abc = moves.start[rows, 3:]
-        here, there = (
-            tool_poses(kinematics, center[rows] + along, abc, length[rows]).tip for along in (0.0, normal[rows])
-        )
-        center, normal = center.copy(), normal.copy()
-        center[rows], normal[rows] = here, (there - here) / np.linalg.norm(there - here, axis=1)[:, None]
-    rows, climb = np.flatnonzero(stays), np.zeros(len(moves))
-    climb[rows] = arc_frame(moves, rows).climb
-    risen = center[move] + (climb[move] * share)[:, None] * normal[move]  # the plane of the piece's start
-    pieces = np.bincount(move, minlength=len(moves))
-    return replace(
-        moves.take(move),
-        motion=np.where(arc & ~stays, FEED, moves.motion)[move],
-        arc_sweep=np.where(stays, moves.arc_sweep / pieces, 0.0)[move],
-        arc_center=np.where(stays[move][:, None], risen, 0.0),
-        arc_normal=np.where(stays[:, None], normal, 0.0)[move],
-        from_machine=np.zeros((len(move), 2), dtype=bool),
-    )
-
-
-def _with_times(pieces: Moves, moves: Moves, move: IntArray, count: IntArray, last: BoolArray) -> tuple[Moves, float]:
-    """The pieces that move tip or tool axis, with feeds and dwells that keep the time of every move.
-
-    And the time, s, before the first of them.
-    """
-    length, turn = move_lengths(moves), _turning(moves).max(axis=1)
-    share = (np.where(length > 0.0, length, turn) / moves.feed / count)[move]  # s; nan: a rapid
-    way = move_lengths(pieces)
-    # Where the tip on the part runs as far as the axes do (tool centre point control, or none turns): as programmed.
-    same = (way > 0.0) & np.isclose(way * count[move], length[move], rtol=1e-9, atol=0.0)
-    way = np.where(way > 0.0, way, _turning(pieces).max(axis=1))
-    feed = np.where(same, pieces.feed, way / share)
-    kept = way > 0.0
-    waits = np.where(last, moves.dwell[move], 0.0) + np.where(kept, 0.0, np.nan_to_num(share))
-    dwell = np.bincount(np.cumsum(kept), waits, int(kept.sum()) + 1).astype(float)
-    return replace(replace(pieces, feed=feed).take(kept), dwell=dwell[1:]), float(dwell[0])
-
-
-def _room(like: Moves, n: int) -> Moves:
-    """Columns of n rows, to be filled."""
-    columns = {f.name: getattr(like, f.name) for f in fields(Moves)}
-    return Moves(**{name: np.empty((n, *column.shape[1:]), column.dtype) for name, column in columns.items()})

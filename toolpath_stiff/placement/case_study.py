@@ -23,7 +23,8 @@ from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc import Program, parse_program
+from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated, machine_words
 from toolpath_stiff.tables import Columns, read_table
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg

@@ -9,7 +9,6 @@ import numpy as np
 
 from toolpath_stiff.files import Content
 from toolpath_stiff.placement.case_study import CaseStudy, region_rows, study_text
-from toolpath_stiff.report import number
 from toolpath_stiff.report.figure import (
     BLUE,
     COLOUR_MAP,
@@ -20,6 +19,7 @@ from toolpath_stiff.report.figure import (
     new_figure,
     picture,
 )
+from toolpath_stiff.report.words import number
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:

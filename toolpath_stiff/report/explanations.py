@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.defaults import MEAN_OVER_SD
 from toolpath_stiff.hints import parted
-from toolpath_stiff.report import WIDTH, counted, labelled, machine_text, number, plain, shortened
-from toolpath_stiff.updating.inference.candidates import choice_text
-from toolpath_stiff.updating.inference.fits import scatter_text
-from toolpath_stiff.updating.inference.noise import GUESSES
+from toolpath_stiff.inference.candidates import choice_text
+from toolpath_stiff.inference.fits import scatter_text
+from toolpath_stiff.inference.noise import GUESSES
+from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, number, plain, shortened
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument
+    from toolpath_stiff.diagnosis.document import DiagnosisDocument
 
 NONE = "none"
 LEAST = 0.005  # probability from which a row is more than "< 0.5 %"

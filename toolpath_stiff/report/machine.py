@@ -13,8 +13,8 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Machine, StrutLaw
-from toolpath_stiff.report import machine_text
 from toolpath_stiff.report.figure import BLUE, house_style, new_figure, picture
+from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import acting_names, condition_warnings, effects_stated
 from toolpath_stiff.stiffness.truss import HUB, TIP, platform_bars, platform_nodes
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from toolpath_stiff.analysis.checks import MachineCheck
     from toolpath_stiff.analysis.poses import PoseReport
     from toolpath_stiff.machine.limits import Reach
-    from toolpath_stiff.stiffness.effects import Effect, Parameter
-    from toolpath_stiff.stiffness.effects.trial import Trial
+    from toolpath_stiff.stiffness.contract import Effect, Parameter
     from toolpath_stiff.stiffness.model import StiffnessModel
+    from toolpath_stiff.stiffness.trial import Trial
 
 
 STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"

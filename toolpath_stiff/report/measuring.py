@@ -16,30 +16,23 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.files import Content
-from toolpath_stiff.report import plain, shortened
+from toolpath_stiff.planning.document import GapMap, gap_map, group_of, height_groups, plan_csv, rows_of
+from toolpath_stiff.planning.next_visit import TABLES, tables_of
+from toolpath_stiff.planning.plan import Plan, Proposal
+from toolpath_stiff.planning.visits import Visits
+from toolpath_stiff.readings.raw import measurement_csv
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
-from toolpath_stiff.report.readings import dated, history_png
+from toolpath_stiff.report.history import dated, history_png
+from toolpath_stiff.report.words import plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
-from toolpath_stiff.updating.planning import Plan, Proposal
-from toolpath_stiff.updating.planning.document import (
-    GapMap,
-    gap_map,
-    group_of,
-    height_groups,
-    plan_csv,
-    rows_of,
-)
-from toolpath_stiff.updating.planning.next_visit import TABLES, tables_of
-from toolpath_stiff.updating.planning.visits import Visits
-from toolpath_stiff.updating.raw import measurement_csv
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.updating.planning.document import PlanDocument
-    from toolpath_stiff.updating.raw import LoopFigures, Reduction
-    from toolpath_stiff.updating.raw_records import Loop
+    from toolpath_stiff.planning.document import PlanDocument
+    from toolpath_stiff.readings.raw import LoopFigures, Reduction
+    from toolpath_stiff.readings.raw_records import Loop
 
 
 # Colours told apart by eyes that see no red or green (Okabe and Ito 2008), and shapes beside them.

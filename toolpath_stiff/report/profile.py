@@ -11,7 +11,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.report import number, plain, shortened
+from toolpath_stiff.report.captions import add_heading, add_legend
 from toolpath_stiff.report.figure import (
     DPI,
     INK,
@@ -24,8 +24,6 @@ from toolpath_stiff.report.figure import (
     picture,
 )
 from toolpath_stiff.report.painting import (
-    add_heading,
-    add_legend,
     add_scales,
     label_places,
     new_pen,
@@ -36,6 +34,7 @@ from toolpath_stiff.report.painting import (
     word_font,
     write_word,
 )
+from toolpath_stiff.report.words import number, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:

@@ -8,25 +8,16 @@ from collections.abc import Sequence
 
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes import M_STATE, M_STOP, MOTION, ONCE
-from toolpath_stiff.nc.codes.motion import ARCS, CYCLES
+from toolpath_stiff.nc.codes.code import M_STATE, M_STOP, MOTION, ONCE
+from toolpath_stiff.nc.codes.drilling import CYCLES
+from toolpath_stiff.nc.codes.motion import ARCS
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
 from toolpath_stiff.nc.moves import RAPID, Arc
 from toolpath_stiff.nc.state import CurrentBlock, Flow
 from toolpath_stiff.nc.words import AXES, POLAR, Block, read_block
-from toolpath_stiff.rewriting.controls import (
-    FEED_DECIMALS,
-    LEAN,
-    LEVER,
-    OFF,
-    SAME,
-    Controls,
-    LineEdit,
-    chords,
-    lean,
-    points_between,
-)
+from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
+from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, points_between
 
 HALF_CIRCLE = 0.999  # chord over diameter, from which R magnifies a rounded end more than twenty times
 NEAR = 2.0  # units by which the centre of an arc given by R may miss its place; beyond, I, J, K are written

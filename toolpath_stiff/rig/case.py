@@ -30,9 +30,10 @@ from toolpath_stiff.rig.hidden import (
     disturb_readings,
     reading_sd,
     readings,
-    with_loops,
 )
-from toolpath_stiff.rig.structure import ROOM_TEMPERATURE, Nominal, Rows, load_nominal, reachable
+from toolpath_stiff.rig.loops import with_loops
+from toolpath_stiff.rig.nominal import Nominal, load_nominal, reachable
+from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 

@@ -19,8 +19,10 @@ from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, Oddity, readings
-from toolpath_stiff.rig.structure import Nominal, Rows
-from toolpath_stiff.rig.unknowns import UNKNOWNS, Unknown
+from toolpath_stiff.rig.nominal import Nominal
+from toolpath_stiff.rig.rows import Rows
+from toolpath_stiff.rig.unknown import Unknown
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.units import m_from_mm, m_from_um, per_s_from_per_min
 
 Parameters = dict[str, Any]

@@ -23,9 +23,8 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness import closed_form, exact
-from toolpath_stiff.stiffness.effects import guard
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
+from toolpath_stiff.stiffness import closed_form, exact, guard
+from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, acting_effects, load_path
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small

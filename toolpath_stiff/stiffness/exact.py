@@ -1,4 +1,4 @@
-"""The exact route: strut forces from equilibrium, compliance from energy, effects; indicators by virtual work.
+"""The exact route: strut forces from equilibrium, compliance from energy, effects along the load path.
 
 Six pin-jointed struts carry a wrench w at the tip in one way only: J^T f = w with the rows [u_i, r_i x u_i] of J.
 Castigliano's second theorem then gives the tip's displacement from the stored energy, half of [f; w]^T Q [f; w],
@@ -20,27 +20,11 @@ the stretch of strut i, s_i the secant compliance that the effects state, the fo
 It is convex, because a strut gives more under more force, and its gradient has kinks (a strut at the edge of its gap).
 Whole steps of Newton's method settle most poses; where they cycle between the kinks, steps with an exact line search,
 which converge on such functions from everywhere, come first.
-
-What an indicator across part of the load path reads under a load at the tip: by virtual work.
-
-A pair of equal and opposite unit forces at the indicator's two points is carried by what lies between them alone (the
-six struts are statically determinate, so that the pair loads nothing else). With the real loads u = [f; w] of strut
-forces and tip wrench, and those of the pair, v, the reading is the sum over the links inside the loop of v^T C u
-(principle of virtual forces; Przemieniecki 1968, Theory of Matrix Structural Analysis, chapter 3). The tip's own loop
-is the case v = u over all links.
-
-| loop | v |
-| --- | --- |
-| spindle, table | the unit load at the tip; no strut forces |
-| strut N, joint N | 1 in strut N |
-| frame N | a unit force on the vertex along the indicator: `Effect.vertex_displacement` |
-| strut N alone | 1 in strut N, and so is u: the strut's own compliance |
-| platform | what the tip reads less what the spindle does |
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -49,18 +33,29 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import EffectError, InputError, PoseError
-from toolpath_stiff.stiffness.effects import guard
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, MeasuringLoop
-from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
+from toolpath_stiff.stiffness import guard
+from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 WHOLE_STEPS, MOST_STEPS, LINE_STEPS = 25, 200, 40
+
+
 LEAST_STIFFNESS = 1e-6  # N/m; what a strut law gives below is no stiffness, and its inverse may be no number
+
+
 SETTLED = 1e-8  # of the load: the tip's compliance is then certain to some 1e-8 of itself
+
+
 DIFFERENCE = 1e-9  # of the load, for the tangent: well below what settles, or the edge of a gap would be straddled
+
+
 LEAST_TANGENT = 1e-3  # of the secant: a strut whose stretch does not grow with its force would be infinitely stiff
+
+
 FLAT = 0.1  # of its slope at the start, to which a line search brings the slope of the energy
+
+
 FAINT = 1e-7  # of the struts' stiffness: added to the parallel one in the search alone, so that it can be inverted
 
 
@@ -451,106 +446,3 @@ def _unsettled(model: StiffnessModel, path: LoadPath, row: int) -> InputError:
         expected="a stretch of each strut that grows with its force",
         hint="check the parameters of these effects",
     )
-
-
-def loop_compliance(
-    model: StiffnessModel, path: LoadPath, direction: FloatArray, loops: Sequence[MeasuringLoop], which: IntArray
-) -> FloatArray:
-    """Displacement that indicators read, per load at the tip (of a strut alone: per force in it).
-
-    Parameters
-    ----------
-    model
-        Machine and effects; instruments are not asked.
-    path
-        n poses under their loads.
-    direction
-        (n, 3) unit vectors of the load.
-    loops, which
-        The loops, and which of them each reading (n,) is of.
-
-    Returns
-    -------
-    (n,) m/N: positive along the load, as a strut or joint gets longer, as a vertex moves outwards or up.
-
-    Raises
-    ------
-    InputError
-        As `exact.compliance_along`.
-    """
-    found = np.empty(len(path))
-    for number in np.unique(which).tolist():
-        rows = np.flatnonzero(which == number)
-        found[rows] = _one_loop(model, path.take(rows), direction[rows], loops[number])
-    return found
-
-
-def _one_loop(model: StiffnessModel, path: LoadPath, direction: FloatArray, loop: MeasuringLoop) -> FloatArray:
-    if loop.kind == "tip":
-        return compliance_along(model, path, direction)
-    if loop.kind == "platform":
-        whole = compliance_along(model, path, direction)
-        return whole - _one_loop(model, path, direction, MeasuringLoop("spindle"))
-    real = np.zeros((len(path), 12))
-    if loop.kind == "alone":
-        real[:, loop.number - 1] = 1.0
-        path = replace(path, strut_forces=real[:, :6] * path.force[:, None])
-    else:
-        loaded = under_load(model, path, direction)
-        path = loaded.path
-        real[:, :6], real[:, 6:9] = loaded.forces, direction
-    found = np.zeros(len(path))
-    if loop.kind == "frame":
-        return found + _vertex_reading(model, path, real[:, :6], direction, loop)
-    pair = np.zeros((len(path), 12))
-    if loop.kind in ("spindle", "table"):
-        pair[:, 6:9] = direction
-    else:
-        pair[:, loop.number - 1] = 1.0
-    if "struts" in loop.links:
-        law = path.machine.strut_law.stiffness(path.struts.lengths)
-        refuse_law_beyond_zero(path, law)
-        found += (pair[:, :6] * real[:, :6] / law).sum(axis=1)
-    for active in model.effects:
-        share = active.effect.seen_by(loop)
-        if not share or (active.effect.load_dependent and path.strut_forces is None):
-            continue
-        series = active.adds("strut_compliance", path)
-        if series is not None:
-            found += share * (pair[:, :6] * series * real[:, :6]).sum(axis=1)
-        form = active.adds("load_compliance", path)
-        if form is not None:
-            found += share * np.einsum("ni,nij,nj->n", pair, form, real)
-    return found
-
-
-def _vertex_reading(
-    model: StiffnessModel, path: LoadPath, forces: FloatArray, direction: FloatArray, loop: MeasuringLoop
-) -> FloatArray:
-    """(n,) m/N of a vertex against the floor."""
-    _, radial = frame_vertices(path.machine.frame_joints)[loop.number - 1]
-    along = {"": direction, "radial": radial, "vertical": np.array([0.0, 0.0, 1.0])}[loop.where]
-    found = np.zeros(len(path))
-    for active in model.effects:
-        if active.effect.seen_by(loop) and active.effect.acts_on(path, active.values):
-            moved = active.effect.vertex_displacement(path, active.values, forces, loop.number)
-            if moved is not None:
-                found += (moved * along).sum(axis=1)
-    return found
-
-
-def law_products(forces: FloatArray, loops: Sequence[MeasuringLoop], which: IntArray) -> FloatArray:
-    """(n, 6) what each strut's own compliance counts in a reading: products of real and virtual strut forces.
-
-    `forces` (n, 6) are those under the unit load.
-    """
-    found = np.zeros_like(forces)
-    for number in np.unique(which).tolist():
-        rows, loop = which == number, loops[number]
-        if loop.kind in ("tip", "platform"):
-            found[rows] = forces[rows] ** 2
-        elif loop.kind == "strut":
-            found[rows, loop.number - 1] = forces[rows, loop.number - 1]
-        elif loop.kind == "alone":
-            found[rows, loop.number - 1] = 1.0
-    return found

@@ -24,14 +24,9 @@ from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Machine, with_parameter
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
-from toolpath_stiff.stiffness.effects import find_effect, guard, known_effects
-from toolpath_stiff.stiffness.effects.contract import (
-    SETUP,
-    Conditions,
-    Effect,
-    LoadPath,
-    read_parameters,
-)
+from toolpath_stiff.stiffness import guard
+from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
+from toolpath_stiff.stiffness.contract import SETUP, Conditions, Effect, LoadPath, read_parameters
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.units import mm_from_m
 

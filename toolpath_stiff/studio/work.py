@@ -1,10 +1,4 @@
-"""Long work beside the page: one process at a time, which reports how far it is and can be stopped at any moment.
-
-Effects of one's own, edited beside the page: working copies, loaded whenever they are saved.
-
-A working copy stands in the case's folder `edit/`, outside the case: it becomes a file of the case, and a step that can
-be undone, each time it is saved without a fault. Code is run of those files alone that the user has loaded before.
-"""
+"""Long work beside the page: one process at a time, which reports how far it is and can be stopped at any moment."""
 
 from __future__ import annotations
 
@@ -15,13 +9,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from toolpath_stiff.api.case import Case
-from toolpath_stiff.api.case_results import first_name, free_name, sha256, write_files
-from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.errors import TpsError
 
 COARSE_SAMPLES = 6000  # of a path in the page; the statistics are those of all samples
-FOLDER = "edit"
-LOOKS_EVERY = 0.5  # s between two looks at the working copies
 
 
 class Job:
@@ -69,7 +59,7 @@ class Job:
         self._process.kill()
 
 
-PRELOADED = ("toolpath_stiff.studio.work", "toolpath_stiff.api.case", "toolpath_stiff.updating.correction", "pandas")
+PRELOADED = ("toolpath_stiff.studio.work", "toolpath_stiff.case.case", "toolpath_stiff.correction.strut_law", "pandas")
 
 
 def _context() -> Any:
@@ -77,7 +67,7 @@ def _context() -> Any:
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([*PRELOADED, "toolpath_stiff.updating.diagnosis", "toolpath_stiff.analysis"])
+    context.set_forkserver_preload([*PRELOADED, "toolpath_stiff.diagnosis.diagnose", "toolpath_stiff.analysis"])
     return context
 
 
@@ -94,7 +84,7 @@ def work(folder: str, kind: str, options: Mapping[str, Any], pipe: Connection) -
             pipe.send(("progress", (text, done, total)))
 
     try:
-        from toolpath_stiff.api.case import Case
+        from toolpath_stiff.case.case import Case
 
         pipe.send(("done", TASKS[kind](Case.open(folder), tell, **options)))
     except TpsError as error:
@@ -234,85 +224,3 @@ def draft(case: Any, tell: Tell, result: str) -> dict[str, Any]:
 TASKS: dict[str, Callable[..., dict[str, Any]]] = {
     task.__name__: task for task in (diagnose, compare, update, plan, analyze, place, set_up, draft)
 }
-
-
-class Editing:
-    """The working copies of a case's own effects.
-
-    Attributes
-    ----------
-    faults
-        File of the case -> what is wrong with its working copy, with its line; "" where nothing is.
-    """
-
-    def __init__(self, case: Case) -> None:
-        self.case, self.faults = case, dict[str, str]()
-        self._open: dict[str, tuple[Path, str]] = {}  # file of the case -> its working copy, and that one's sum
-        self._closing = threading.Event()
-
-    def open(self, name: str) -> None:
-        """Write the working copy of a file of the case and follow it from now on."""
-        if name not in self.case.state.effects:
-            raise InputError(f"{name} is no file of own effects of this case")
-        content, copy = (
-            (self.case.folder / name).read_bytes(),
-            free_name(self.case.folder, f"{FOLDER}/{first_name(name)}"),
-        )
-        write_files(self.case.folder, {copy: content})
-        self._open[name], self.faults[name] = (self.case.folder / copy, sha256(content)), ""
-
-    def save(self, name: str, text: str) -> None:
-        """Write the working copy as the page has it; `look` loads it."""
-        if name not in self._open:
-            self.open(name)
-        write_files(self.case.folder, {f"{FOLDER}/{self._open[name][0].name}": text})
-
-    def look(self) -> bool:
-        """Load every working copy that was saved since the last look; whether there was one."""
-        changed = False
-        for name in [one for one in self._open if one in self.case.state.effects]:
-            file, known = self._open[name]
-            try:
-                now = sha256(file.read_bytes())
-            except OSError:  # an editor that replaces the file is between two steps
-                continue
-            if now != known:
-                self._open[name], changed = (file, now), True
-                self._load(name, file)
-        return changed
-
-    def _load(self, name: str, file: Path) -> None:
-        try:
-            self.case.change_effects(name, file)
-        except TpsError as error:
-            self.faults[name] = str(error).replace(f"{self.case.folder}/", "")
-            return
-        new = self.case.state.effects[-1]
-        self._open[new], self.faults[new] = self._open[name], ""
-
-    def state(self) -> list[dict[str, str | bool]]:
-        """The own effects of the case with their text, as the page shows them; `copy`: "" where none is open.
-
-        `off`: its code is not run, as this user has not agreed to it.
-        """
-        found, off = list[dict[str, str | bool]](), self.case.not_agreed
-        for name in self.case.recorded.effects:
-            copy = None if name in off else self._open.get(name, (None, ""))[0]
-            text = (copy or self.case.folder / name).read_text("utf-8", "replace")
-            fault, path = self.faults.get(name, ""), str(copy.resolve()) if copy else ""
-            found.append({"file": name, "text": text, "copy": path, "fault": fault, "off": name in off})
-        return found
-
-    def follow(self, looked: Callable[[], None]) -> None:
-        """Call `looked` every half second in a thread until `close`."""
-
-        def run() -> None:
-            while not self._closing.wait(LOOKS_EVERY):
-                if self._open:
-                    looked()
-
-        threading.Thread(target=run, daemon=True).start()
-
-    def close(self) -> None:
-        """Stop following."""
-        self._closing.set()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.nc import compensation, geometry
-from toolpath_stiff.nc.codes import (
+from toolpath_stiff.nc.codes.code import (
     ARC_DISTANCE,
     CUTTER,
     DIAMETER,

@@ -3,10 +3,6 @@
 Units, plane, distance modes (G20 G21, G17 G18 G19, G90 G91, G90.1 G91.1); F and S, feed and spindle modes (G93 G94 G95,
 G96 G97), G4, the feed of a move; subprogram calls (M97, M98), M99, the end (M2, M30), which `interpreter` carries out.
 mm/min inside.
-
-`OTHER_CODES` are codes of Fanuc's and Haas' controls that change no path, and those that would and are refused with
-the reason. The first are what programs begin with ("safe start"): they switch off what is refused where it is
-switched on.
 """
 
 from __future__ import annotations
@@ -14,7 +10,7 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.codes import (
+from toolpath_stiff.nc.codes.code import (
     ARC_DISTANCE,
     DISTANCE,
     DWELL,
@@ -22,35 +18,29 @@ from toolpath_stiff.nc.codes import (
     FEED_MODE,
     M_STOP,
     M_SUBPROGRAM,
-    MIRROR,
     ONCE,
-    PATH_CONTROL,
     PLANE,
-    POLAR_PLANE,
     SPEED,
-    SPEED_WATCH,
     SPINDLE_MODE,
-    STROKE_CHECK,
     UNITS,
     Alias,
     Code,
-    Refused,
     g_codes,
     holds_anyway,
     m_codes,
 )
 from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated
 from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
+from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc
-from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, Numbers, State
+from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, State
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
 _FANUC, _HAAS = "Fanuc, operator's manuals", "Haas, mill operator's manual"
+
+
 _OURS = ("generic", "fanuc")
-
-
-# -- units, plane, distance modes --------------------------------------------------------------------------------------
 
 
 def units(state: State, block: CurrentBlock, code: str) -> None:
@@ -84,7 +74,11 @@ def arc_distance(state: State, block: CurrentBlock, code: str) -> None:
 
 
 _UNITS, _PLANE, _DISTANCE = g_codes("G20 G21"), g_codes("G17 - G19.1"), g_codes("G90 G91")
+
+
 _FANUC_INCH = "Fanuc, operator's manuals, Inch/metric conversion (G20 G21, in G-code system C G70 G71)"
+
+
 MODE_CODES = (
     Code("G17", PLANE, plane, "plane XY", _PLANE),
     Code("G18", PLANE, plane, "plane ZX", _PLANE),
@@ -96,12 +90,12 @@ MODE_CODES = (
     Code("G90.1", ARC_DISTANCE, arc_distance, "absolute arc centres", g_codes("G90.1 G91.1")),
     Code("G91.1", ARC_DISTANCE, arc_distance, "incremental arc centres", g_codes("G90.1 G91.1")),
 )
+
+
 MODE_ALIASES = (
     Alias("G70", "G20", "inch", _FANUC_INCH, ("fanuc",)),
     Alias("G71", "G21", "mm", _FANUC_INCH, ("fanuc",)),
 )
-
-# -- feed and spindle --------------------------------------------------------------------------------------------------
 
 
 SLOWEST = 1e-6  # mm/min, or 1/min: slower is a slip, and its time beyond all numbers
@@ -203,9 +197,6 @@ def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
     return value
 
 
-# -- the feed of a move ----------------------------------------------------------------------------------------------
-
-
 def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: list[float], arc: Arc | None) -> float:
     """Feed of a move in mm/min, or deg/min for one of the rotary axes alone."""
     if state.feed is None:
@@ -250,6 +241,8 @@ def arc_length(arc: Arc, start: list[float], end: list[float]) -> float:
 
 
 _FEEDS, _SPINDLE = g_codes("G93 G94 G95"), g_codes("G96 G97")
+
+
 FEED_CODES = (
     Code("F", FEED, feed_word, "feed", "LinuxCNC, Other Codes, F: Set Feed Rate"),
     Code("S", SPEED, speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
@@ -263,9 +256,6 @@ FEED_CODES = (
     ),
     Code("G97", SPINDLE_MODE, holds_anyway, "spindle speed in revolutions", _SPINDLE, label=SPINDLE_MODE),
 )  # fmt: skip
-
-
-# -- calls and the end -------------------------------------------------------------------------------------------------
 
 
 def call(state: State, block: CurrentBlock, code: str) -> None:
@@ -320,7 +310,11 @@ def end_of_program(state: State, block: CurrentBlock, code: str) -> None:
 
 
 _CALLS = "LinuxCNC, O Codes, Fanuc-Style Programs; Fanuc, operator's manuals, Subprogram (M98, M99)"
+
+
 _MACROS = "Fanuc, operator's manuals, Custom macro, Macro call (G65, G66, G67)"
+
+
 FLOW_CODES = (
     Code("M0", M_STOP, holds_anyway, "stop", m_codes("M0 M1")),
     Code("M1", M_STOP, holds_anyway, "optional stop", m_codes("M0 M1")),
@@ -337,63 +331,4 @@ FLOW_CODES = (
         for code, meaning in (("G65", "macro call"), ("G66", "macro call after moves"), ("G67", "no such call"))
     ),
     Code("M99", M_SUBPROGRAM, end_of_subprogram, "subprogram end", _CALLS),
-)  # fmt: skip
-
-
-def stroke_check(state: State, block: CurrentBlock, code: str) -> None:
-    """G22 X Y Z I J K, G23: the zone that the tool must not enter, and no zone."""
-    for letter in (*POINT_WORDS, "I", "J", "K") if code == "G22" else ():
-        block.take(letter)
-
-
-def speed_watch(state: State, block: CurrentBlock, code: str) -> None:
-    """G25, G26 P Q R I: whether the control watches that the spindle keeps its speed."""
-    for letter in "PQRI":
-        block.take(letter)
-
-
-_OFF = "none is on, since switching it on is refused"
-_STROKE, _WATCH = (
-    f"{_FANUC}, Stored stroke check (G22, G23)",
-    f"{_FANUC}, Spindle speed fluctuation detection (G25, G26)",
-)
-_MIRRORED = f"{_FANUC}, Programmable mirror image (G50.1, G51.1)"
-OTHER_CODES = (
-    Code(
-        "G13.1", POLAR_PLANE, holds_anyway, "polar interpolation off",
-        f"{_FANUC}, Polar coordinate interpolation (G12.1, G13.1)", _OURS, listed=_OFF,
-    ),
-    Code("G50.1", MIRROR, holds_anyway, "mirror image off", _MIRRORED, _OURS, listed=_OFF),
-    Code("G100", MIRROR, holds_anyway, "mirror image off", f"{_HAAS}, G100", ("generic", "haas"), listed=_OFF),
-    Code(
-        "G22", STROKE_CHECK, stroke_check, "stored stroke check on", _STROKE, _OURS, takes_axes=True,
-        listed="the zone that the tool must not enter",
-    ),
-    Code(
-        "G23", STROKE_CHECK, stroke_check, "stored stroke check off", _STROKE, _OURS,
-        listed="no zone that the tool must not enter",
-    ),
-    Code("G25", SPEED_WATCH, speed_watch, "spindle speed not watched", _WATCH, _OURS, listed="the spindle's speed"),
-    Code("G26", SPEED_WATCH, speed_watch, "spindle speed watched", _WATCH, _OURS, listed="the spindle's speed"),
-    Code(
-        "G62", PATH_CONTROL, holds_anyway, "automatic corner override", f"{_FANUC}, Automatic corner override (G62)",
-        _OURS, listed="slower feed in corners",
-    ),
-    Code(
-        "G63", PATH_CONTROL, holds_anyway, "tapping mode", f"{_FANUC}, Tapping mode (G63)", _OURS,
-        listed="no override of the feed",
-    ),
-)  # fmt: skip
-_MIRROR = ("mirror image", "post the program as it is cut")
-OTHER_REFUSED = (
-    Refused("G31", "a move up to a signal (skip, probing)", "leave probing out", f"{_FANUC}, Skip function (G31)"),
-    Refused("G44", "a tool length counted the other way", "G43 with the length's other sign", f"{_FANUC}, G43, G44"),
-    Refused("G47", "engraving in the control's own letters", "post the program with lines and arcs", f"{_HAAS}, G47"),
-    Refused("G51.1", *_MIRROR, _MIRRORED),
-    Refused(
-        "G53.1", "the tool turned to a tilted work plane", "post X, Y, Z, A, B, C of the tool tip",
-        f"{_FANUC}, Tool axis direction control (G53.1)",
-    ),
-    Refused("G101", *_MIRROR, f"{_HAAS}, G101"),
-    Refused("G107", "cylindrical mapping", "post X, Y, Z, A of the tool tip", f"{_HAAS}, G107"),
 )  # fmt: skip

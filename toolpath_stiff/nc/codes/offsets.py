@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from toolpath_stiff.nc.codes import LENGTH, M_TOOL, OFFSET, ONCE, TOOL, Alias, Code, g_codes, m_codes
+from toolpath_stiff.nc.codes.code import LENGTH, M_TOOL, OFFSET, ONCE, TOOL, Alias, Code, g_codes, m_codes
 from toolpath_stiff.nc.codes.motion import know_position
 from toolpath_stiff.nc.codes.points import axis_words, forget_polar, refuse_while_rotated, zero_moved
 from toolpath_stiff.nc.state import CurrentBlock, State

@@ -12,9 +12,10 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes import ONCE, PLANE, POLAR, ROTATION, SMOOTHING, UNITS, Code
+from toolpath_stiff.nc.codes.code import ONCE, PLANE, POLAR, ROTATION, SMOOTHING, UNITS, Code
 from toolpath_stiff.nc.controller import GENERIC, INCREMENT_DEGREE, INCREMENT_INCH, INCREMENT_MM
-from toolpath_stiff.nc.state import CurrentBlock, Rotation, State
+from toolpath_stiff.nc.frames import Rotation
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, CORNERS, Word
 
 SAME_PLACE_MM = 1e-9

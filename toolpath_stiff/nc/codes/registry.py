@@ -3,8 +3,6 @@
 Codes and modal groups follow LinuxCNC (its manual, "G-Code Overview", modal groups), because its interpreter is what
 the results are compared with; polar words and rotation, which it does not have, follow Fanuc's controls. Codes that
 leave the path alone, and codes that are refused with the reason, have their rows here.
-
-M70 to M73: modes saved and restored, as LinuxCNC has them (manual, "M-Codes", M70 - M73).
 """
 
 from __future__ import annotations
@@ -13,7 +11,7 @@ import inspect
 import re
 from collections.abc import Iterable, Iterator
 
-from toolpath_stiff.nc.codes import (
+from toolpath_stiff.nc.codes.code import (
     DIAMETER,
     DYNAMIC,
     EVERYWHERE,
@@ -21,7 +19,6 @@ from toolpath_stiff.nc.codes import (
     M_COOLANT,
     M_OVERRIDES,
     M_SPINDLE,
-    M_STATE,
     M_TAPPING,
     MOTION,
     ONCE,
@@ -37,85 +34,17 @@ from toolpath_stiff.nc.codes import (
     m_codes,
 )
 from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
-from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES, OTHER_CODES, OTHER_REFUSED
-from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, DRILLING_CODES, STRAIGHT_CODES, SYNCHRONISED_CODES
-from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_CODES, take_offset
-from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES, forget_polar
-from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, SavedModes, State
-
-OTHER_CONTROLS = "is an M code of the machine's builder on other controls"
-
-# -- codes that leave the path alone, and refused ones -----------------------------------------------------------------
-
+from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
+from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES
+from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, STRAIGHT_CODES
+from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_CODES
+from toolpath_stiff.nc.codes.other_controls import OTHER_CODES, OTHER_REFUSED
+from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES
+from toolpath_stiff.nc.codes.saved import SAVED_CODES
+from toolpath_stiff.nc.codes.synchronised import SYNCHRONISED_CODES
+from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
 
 WAIT_FOR_INPUT = 66  # LinuxCNC, M-Codes, M66: P or E, and L with the kind of wait
-
-
-def save_modes(state: State, block: CurrentBlock, code: str) -> None:
-    """M70: save the modes at this level of calls; M73: the same, and restore them where the subprogram returns."""
-    _check_block(state, block, code)
-    state.saved[state.level] = SavedModes(
-        state.inch, state.plane, state.absolute, state.arc_absolute, state.feed_mode, state.feed, state.speed,
-        state.retract, state.frames.active, state.frames.tool, state.frames.tip_held, code == "M73",
-    )  # fmt: skip
-
-
-def forget_modes(state: State, block: CurrentBlock, code: str) -> None:
-    """M71: what was saved at this level does not hold any more."""
-    _check_block(state, block, code)
-    state.saved.pop(state.level, None)
-
-
-def restore_modes(state: State, block: CurrentBlock, code: str) -> None:
-    """M72: the modes saved at this level hold again."""
-    _check_block(state, block, code)
-    saved = state.saved.get(state.level)
-    if saved is None:
-        raise block.fail(block.codes[code], "and nothing was saved at this level of calls", "M70 or M73 before it")
-    found = _restore(state, saved)
-    if found:
-        raise block.fail(block.codes[code], f"where {found}", "G40, G49, G69 and G15 before it")
-
-
-def leave_level(state: State, level: int) -> str:
-    """A subprogram of that level returns: after M73 its caller's modes hold again. What forbids that; "" if nothing."""
-    saved = state.saved.pop(level, None)
-    return _restore(state, saved) if saved is not None and saved.at_return else ""
-
-
-def _restore(state: State, saved: SavedModes) -> str:
-    frames = state.frames
-    if frames.tool != saved.tool or frames.tip_held != saved.tip_held:
-        return "the tool length in force is another one than where the modes were saved"
-    if frames.tool and state.inch != saved.inch:
-        return "the unit would change while a tool length is in force"
-    if state.cutter is not None or frames.rotation is not None or state.polar is not None:
-        return "cutter compensation, G68 or G16 is in force"
-    state.inch, state.absolute, state.arc_absolute = saved.inch, saved.absolute, saved.arc_absolute
-    state.speed, state.retract, state.feed_mode = saved.speed, saved.retract, saved.feed_mode
-    state.feed = None if saved.feed_mode == "G93" else saved.feed
-    if state.plane != saved.plane:
-        state.plane = saved.plane
-        forget_polar(state)
-    take_offset(state, saved.offset)
-    return ""
-
-
-def _check_block(state: State, block: CurrentBlock, code: str) -> None:
-    word = block.codes[code]
-    if state.dialect.name != "linuxcnc":
-        raise block.fail(word, OTHER_CONTROLS, hint="name the control with --dialect linuxcnc if it saves modal state")
-    if len(block.codes) > 1 or block.values:
-        raise block.fail(word, "beside other words", "a block of its own")
-
-
-_SAVED = m_codes("M70 - M73")
-SAVED_CODES = (
-    Code("M70", M_STATE, save_modes, "modes saved", _SAVED, ("linuxcnc",)),
-    Code("M71", M_STATE, forget_modes, "saved modes forgotten", _SAVED, ("linuxcnc",)),
-    Code("M72", M_STATE, restore_modes, "saved modes restored", _SAVED, ("linuxcnc",)),
-    Code("M73", M_STATE, save_modes, "modes saved, restored at the return", _SAVED, ("linuxcnc",)),
-)
 
 
 def path_control(state: State, block: CurrentBlock, code: str) -> None:
@@ -165,7 +94,11 @@ def dynamic_offset(state: State, block: CurrentBlock, code: str) -> None:
 
 
 _FANUC, _HAAS = "Fanuc, operator's manuals", "Haas, mill operator's manual"
+
+
 GENERIC_HAAS = ("generic", "haas")
+
+
 PLANNING = {
     "G5": "P",
     "G5.1": "QR",
@@ -174,11 +107,23 @@ PLANNING = {
     "G103": "P",
     "G187": "PE",
 }  # code -> the words that it takes
+
+
 SPLINES = ("G5", "G5.1")
+
+
 _PLANNING = "how the control plans ahead: the path is taken as programmed"
+
+
 _LINES_AND_ARCS = "post the program with arcs and lines"
+
+
 _EXACT_STOP = "exact stop: corners are taken as programmed anyway"
+
+
 _COOLANT = m_codes("M7 M8 M9")
+
+
 PASSIVE_CODES = (
     Code(
         "G8", DIAMETER, look_ahead, "lathe radius mode; with P: look-ahead",
@@ -232,20 +177,34 @@ PASSIVE_CODES = (
         for code in ("M48", "M49", "M50", "M51", "M52", "M53")
     ),
 )  # fmt: skip
+
+
 _OTHER_PLANE = ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C", g_codes("G17 - G19.1"))
+
+
 _PROBING = ("probing", "leave probing out", g_codes("G38.2 - G38.5"))
+
+
 _POCKET = (
     "a circular pocket, whose way to its circles and between them is drawn in the manual without numbers",
     "post the program with arcs",
     f"{_HAAS}, G12 and G13",
 )
+
+
 _POLAR_PLANE = (
     "milling in polar coordinates on a rotary axis",
     "post X, Y, Z of the tool tip",
     f"{_FANUC}, Polar coordinate interpolation (G12.1, G13.1)",
 )
+
+
 _LATHE_CYCLE = ("a lathe cycle", "this is a mill", g_codes("G70 Lathe finishing cycle; G71 G72 Lathe roughing cycles"))
+
+
 _MOVES = "post the moves of the cycle"
+
+
 REFUSED_CODES = (
     Refused("G5.2", "a NURBS curve", _LINES_AND_ARCS, g_codes("G5.2 G5.3")),
     Refused("G5.3", "a NURBS curve", _LINES_AND_ARCS, g_codes("G5.2 G5.3")),
@@ -276,7 +235,6 @@ REFUSED_CODES = (
     Refused("G88", "boring with manual feed out", _MOVES, g_codes("G88")),
 )  # fmt: skip
 
-# -- the table ---------------------------------------------------------------------------------------------------------
 
 UNDERSTOOD = (
     *STRAIGHT_CODES, *ARC_CODES, *DRILLING_CODES, *MODE_CODES, *POLAR_CODES, *ROTATION_CODES, *OFFSET_CODES,
@@ -296,10 +254,19 @@ def table(codes: Iterable[Code]) -> dict[str, Code]:
 
 
 CODES: dict[str, Code] = table(UNDERSTOOD)
+
+
 REFUSED: dict[str, Refused] = {code.name: code for code in REFUSED_CODES}
+
+
 ALIASES: dict[str, Alias] = {alias.name: alias for alias in (*MODE_ALIASES, *TOOL_ALIASES)}
+
+
 INCH_METRIC = {alias.name: alias.code for alias in MODE_ALIASES}  # where the dialect has them
+
+
 LISTED = {code.name: code.listed for code in CODES.values() if code.listed}
+
 
 # What a code that is not read would change.
 CHANGES = {
@@ -322,7 +289,10 @@ CHANGES = {
     "G38.2 G38.3 G38.4 G38.5": "where the tool stops, which only the machine knows",
     "G7": "the size of X",
 }
+
+
 BY_CODE = {code: changes for codes, changes in CHANGES.items() for code in codes.split()}
+
 
 # What a code that is read and not acted upon would change.
 LISTED_CHANGES = {
@@ -331,10 +301,14 @@ LISTED_CHANGES = {
     **dict.fromkeys(("G5", "G5.1", "G5.4", "G8", "G103", "G187"), "corners, by the control's tolerance, and the time"),
     "G254": "where the part is, wherever a rotary axis is turned",
 }
+
+
 BY_TEXT = {
     "O word": "the path by whatever is called",
     **dict.fromkeys(("variables", "expressions"), "every coordinate that depends on them"),
 }
+
+
 FIRST_CODE = re.compile(r"([GMgm]) *0*(\d{1,9}(?:\.\d)?)(?![\d.])")
 
 
@@ -377,9 +351,6 @@ def would_change(text: str, listed: bool = False) -> str:
     return (LISTED_CHANGES if listed else BY_CODE).get(code, "")
 
 
-# -- the table as Markdown ---------------------------------------------------------------------------------------------
-
-
 def codes_table() -> str:
     r"""The codes that are understood, their other names, and those that are refused, as Markdown tables.
 
@@ -411,7 +382,10 @@ def codes_table() -> str:
 
 
 HEADING = ("code", "group", "meaning", "function in `nc/codes`", "dialects", "source", "against LinuxCNC")
+
+
 SAME_PATH, NOT_THERE, NOT_HELD = "same path", "has none", "not held"
+
 
 # LinuxCNC's, and in no program whose path is compared with LinuxCNC's. The others are in such programs: the random ones
 # of `benchmarks/hunt.md`, or those of the tests against rs274 (`tests/nc/test_code_registry.py` looks them up).

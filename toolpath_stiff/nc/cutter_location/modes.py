@@ -19,12 +19,10 @@ from toolpath_stiff.nc.cutter_location.state import (
     REFUSED,
     SIEMENS,
     VERICUT,
-    Argument,
     State,
-    Statement,
     Word,
-    is_number,
 )
+from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number
 from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY, SECONDS_PER_MINUTE
 

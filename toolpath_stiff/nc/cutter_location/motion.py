@@ -28,19 +28,15 @@ from toolpath_stiff.nc.cutter_location.state import (
     NX,
     PTC,
     SIEMENS,
-    Argument,
     Cycle,
-    Nested,
     State,
-    Statement,
     Word,
     circular,
-    is_number,
-    nested,
     stand,
     straight,
 )
 from toolpath_stiff.nc.cutter_location.state import drill as drill_hole
+from toolpath_stiff.nc.cutter_location.statements import Argument, Nested, Statement, is_number, nested
 from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling, Vector
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.units import SECONDS_PER_DAY

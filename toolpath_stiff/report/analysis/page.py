@@ -19,27 +19,24 @@ from numpy.typing import NDArray
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.nc.moves import MOTION_NAMES
-from toolpath_stiff.report import (
+from toolpath_stiff.report.analysis.path import cutting_box, legend_extend, scale_limits
+from toolpath_stiff.report.figure import page_colours
+from toolpath_stiff.report.pages import bullets, markup, render_pieces, table
+from toolpath_stiff.report.profile import extremes_by_column, profile_curve
+from toolpath_stiff.report.words import (
     FIGURES,
     ONLY_PLUNGES,
     READERS,
-    bullets,
     duration,
     headline_text,
     length_in_moves,
-    markup,
     number,
     only_plunges,
     plain,
     plunges_beside,
-    render_pieces,
     shortened,
     span_of,
-    table,
 )
-from toolpath_stiff.report.analysis.path import cutting_box, legend_extend, scale_limits
-from toolpath_stiff.report.figure import page_colours
-from toolpath_stiff.report.profile import extremes_by_column, profile_curve
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:

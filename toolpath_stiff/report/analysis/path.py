@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.report import number
+from toolpath_stiff.report.captions import add_heading, add_legend, add_words
 from toolpath_stiff.report.figure import (
     CLASSES,
     COLOUR_MAP,
@@ -21,17 +21,8 @@ from toolpath_stiff.report.figure import (
     new_figure,
     picture,
 )
-from toolpath_stiff.report.painting import (
-    add_heading,
-    add_legend,
-    add_scales,
-    add_strokes,
-    add_words,
-    label_places,
-    new_pen,
-    paint,
-    painted_axes,
-)
+from toolpath_stiff.report.painting import add_scales, add_strokes, label_places, new_pen, paint, painted_axes
+from toolpath_stiff.report.words import number
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:

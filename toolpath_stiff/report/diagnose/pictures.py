@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolpath_stiff.report import plain, shortened
 from toolpath_stiff.report.explanations import (
     AS_GIVEN,
     NONE,
@@ -47,12 +46,13 @@ from toolpath_stiff.report.figure import (
     new_figure,
 )
 from toolpath_stiff.report.painting import painted_axes
+from toolpath_stiff.report.words import plain, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument
+    from toolpath_stiff.diagnosis.document import DiagnosisDocument
 
 ROW = 0.47  # inch a candidate
 OUTSIDE = "outside the catalogue"

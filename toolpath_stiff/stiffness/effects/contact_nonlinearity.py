@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
 
 REFERENCE_FORCE = 500.0  # N, force in the strut at which the compliance is given
 IDLE = 1e-3  # N: below, a strut adds nothing to the tip that could be measured, and the power law would diverge

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
 
 # N: a strut under less is idle. It would add less than g times this over F^2 to the tip's compliance, some 1e-14 m/N.
 IDLE = 1e-3

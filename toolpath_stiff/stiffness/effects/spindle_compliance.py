@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, sizes_in_words
 
 
 class SpindleCompliance(Effect):

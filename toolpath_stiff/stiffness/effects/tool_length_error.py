@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.effects.contract import Effect, about, length_error
+from toolpath_stiff.stiffness.contract import Effect, about, length_error
 
 
 class ToolLengthError(Effect):

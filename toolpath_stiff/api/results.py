@@ -1,0 +1,228 @@
+"""What every result can do: print itself, show itself in a notebook, become a table, a document, a picture, files."""
+
+from __future__ import annotations
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, ParamSpec, TypeVar
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import Content
+from toolpath_stiff.results_folder import Rules, write_folder
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+P = ParamSpec("P")
+
+
+Found = TypeVar("Found")
+
+
+# Called with what is being done, how much of it is done, and how much there is (0: not known).
+Progress = Callable[[str, int, int], None]
+
+
+class Result(ABC):
+    """A result: what a function of this package found.
+
+    `print(result)` shows what the command line shows. Figures are in the shop's units, which every name carries.
+    """
+
+    command: ClassVar[str] = ""  # the command that gives the same result
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """The result as plain data: the JSON document that the command writes, and prints with --json.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> sorted(tps.machine_template("mill.toml").to_dict())
+        ['machine', 'notes', 'text']
+        """
+
+    @abstractmethod
+    def __str__(self) -> str:
+        """The result as text, as a terminal shows it."""
+
+    @abstractmethod
+    def _short(self) -> str:
+        """The result in some words, for `repr`."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._short()}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return notebook_text(str(self))
+
+    def to_json(self) -> str:
+        """`to_dict()` as text, as the command writes it.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> print(tps.Machine.load("nist").check().to_json()[:37])
+        {
+          "file": "nist",
+          "machine": "nis
+        """
+        return json_text(self.to_dict())
+
+    def to_frame(self) -> pd.DataFrame:
+        """The result as a pandas DataFrame, the unit in each column's name.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.effects().to_frame()["link"].tolist()[:3]
+        ['tool', 'platform', 'joints']
+        """
+        raise self._cannot("has no table", "use to_dict()")
+
+    def plot(self) -> Figure:
+        """The result as a matplotlib figure.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> figure = tps.map_stiffness("nist", points=5).plot()
+        >>> type(figure).__name__
+        'Figure'
+        """
+        raise self._cannot("has no picture", "print it, or use to_dict()")
+
+    def _cannot(self, what: str, hint: str) -> InputError:
+        return InputError(f"{type(self).__name__} {what}", hint=hint)
+
+
+class FolderResult(Result):
+    """A result that a command writes as a folder of files."""
+
+    inputs: tuple[str, ...] = ()  # files that were read, which must not be written over
+
+    @abstractmethod
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """Name -> content, or what makes it, of every file that `save` writes; pictures and pages with `plots`.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> list(tps.map_stiffness("nist", points=5).files())
+        ['map.csv', 'map.json', 'map.png', 'map.html']
+        """
+
+    def save(
+        self,
+        folder: str | Path,
+        *,
+        plots: bool = True,
+        replace: bool = False,
+        rules: Rules | None = None,
+        **options: Any,
+    ) -> list[Path]:
+        """Write the files of the command to a folder, all or none; what an earlier run left there is cleared.
+
+        Parameters
+        ----------
+        folder
+            Where to; made if need be.
+        plots
+            Pictures and pages as well as data.
+        replace
+            Keep a file that somebody else wrote as NAME.old beside the new one, where it would be in the way; unless
+            this is said, nothing is written then.
+        rules
+            What must not be replaced, in full; wins over `replace`.
+        **options
+            Further ones of `files`.
+
+        Returns
+        -------
+        list of Path
+            The files written.
+
+        Raises
+        ------
+        InputError
+            A file of such a name is not the tool's, or was read for this result, or the folder cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     written = tps.map_stiffness("nist", points=5).save(folder, plots=False)
+        >>> [file.name for file in written]
+        ['map.csv', 'map.json']
+        """
+        return write_folder(
+            folder,
+            self.files(plots=plots, **options),
+            command=self.command,
+            rules=rules or Rules(inputs=self.inputs, replace=replace),
+        )
+
+
+class TextResult(Result):
+    """A result whose text and document were made when it was found."""
+
+    def __init__(self, text: str, document: dict[str, Any], short: str) -> None:
+        self._text, self._document, self._said = text, document, short
+
+    def __str__(self) -> str:
+        return self._text
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return self._document
+
+    def _short(self) -> str:
+        return self._said
+
+
+def machine_by_name(function: Callable[P, Found]) -> Callable[P, Found]:
+    """The same function, which also takes `(data, machine=...)`: a machine is what many name, and data come first."""
+
+    @wraps(function)
+    def called(*args: P.args, **kwargs: P.kwargs) -> Found:
+        if len(args) == 1 and "machine" in kwargs and "data" not in kwargs:
+            return function(*(kwargs.pop("machine"), *args), **kwargs)  # type: ignore[arg-type]
+        return function(*args, **kwargs)
+
+    return called
+
+
+def notebook_text(text: str) -> str:
+    """Text as a notebook shows it."""
+    import html
+
+    return f"<pre>{html.escape(text)}</pre>"
+
+
+def json_text(document: Any) -> str:
+    """A document as every command writes it: indented, no nan, no infinity, a line feed at the end."""
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def counter(progress: Progress | None, text: str) -> Callable[[int, int], None] | None:
+    """What a loop calls with (done, in all), from what the caller gave."""
+    return None if progress is None else lambda done, total: progress(text, done, total)
+
+
+def teller(progress: Progress | None) -> Callable[[str], None]:
+    """What work of unknown length calls with what it is doing, from what the caller gave."""
+    return (lambda text: None) if progress is None else lambda text: progress(text, 0, 0)
+
+
+def one_of(name: str, value: str, known: Sequence[str]) -> str:
+    """The value, if it is known. Raises `InputError`."""
+    if value not in known:
+        raise InputError(f"{name} {value!r}", expected=f"one of {', '.join(known)}")
+    return value

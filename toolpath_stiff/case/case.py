@@ -1,0 +1,577 @@
+"""A case: a folder with a machine, measurements, a program, and all that was done with them, step by step.
+
+    case.toml       the steps, each with what it changed, its command line and its Python line
+    machines/       every version of the machine, copied or fitted
+    data/           copies of the measurement files
+    used/           the same without the readings that were set aside: commented out, so that line numbers stay
+    programs/       copies of the programs
+    results/        a folder a result, as the commands write them
+    exercise/       a blind exercise, if one was started
+
+The state is what the steps up to `done` have made of it; undo and redo move `done`, nothing is deleted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Unpack
+
+from toolpath_stiff.api.diagnosis import Measurements
+from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si, positive
+from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.trust import agree, withdraw
+from toolpath_stiff.case.contents import reading_arguments
+from toolpath_stiff.case.files import (
+    copied,
+    drop,
+    first_name,
+    free_name,
+    machine_bytes,
+    measurements_csv,
+    used_name,
+    without_lines,
+    write_files,
+)
+from toolpath_stiff.case.findings import Findings
+from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES, read_case
+from toolpath_stiff.defaults import MACHINE
+from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.files import read_bytes
+from toolpath_stiff.hints import command_line, options
+
+if TYPE_CHECKING:
+    from toolpath_stiff.api.effects import EffectDraft
+    from toolpath_stiff.api.results import Progress
+
+
+class Case(Findings):
+    r"""A folder that holds a machine, measurements, a program, and every step that was done with them.
+
+    Attributes
+    ----------
+    folder
+        Where it is.
+    plots
+        Whether results are kept with pictures and pages, which take their time.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     case = tps.Case.open(folder)
+    ...     case.start_exercise(seed=9006)
+    ...     case.set_aside("data/measurements.csv", 5)
+    ...     _ = case.undo()
+    ...     [step.kind for step in tps.Case.open(folder).history], [step.kind for step in case.undone]
+    ...     _ = case.redo()
+    ...     _ = pathlib.Path(case.path("plan.csv")).write_text("x_mm,y_mm,z_mm,dx,dy,dz\n0,0,900,1,0,0\n")
+    ...     case.measure(case.path("plan.csv"))
+    ...     case.check_files()  # raises InputError for a file that is gone or was changed
+    ...     case.state.data, case.claim("weak_strut")["verdict"], case.next_result("compare")
+    (['machine', 'exercise'], ['aside'])
+    (('data/measurements.csv', 'data/measured.csv'), 'right', 'results/006-compare')
+    """
+
+    @classmethod
+    def open(cls, folder: str | Path, machine: str | Path = MACHINE, trust: Iterable[str] = ()) -> Case:
+        """Open a case, or begin one in a folder that has none.
+
+        Files of own effects that came with a case from elsewhere are code, and are run once you have agreed to them:
+        until then the case works without them, and `not_agreed` names them.
+
+        Parameters
+        ----------
+        folder
+            Its folder; made if need be.
+        machine
+            Of a new case: name or file.
+        trust
+            Files of own effects of the case that you have read and agree to run, as of the method `trust`.
+
+        Raises
+        ------
+        InputError
+            case.toml is no case, a file of the case is missing or was changed by another program, or it has no file
+            that `trust` names.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     _ = tps.Case.open(folder, "genhexkins")  # begins it
+        ...     case = tps.Case.open(folder)
+        ...     case.machine, len(case.history)
+        (<Machine genhexkins: 6 struts, no effects>, 1)
+        """
+        place = Path(folder)
+        if (place / CASE_FILE).is_file():
+            found = cls(place, *read_case(place / CASE_FILE))
+            found.check_files()
+        else:
+            found = cls(place, [], 0, "")
+            found.set_machine(machine)
+        if trust := tuple(trust):
+            found.trust(*trust)
+        return found
+
+    def __repr__(self) -> str:
+        off = f", without {', '.join(self.not_agreed)}: not agreed to" if self.not_agreed else ""
+        return f"<Case {self.folder.name}: {self._done} steps{off}>"
+
+    # -- what one does ------------------------------------------------------------------------------------------------
+
+    def set_machine(self, machine: str | Path) -> None:
+        """Use another machine: a name or a file, of which the case keeps a copy.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.set_machine("genhexkins")
+        ...     case.machine.name, case.state.machine
+        ('genhexkins', 'machines/genhexkins.toml')
+        """
+        text = machine_bytes(machine)
+        name = free_name(self.folder, f"machines/{Path(machine).stem}.toml")
+        write_files(self.folder, {name: text})
+        try:
+            Machine.load(self.path(name), effects=[self.path(one) for one in self.state.effects])
+        except TpsError:
+            drop(self.folder, name)
+            raise
+        python = f"case.set_machine({str(machine)!r})"
+        if not self.history:
+            python = f"case = tps.Case.open({self.folder.resolve().name!r}, {str(machine)!r})"
+        self.record(
+            "machine",
+            f"machine {Path(machine).name}",
+            change={"machine": name, "on": {}},
+            files=[name],
+            command=command_line("machine", "check", name),
+            python=python,
+        )
+
+    def trust(self, *names: str) -> None:
+        """Agree to run these files of own effects of the case (their names there), as they are now; read them before.
+
+        The agreement is this user's, and kept in their configuration folder: it holds for files of the same content in
+        any case. Raises `InputError` for a file that the case has not, or that cannot be used, which stays unused.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.add_effects(tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py")))
+        ...     case.trust("effects/my_screw.py")  # agreed to already, by adding it
+        ...     case.not_agreed, case.state == case.recorded
+        ((), True)
+        """
+        self.check_files()
+        for name in names:
+            if name not in self.recorded.effects:
+                expected = ", ".join(self.not_agreed) or "none is left"
+                raise InputError(f"{name!r} is no file of own effects of this case", expected=expected)
+            if name in self.not_agreed:
+                self._agree(name)
+
+    def _agree(self, name: str) -> None:
+        """Run a file of the case from now on; not if the machine cannot be built with it."""
+        content = (self.folder / name).read_bytes()
+        agree(content, name)
+        try:
+            self.machine  # noqa: B018
+        except TpsError:
+            withdraw(content)
+            raise
+
+    def add_effects(self, file: str | Path) -> None:
+        """Use a Python file with effects of one's own. Its code is run: to add it is to agree to that, as of `trust`.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.add_effects(tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py")))
+        ...     case.change_effects("effects/my_screw.py", pathlib.Path(folder, "my_screw.py"))
+        ...     case.state.effects
+        ('effects/my_screw-2.py',)
+        """
+        name = copied(self.folder, file, "effects")
+        self._take_effects(name, "", f"own effects of {Path(file).name}", f"case.add_effects({str(file)!r})")
+
+    def change_effects(self, name: str, file: str | Path) -> None:
+        """Use an edited file in place of a file of own effects of the case (its name there). Its code is run."""
+        if name not in self.state.effects:
+            raise InputError(f"{name} is no file of own effects of this case", expected=", ".join(self.state.effects))
+        new = copied(self.folder, first_name(name), "effects", read_bytes(file, "the file"))
+        text = f"own effects of {Path(name).name}, edited"
+        self._take_effects(new, name, text, f"case.change_effects({name!r}, {str(file)!r})")
+
+    def _take_effects(self, new: str, old: str, text: str, python: str) -> None:
+        """Put a file of the case among the effects, in place of `old` if there is one; drop it where it is at fault."""
+        state, recorded = self.state, self.recorded
+        files = [*(one for one in state.effects if one != old), new]
+        try:
+            Machine.load(self.path(state.machine), effects=[self.path(one) for one in files])
+            agree((self.folder / new).read_bytes(), new)
+        except TpsError:
+            drop(self.folder, new)
+            raise
+        lost = set(state.on) - set(self._known(state.on, files)) if old else set()
+        change = {
+            "effects": (*(one for one in recorded.effects if one != old), new),
+            "on": {name: keys for name, keys in recorded.on.items() if name not in lost},
+        }
+        command = command_line("effects", "check", new)
+        self.record("effects", text, change=change, files=[new], command=command, python=python)
+
+    def add_data(self, *files: str | Path) -> None:
+        """Add measurement files; the case keeps copies, and nothing is kept of a file that cannot be used.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.add_data("nist-table1")
+        ...     case.data_files, len(case.data.to_frame()), case.question("compare").split()[:2]
+        (('data/nist-table1.csv',), 42, ['tps', 'compare'])
+        """
+        from toolpath_stiff.report.words import counted
+
+        names = [copied(self.folder, file, "data", measurements_csv(file, self.machine)) for file in files]
+        after = (*self.state.data, *names)
+        try:
+            count = len(Measurements([self.path(name) for name in after]).on(self.machine))
+        except TpsError:
+            drop(self.folder, *names)
+            raise
+        text = f"{', '.join(Path(file).name for file in files)} added: {counted(count, 'reading')} in all"
+        self.record(
+            "data",
+            text,
+            change={"data": after},
+            files=names,
+            command=self._ask("compare", after),
+            python=f"case.add_data({', '.join(repr(str(file)) for file in files)})",
+        )
+
+    def set_aside(self, file: str, line: int, back: bool = False) -> None:
+        """Leave out the readings of a line of a measurement file of the case; `back`: use them again."""
+        state, entry = self.state, f"{file}:{line}"
+        if file not in state.data or (entry in state.aside) is not back:
+            raise InputError(f"{entry} is no reading that is {'set aside' if back else 'in use'}")
+        aside = tuple(one for one in state.aside if one != entry) if back else (*state.aside, entry)
+        touched = without_lines(
+            self.folder / file, [int(one.rpartition(":")[2]) for one in aside if one.startswith(file + ":")]
+        )
+        write_files(self.folder, {used_name(file): touched})
+        if not back:
+            self._check_aside(file, line)
+        text = f"{file} line {line} {'used again' if back else 'set aside'}"
+        words = [f"-e '{one.rpartition(':')[2]}s/^/# /'" for one in aside if one.startswith(file + ":")]
+        sed = f"sed {' '.join(words)} {file} > {used_name(file)}" if words else self._ask("compare", state.data)
+        self.record(
+            "aside",
+            text,
+            change={"aside": aside},
+            command=sed,
+            python=f"case.set_aside({file!r}, {line}{', back=True' if back else ''})",
+        )
+
+    def switch(self, effect: str, values: Mapping[str, Any] | None) -> None:
+        """Switch an effect on with these values (keys as in a machine file), or off with None.
+
+        Raises `InputError` for an effect that is unknown or in the machine, and for values that it cannot have.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.switch("weak_strut", {"strut": 4, "factor": 0.8})
+        ...     case.state.on
+        {'weak_strut': {'strut': 4, 'factor': 0.8}}
+        """
+        self._check_effect(effect, values or {}, values is not None)
+        on = {name: dict(keys) for name, keys in self.recorded.on.items() if name != effect}
+        if values is not None:
+            on[effect] = dict(values)
+        name = self._machine_by_hand(self._known(on, self.state.effects))
+        said = ", ".join(f"{key} {_short(value)}" for key, value in (values or {}).items())
+        self.record(
+            "switch",
+            f"{effect} on: {said}" if values is not None else f"{effect} off",
+            change={"on": on},
+            files=[name] if name != self.state.machine else [],
+            command=self._of_machine(name),
+            python=f"case.switch({effect!r}, {dict(values) if values is not None else None!r})",
+        )
+
+    def _of_machine(self, name: str) -> str:
+        """What asks a machine file for its errors; without readings, for its slips."""
+        return self.question("compare", machine=name) if self.state.data else command_line("machine", "check", name)
+
+    def _machine_by_hand(self, on: Mapping[str, Mapping[str, Any]]) -> str:
+        """The file of the machine with these effects, written for whoever asks the commands; as it stands with none."""
+        if not on:
+            return self.state.machine
+        name = free_name(self.folder, "machines/by-hand.toml")
+        self.machine_with(on).save(self.folder / name)
+        return name
+
+    def accept(self, file: str | Path) -> None:
+        """Go on with the machine file that an update of this case wrote.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.accept(tps.Machine.load("nist").save(pathlib.Path(folder, "fitted.toml")))
+        ...     case.state.machine
+        'machines/nist-updated.toml'
+        """
+        name = free_name(self.folder, f"machines/{Path(self.state.machine).stem.removesuffix('-updated')}-updated.toml")
+        write_files(self.folder, {name: read_bytes(file, "the machine file")})
+        command = next((step.command for step in reversed(self.history) if step.kind == "update"), "")
+        self.record(
+            "accept",
+            f"goes on with {name}",
+            change={"machine": name, "on": {}},
+            files=[name],
+            command=f"{command} -o {name}" if command else "",
+            python=f"case.accept({str(file)!r})",
+        )
+
+    def add_program(self, file: str | Path, **reading: Unpack[Reading]) -> None:
+        r"""Use an NC program or cutter-location file.
+
+        Further arguments as of `Program.read`: dialect, controller, offsets, tools, block_delete, feed_mm_per_min. They
+        hold for later programs of the case too, until they are given anew; None takes one back.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     file, tools = pathlib.Path(folder, "slot.nc"), pathlib.Path(folder, "my.tbl")
+        ...     _ = file.write_text("G21 G90\nT1 M6\nG43 H1\nG1 X40 F300\nM2\n")
+        ...     _ = tools.write_text("T1 P1 Z120\n")
+        ...     case.add_program(file, tools=tools)
+        ...     case.place_at((0, 0, 850))
+        ...     case.require(50000)
+        ...     found = case.analyze()
+        ...     case.program, found.complete, case.latest("analyze"), case.history[-1].command[:30]
+        (<Program slot.nc>, True, 'results/005-analyze', 'tps analyze programs/slot.nc -')
+        """
+        name = copied(self.folder, file, "programs")
+        python = f"case.add_program({', '.join([repr(str(file)), *_arguments(reading)])})"
+        self._take_program(name, reading, [name], "program", f"program {Path(file).name}", python)
+
+    def read_programs(self, **reading: Unpack[Reading]) -> None:
+        r"""Read the programs of the case with another tool table, offsets, controller file: arguments of `add_program`.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     tools = pathlib.Path(folder, "my.tbl")
+        ...     _ = tools.write_text("T1 P1 Z120\n")
+        ...     case.read_programs(tools=tools)
+        ...     case.state.reading
+        {'tools': 'programs/my.tbl'}
+        """
+        text = ", ".join(f"{TABLES.get(name, name)} {Path(str(value)).name}" for name, value in reading.items())
+        python = f"case.read_programs({', '.join(_arguments(reading))})"
+        self._take_program(self.state.program, reading, [], "reading", f"programs are read with {text}", python)
+
+    def _take_program(
+        self, program: str, given: Mapping[str, Any], files: list[str], kind: str, text: str, python: str
+    ) -> None:
+        """Read a program of the case with what it has and what is given; drop the files where it cannot be read."""
+        state, reading = self.state, dict(self.state.reading)
+        try:
+            for key, value in given.items():
+                if key not in READING:
+                    raise InputError(f"{key} is not kept in a case", expected=", ".join(READING))
+                reading[key] = value
+                if key in TABLES and value is not None:
+                    reading[key] = copied(self.folder, value, "programs")
+                    files.append(reading[key])
+                elif key == "block_delete" and not isinstance(value, bool | None):
+                    reading[key] = ",".join(map(str, sorted(value)))
+            reading = {key: value for key, value in reading.items() if value not in (None, False)}
+            if program:
+                self._program(program, reading).moves()
+            else:
+                Program.from_text("M2", **reading_arguments(self.folder, reading))
+        except TpsError:
+            drop(self.folder, *files)
+            raise
+        change: dict[str, Any] = {"reading": reading} if reading != state.reading else {}
+        if program != state.program:
+            change |= {"program": program, "origin": ()}
+        command = self._analyze_line(program, change.get("origin", state.origin), reading=reading) if program else ""
+        self.record(kind, text, change=change, files=files, command=command, python=python)
+
+    def place_at(self, origin_mm_deg: Sequence[float]) -> None:
+        """Put program zero somewhere: X, Y, Z, A, B, C in machine coordinates."""
+        pose_si("origin", origin_mm_deg)
+        origin = tuple(round(float(value), 6) for value in origin_mm_deg)
+        word = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", origin, strict=False))
+        self.record(
+            "place_at",
+            f"program zero at {word}",
+            change={"origin": origin},
+            command=self._analyze_line(self.state.program, origin),
+            python=f"case.place_at({origin})",
+        )
+
+    def require(self, stiffness_N_per_mm: float) -> None:
+        """Ask a stiffness of every cut; 0: none."""
+        from toolpath_stiff.api.programs import STIFFEST_N_PER_MM
+
+        asked = finite("required", stiffness_N_per_mm)
+        if asked:
+            positive("required", asked, "N/mm", STIFFEST_N_PER_MM)
+        self.record(
+            "require",
+            f"{asked:g} N/mm required",
+            change={"require": asked},
+            command=self._analyze_line(self.state.program, self.state.origin, require=asked)
+            if self.state.program
+            else "",
+            python=f"case.require({asked:g})",
+        )
+
+    def draft(self, progress: Progress | None = None) -> EffectDraft:
+        """What a diagnosis leaves unexplained as an effect file, as `tps.draft_effect`; the case uses it from then on.
+
+        It competes like an effect of one's own; without new readings it is `described` at best.
+        """
+        result = self.next_result("draft")
+        found, command = self.draft_in(result, progress)
+        self.record("draft", found._short(), command=command, python="case.draft()", result=result)
+        if found.text:
+            self.add_effects(self.folder / result / f"{found.name}.py")
+        return found
+
+    # -- a blind exercise ---------------------------------------------------------------------------------------------
+
+    def start_exercise(self, seed: int, hidden: str | None = None, layout: str = "tilted") -> None:
+        """Begin a blind exercise: a simulated machine that hides something, and what was measured on it.
+
+        `hidden` and `layout` as of `tps rig new`.
+        """
+        from toolpath_stiff.rig.exercise import new_exercise
+
+        folder = free_name(self.folder, "exercise")
+        new_exercise(self.folder / folder, seed, layout, hidden)
+        machine, data = free_name(self.folder, "machines/machine.toml"), free_name(self.folder, "data/measurements.csv")
+        write_files(
+            self.folder,
+            {
+                machine: (self.folder / folder / "machine.toml").read_bytes(),
+                data: (self.folder / folder / "measurements.csv").read_bytes(),
+            },
+        )
+        change = {"machine": machine, "data": (data,), "aside": (), "on": {}, "exercise": folder}
+        other = {"hidden": hidden, "layout": layout if layout != "tilted" else None}
+        words = "".join(f", {name}={value!r}" for name, value in other.items() if value)
+        self.record(
+            "exercise",
+            f"blind exercise, seed {seed}",
+            change=change,
+            files=[machine, data],
+            command=command_line("rig", "new", *options(seed=seed, out=folder, **other)),
+            python=f"case.start_exercise({seed}{words})",
+        )
+
+    def measure(self, plan_file: str | Path) -> None:
+        """Measure the exercise's machine at the poses of a plan; the readings are added."""
+        from toolpath_stiff.report.words import counted
+        from toolpath_stiff.rig.exercise import measure_again
+
+        name = free_name(self.folder, "data/measured.csv")
+        visit = 1 + sum(step.kind == "measure" for step in self.history)
+        (self.folder / "data").mkdir(exist_ok=True)
+        count = measure_again(self.folder / self._exercise(), str(plan_file), str(self.folder / name), visit)
+        line = command_line("rig", "measure", self._exercise(), *options(at=plan_file, out=name, visit=visit))
+        self.record(
+            "measure",
+            f"{counted(count, 'reading')} measured",
+            change={"data": (*self.state.data, name)},
+            files=[name],
+            command=line,
+            python=f"case.measure({str(plan_file)!r})",
+        )
+
+    def claim(self, effects: str) -> dict[str, Any]:
+        """Open the seal of the exercise and score a claim: names of effects with commas, "none" or "outside"."""
+        from toolpath_stiff.api.results import json_text
+        from toolpath_stiff.rig.exercise import reveal
+
+        found = reveal(self.folder / self._exercise(), effects)
+        result = self.next_result("reveal")
+        write_files(self.folder, {f"{result}/reveal.json": json_text(found)})
+        self.record(
+            "reveal",
+            f"claimed {effects}: {found['verdict']}",
+            result=result,
+            command=command_line("rig", "reveal", self._exercise(), *options(claim=effects)),
+            python=f"case.claim({effects!r})",
+        )
+        return found
+
+    def _exercise(self) -> str:
+        if not self.state.exercise:
+            raise InputError("no exercise was started in this case", hint="start one with start_exercise(seed)")
+        return self.state.exercise
+
+    def _check_effect(self, name: str, values: Mapping[str, Any], on: bool) -> None:
+        from toolpath_stiff.machine.model import EffectEntry
+        from toolpath_stiff.stiffness.catalogue import find_effect
+        from toolpath_stiff.stiffness.contract import read_parameters
+
+        effect = find_effect(name, [self.path(one) for one in self.state.effects])
+        if on:
+            read_parameters(effect, EffectEntry(name, dict(values)), "by hand")
+            if name in self.machine.effects:
+                raise InputError(f"{name} is in the machine already")
+
+    def _check_aside(self, file: str, line: int) -> None:
+        machine = self.machine
+        try:
+            before = Measurements([self.path(file)]).on(machine)
+            after = Measurements([self.path(used_name(file))]).on(machine)
+            good = len(before) - len(after) >= 1 and line not in set(after.line.tolist())
+        except TpsError:
+            good = False
+        if not good:
+            self._rewrite_used()
+            raise InputError(f"{file} line {line} cannot be left out by itself")
+
+
+def _arguments(given: Mapping[str, Any]) -> list[str]:
+    """Arguments as a Python line has them."""
+    return [f"{name}={str(value) if isinstance(value, Path) else value!r}" for name, value in given.items()]
+
+
+def _short(value: Any) -> str:
+    return f"{value:.5g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,153 @@
+"""What a case holds, as its steps have made it: machine, readings, program; the commands that ask of these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from toolpath_stiff.api.by_hand import Preview, preview, with_effects
+from toolpath_stiff.api.diagnosis import Measurements
+from toolpath_stiff.api.inputs import Program, Reading
+from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.case.files import used_name
+from toolpath_stiff.case.steps import TABLES, History
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import command_line, options
+
+if TYPE_CHECKING:
+    from toolpath_stiff.case.steps import Step
+
+
+NOT_AGREED = "its code is not run, as you have not agreed to it"
+
+
+def reading_words(reading: Mapping[str, Any]) -> list[str]:
+    """How a program is read, as options of a command."""
+    return options(**{name.removesuffix("_mm_per_min"): value for name, value in reading.items()})
+
+
+def reading_arguments(folder: Path, reading: Mapping[str, Any]) -> Reading:
+    """The same as arguments of `Program.read`."""
+    given = {name: str(folder / value) if name in TABLES else value for name, value in reading.items()}
+    if isinstance(switches := given.get("block_delete"), str):
+        given["block_delete"] = [int(one) for one in switches.split(",")]
+    return cast("Reading", given)
+
+
+class Contents(History):
+    """Machine, readings and program of a case."""
+
+    def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
+        super().__init__(folder, steps, done, text)
+        self._preview: tuple[object, Preview] | None = None
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, effects of one's own included."""
+        return self.machine_of(self.state.machine)
+
+    def machine_of(self, file: str) -> Machine:
+        """A machine file of the case with the effects of one's own; those that are not agreed to are left out of it.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.machine_of(case.state.machine)
+        <Machine nist: 6 struts, no effects>
+        """
+        from toolpath_stiff.machine.file import load_machine
+        from toolpath_stiff.stiffness.catalogue import known_effects
+        from toolpath_stiff.stiffness.model import Idle, build_model
+
+        path, files = self.path(file), tuple(map(self.path, self.state.effects))
+        if not self.not_agreed:
+            return Machine.load(path, effects=files)
+        given, known = load_machine(path), known_effects(files)
+        acting, reading = (tuple(e for e in some if e.name in known) for some in (given.effects, given.instruments))
+        left = {e.name for e in (*given.effects, *given.instruments)} | set(self.recorded.on)
+        model = build_model(given.with_changes(effects=acting, instruments=reading), files)
+        withheld = tuple(Idle(name, NOT_AGREED, waiting=True) for name in sorted(left - set(known)))
+        return Machine(replace(model, withheld=withheld), path, files)
+
+    @property
+    def data_files(self) -> tuple[str, ...]:
+        """The files of the readings in use; those with readings set aside are in used/."""
+        state = self.state
+        touched = {entry.rpartition(":")[0] for entry in state.aside}
+        return tuple(used_name(name) if name in touched else name for name in state.data)
+
+    @property
+    def data(self) -> Measurements:
+        """The readings in use. Raises `InputError` where there are none."""
+        if not self.data_files:
+            raise InputError("this case has no measurements", hint="add a file with add_data, or start an exercise")
+        return Measurements([self.path(name) for name in self.data_files])
+
+    @property
+    def preview(self) -> Preview:
+        """The error of the readings in use with effects of any size, as `tps.preview`; made once for these readings."""
+        state = self.state
+        key = (state.machine, state.effects, state.data, state.aside)
+        if self._preview is None or self._preview[0] != key:
+            self._preview = (key, preview(self.machine, self.data))
+        return self._preview[1]
+
+    def machine_with(self, on: Mapping[str, Mapping[str, Any]]) -> Machine:
+        """The machine with effects of these sizes; where there are readings, the strut law is refitted beside them.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     tps.Case.open(folder).machine_with({"weak_strut": {"strut": 4, "factor": 0.8}})
+        <Machine nist: 6 struts, weak_strut>
+        """
+        machine = self.machine
+        if not on:
+            return machine
+        found = self.preview.machine(on) if self.state.data else with_effects(machine, on)
+        return replace(found, model=replace(found.model, withheld=machine.model.withheld))
+
+    @property
+    def program(self) -> Program:
+        """The program. Raises `InputError` where there is none."""
+        if not self.state.program:
+            raise InputError("this case has no program", hint="add one with add_program")
+        return self._program(self.state.program, self.state.reading)
+
+    def _program(self, name: str, reading: Mapping[str, Any]) -> Program:
+        return Program.read(self.path(name), **reading_arguments(self.folder, reading))
+
+    def latest(self, kind: str) -> str:
+        """Folder of the latest result of a kind among the steps that hold; "" without one."""
+        return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
+
+    def question(self, name: str, **own: Any) -> str:
+        """The command line that asks this of the readings in use."""
+        return self._ask(name, self.data_files, **own)
+
+    def _ask(self, name: str, files: Sequence[str], machine: str = "", **own: Any) -> str:
+        state = self.state
+        asked = options(machine=machine or state.machine, **own, effects=list(state.effects))
+        return command_line(name, *files, *asked)
+
+    def _analyze_line(
+        self,
+        program: str,
+        origin: Sequence[float],
+        name: str = "analyze",
+        machine: str = "",
+        require: float | None = None,
+        reading: Mapping[str, Any] | None = None,
+    ) -> str:
+        state, word = self.state, ",".join(f"{value:.10g}" for value in origin) or None
+        need = state.require if require is None else require
+        own: dict[str, Any] = {"partial": True, "require": f"{need:g}" if need else None} if name == "analyze" else {}
+        asked = options(machine=machine or state.machine, origin=word, **own, effects=list(state.effects))
+        return command_line(name, program, *asked, *reading_words(state.reading if reading is None else reading))

@@ -1,0 +1,480 @@
+"""Diagnosis: which physical effect is missing from the model, if any.
+
+Reads the verdict of `verdict` for each noise model, takes what they have in common, and writes it down with what a user
+needs to judge it: fits with intervals, errors held out by point, what these data cannot tell, what to measure next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.defaults import STRUT_SPREAD
+from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.hints import Asked
+from toolpath_stiff.inference.candidates import testable_effects
+from toolpath_stiff.inference.doubts import (
+    SlipSize,
+    SuspectEntry,
+    alone,
+    mended,
+    slips_that_show,
+    suspect_entries,
+    suspect_rows,
+)
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import Baseline, HeldOut, held_out, of_readings, refine
+from toolpath_stiff.inference.hypotheses import Confounding, Detectable, Unexcluded, confounding, detectable_sizes
+from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
+from toolpath_stiff.inference.noise import JOINT_ERROR, Noise, noise_models
+from toolpath_stiff.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.planning.document import nothing_gained, plan_rows
+from toolpath_stiff.planning.plan import plan_measurements
+from toolpath_stiff.planning.rivals import rivals_of
+from toolpath_stiff.planning.visits import Costs, Menu
+from toolpath_stiff.portrait.alike import Alike, looks_the_same
+from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
+from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.stiffness.contract import Conditions, Effect
+from toolpath_stiff.stiffness.model import build_model, setup_of
+
+if TYPE_CHECKING:
+    from toolpath_stiff.comparison.loop_readings import LoopsDocument
+    from toolpath_stiff.nc.moves import Program
+    from toolpath_stiff.units import Pose
+
+
+NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
+
+
+FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect and a few to spare
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Which effect is missing, and what stands behind it.
+
+    Attributes
+    ----------
+    verdict, plausible
+        Common to all noise models; see `verdict`.
+    judgements
+        Name of the noise model -> judgement. The one that is written out in full is `main`.
+    main
+        The judgement of the measured or stated noise, else of the high guess.
+    data, machine, effects
+        What was diagnosed, with the effects that these data can test.
+    cannot_test
+        Effect -> missing columns; empty where nothing in these data depends on the effect.
+    as_given, base, fits
+        The machine file as it stands; its strut law refitted; effect or "a + b" -> final fit of all that were offered.
+    held_out_base, held_out
+        Errors at left-out points.
+    confounding, detectable
+        What these data cannot tell apart, and what they would have shown.
+    files, seed, command, asked
+        For the record, and for the commands that go on from here.
+    next_measurements, remarks
+        Where the verdict is `ambiguous`: rows of a plan that would tell the explanations apart; what it cannot do.
+        Where it is `described`: of a plan that would confirm it.
+    path
+        How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
+    portrait
+        What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
+    alike
+        What else would look the same as the effect that is named (`alike_of`); None where nothing would, or none is.
+    unexcluded
+        Effects that the readings neither show nor exclude beside the likeliest explanation, at a size that matters.
+    suspects
+        Rows that look mistyped; `data` no longer holds those that are clear.
+    slips
+        The smallest slips of a pose that these readings would show; none where rows were not looked at.
+    loops
+        Readings of indicators beside the tip against the likeliest explanation. Everything above with an entry a
+        reading is of those of the tip.
+    """
+
+    verdict: str
+    plausible: tuple[str, ...]
+    judgements: dict[str, Judgement]
+    main: Judgement
+    data: Measurements
+    machine: Machine
+    effects: tuple[Effect, ...]
+    cannot_test: dict[str, tuple[str, ...]]
+    as_given: Fit
+    base: Fit
+    fits: dict[str, Fit]
+    held_out_base: HeldOut
+    held_out: dict[str, HeldOut]
+    confounding: Confounding
+    detectable: tuple[Detectable, ...]
+    files: tuple[str, ...]
+    seed: int
+    command: str = ""
+    asked: Asked | None = None
+    next_measurements: tuple[dict[str, Any], ...] = ()
+    remarks: tuple[str, ...] = ()
+    path: dict[str, Any] | None = None
+    portrait: Portrait | None = None
+    alike: Alike | None = None
+    unexcluded: tuple[Unexcluded, ...] = ()
+    suspects: tuple[SuspectEntry, ...] = ()
+    slips: tuple[SlipSize, ...] = ()
+    loops: LoopsDocument = field(default_factory=lambda: cast("LoopsDocument", {"by_loop": [], "readings": []}))
+
+    @property
+    def noise(self) -> Noise:
+        """The noise model of `main`."""
+        return self.main.noise
+
+    @property
+    def predictor(self) -> Predictor:
+        """The model's answers to the data."""
+        return self.main.problem.predictor
+
+    @property
+    def explanations(self) -> tuple[str, ...]:
+        """Hypotheses left standing under any noise model, the most likely first: effects, `none`, "a + b".
+
+        One alone where one is the answer.
+        """
+        most = 1 if self.verdict in NAMING else None
+        return tuple(dict.fromkeys(name for one in self.judgements.values() for name in one.explanations[:most]))
+
+    @property
+    def before(self) -> FloatArray:
+        """(n,) ln measured - ln modelled of the machine file as given."""
+        return self.as_given.residual
+
+    @property
+    def best(self) -> str | None:
+        """Name of the best explanation by an effect or a pair; None where there is none."""
+        offered = [name for name in self.ranking() if name in self.fits and any(s.any() for s in self.fits[name].sizes)]
+        return offered[0] if offered else None
+
+    @property
+    def after(self) -> FloatArray:
+        """(n,) residual of the best explanation; with the strut law refitted where there is none, or none is needed."""
+        if self.best is None or self.verdict == "adequate":
+            return self.base.residual
+        return self.fits[self.best].residual
+
+    @property
+    def law(self) -> FloatArray:
+        """(2,) the strut law's logarithms with the best explanation."""
+        return self.base.law if self.best is None else self.fits[self.best].law
+
+    def ranking(self) -> list[str]:
+        """Explanations, most likely first: by probability, then by evidence."""
+        likely = sorted(self.main.probability.items(), key=lambda item: (-item[1], item[0]))
+        names = [name for name, weight in likely if weight > 0.0 and name in self.fits]
+        return names + [f.name for f in self.main.families if f.name not in names]
+
+
+def diagnose(
+    machine: Machine,
+    data: Measurements,
+    *,
+    noise: float | tuple[float, float] | None = None,
+    strut_spread: float = STRUT_SPREAD,
+    joint_error: float = JOINT_ERROR,
+    effect_files: Sequence[str | Path] = (),
+    seed: int = 0,
+    plan_next: bool = True,
+    program: Program | Callable[[], Program] | None = None,
+    origin: Pose | None = None,
+    setup: str | None = None,
+    temperature: float | None = None,
+    files: Sequence[str] = (),
+    command: str = "",
+    asked: Asked | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """Find out which physical effect the model lacks, if any: everything that `tps diagnose` says.
+
+    Parameters
+    ----------
+    machine, data
+        The model and n readings of the machine.
+    noise
+        Relative sd of one reading, re-clamping included, or (repeat, clamping); None: from the data.
+    strut_spread, joint_error
+        Relative sd of the struts' stiffnesses; m, sd of each joint coordinate.
+    effect_files
+        A user's own effects, which take part.
+    seed
+        Of the bootstrap and of the poses of the plan.
+    plan_next
+        Whether to plan the next measurements where the verdict is `ambiguous`.
+    program
+        Where several explanations remain, how much the choice between them matters is worked out on this program, or
+        on what this function returns; None: not at all.
+    origin, setup, temperature
+        Placement of that program (mm, degrees), set-up and degrees C under which it runs; None: the machine file's.
+    files, command, asked
+        Names of the measurement files and the command, for the record; what the commands that go on from here carry.
+    progress
+        Told what is being done.
+
+    Raises
+    ------
+    InputError
+        Too few readings, or what `Predictor` and `noise_models` refuse.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.readings.measurements import read_measurements
+    >>> nist = load_machine("nist")
+    >>> found = diagnose(nist, read_measurements("nist-table1", nist), noise=0.10, plan_next=False)
+    >>> found.verdict
+    'ambiguous'
+    """
+    say = progress or (lambda text: None)
+    found = _examined(machine, data, noise, strut_spread, joint_error, effect_files, seed, tuple(files), say)
+    found = replace(found, command=command, asked=asked, portrait=portrait_of(found, say), alike=alike_of(found))
+    if found.verdict not in ("ambiguous", "described"):
+        return found
+    if plan_next:
+        say("planning the next measurements")
+        rows, remarks = next_measurements(found, seed=seed)
+        found = replace(found, next_measurements=tuple(rows), remarks=tuple(remarks))
+    if program is not None and found.verdict == "ambiguous":
+        of_machine = found.predictor.base.conditions
+        conditions = Conditions(
+            of_machine.setup if setup is None else setup, of_machine.temperature if temperature is None else temperature
+        )
+        chosen = program() if callable(program) else program
+        found = replace(found, path=choice_on_path(found, chosen, origin, conditions))
+    return found
+
+
+def _examined(
+    machine: Machine,
+    data: Measurements,
+    noise: float | tuple[float, float] | None,
+    strut_spread: float,
+    joint_error: float,
+    effect_files: Sequence[str | Path],
+    seed: int,
+    files: tuple[str, ...],
+    say: Callable[[str], None],
+) -> Diagnosis:
+    """From readings to verdict under each noise model, then what stands behind the verdict that they share."""
+    _check_number(data)
+
+    def judged(data: Measurements) -> tuple[dict[str, Judgement], Judgement]:
+        predictor, judgements = Predictor(machine, data, effect_files), {}
+        effects = testable_effects(predictor)[0]
+        for one in noise_models(data, noise, strut_spread, joint_error):
+            say(f"searching {len(effects)} effects, noise {one.name}")
+            judgements[one.name] = judge(Problem.of(predictor, one), one, effects, seed)
+        # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
+        return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
+
+    judgements, main = judged(data)
+    looked_at = not main.question and data.beside is None
+    suspects = suspect_rows(main.problem, main.likeliest) if looked_at else ()
+    clear = [suspect for suspect in suspects if suspect.clear]
+    clear = [suspect for suspect in clear if suspect not in alone(data, clear)]
+    kept = np.ones(len(data), dtype=bool)
+    kept[[row for suspect in clear for row in suspect.rows]] = False
+    if clear and kept.sum() >= FEWEST:
+        # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
+        say("once more with the rows mended that look mistyped")
+        clear = clear if judged(mended(data, clear))[1].explained else []
+    entries = suspect_entries(suspects, data, left_out=clear)
+    if clear:
+        say("once more without the rows that look mistyped")
+        data = data.select(kept)
+        judgements, main = judged(data)
+    verdict, plausible = common_verdict(list(judgements.values()))
+    effects, cannot = testable_effects(main.problem.predictor)
+    say("final fits, errors held out by point")
+    baseline = Baseline.of(main.problem)
+    fits = _all_fits(main)
+    tested = {family.name for family in main.families}
+    cannot |= {effect.name: () for effect in effects if effect.name not in tested}
+    held = {name: held_out(fit, data.point) for name, fit in fits.items()}
+    tip = data.tip
+    return Diagnosis(
+        verdict, plausible, judgements, main, data.of_tip, machine, effects, cannot,
+        of_readings(baseline.as_given, tip), of_readings(baseline.refitted, tip),
+        {name: of_readings(fit, tip) for name, fit in fits.items()},
+        held_out(baseline.refitted, data.point).of_readings(tip),
+        {name: one.of_readings(tip) for name, one in held.items()},
+        confounding(main.problem, main.families),
+        tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
+        files or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries),
+        unexcluded=tuple(one for one in unexcluded(main) if one.effect.name not in plausible),
+        slips=slips_that_show(main.problem, main.likeliest) if looked_at else (), loops=_loops(main, fits),
+    )  # fmt: skip
+
+
+def _check_number(data: Measurements) -> None:
+    if len(data.of_tip) < FEWEST or np.isnan(data.stiffness).any():
+        raise InputError(
+            f"{len(data.of_tip)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
+            expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
+        )
+
+
+def _all_fits(main: Judgement) -> dict[str, Fit]:
+    """The fits of a judgement, and with the model itself the best of every family that it has only on tables."""
+    fits = dict(main.fits)
+    for family in main.families:
+        if family.best is not None and family.name not in fits:
+            fits[family.name] = refine(main.problem, family.best)
+    return fits
+
+
+def _loops(main: Judgement, fits: dict[str, Fit]) -> LoopsDocument:
+    """Readings of loops beside the tip against the likeliest explanation."""
+    problem = main.problem
+    if problem.predictor.data.beside is None:
+        return {"by_loop": [], "readings": []}
+    from toolpath_stiff.comparison.loop_readings import loops_document
+
+    likeliest = max(main.probability, key=lambda name: main.probability[name], default=NONE)
+    fit = fits.get(likeliest)
+    residual = main.base.residual if fit is None else fit.residual
+    return loops_document(problem.predictor.data, problem.observed - residual, problem.scatter.covariance)
+
+
+def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:
+    """The verdict that all noise models share, and names that hold the truth under any; else `ambiguous`."""
+    verdicts = {judgement.verdict for judgement in judgements}
+    plausible = tuple(dict.fromkeys(name for judgement in judgements for name in judgement.plausible))
+    if len(verdicts) == 1:
+        verdict = verdicts.pop()
+        return verdict if verdict not in NAMING or _same(judgements) else "ambiguous", plausible
+    if verdicts == set(NAMING) and _same(judgements):
+        return "described", plausible
+    return "ambiguous", plausible if plausible else (NONE,)
+
+
+def _same(judgements: Sequence[Judgement]) -> bool:
+    """Whether all of them name the same effects."""
+    return len({frozenset(judgement.plausible) for judgement in judgements}) == 1
+
+
+def portrait_of(diagnosis: Diagnosis, say: Callable[[str], None]) -> Portrait | None:
+    """What the missing thing looks like: of unexplained readings, and of what the best explanation leaves behind.
+
+    None where nothing stands out of what is left, and where the readings do not look as if they were of this machine.
+    """
+    main, verdict = diagnosis.main, diagnosis.verdict
+    if main.question or verdict == "adequate":
+        return None
+    base = main.base
+    if verdict != "unexplained":
+        gate = main.gates.get(diagnosis.best or "")
+        if diagnosis.best is None or gate is None or gate.probability > FALSE_ALARM:
+            return None
+        base = diagnosis.fits[diagnosis.best]
+    problem, noise = main.problem, diagnosis.noise
+    if noise.tip is not None:  # its terms are compliances at the tip: other loops are left out
+        if verdict != "unexplained":
+            return None
+        noise = noise.select(noise.tip)
+        problem = Problem.of(Predictor(diagnosis.machine, diagnosis.data, diagnosis.predictor.effect_files), noise)
+        base = problem.score_base()
+    say("describing what is missing")
+    found = draw_portrait(problem, base, noise, diagnosis.seed, main.base_gate.worst)
+    return found if found.terms or verdict == "unexplained" else None
+
+
+def alike_of(diagnosis: Diagnosis) -> Alike | None:
+    """What else would look the same as the one effect that is named: parts that the catalogue does not have."""
+    main = diagnosis.main
+    named = diagnosis.fits.get(diagnosis.best or "")
+    if diagnosis.verdict not in NAMING or named is None or main.noise.tip is not None:
+        return None
+    return looks_the_same(main.problem, diagnosis.base, named, diagnosis.noise, diagnosis.seed)
+
+
+POSES = 6
+
+
+PATH_STEP = 5e-3  # m between samples: the mean of a path needs no more
+
+
+def next_measurements(
+    diagnosis: Diagnosis, poses: int = POSES, seed: int = 0
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Rows of a plan that would tell the plausible explanations apart, each with its reason; and remarks.
+
+    Of an answer that is only `described`, what would confirm it. No rows with any other verdict than these two, and
+    where they would gain nothing: the first remark says so.
+    """
+    # Under several noise models the most demanding one that leaves rivals: a plan for it serves the others, too.
+    open_ones = [j for j in diagnosis.judgements.values() if j.verdict == diagnosis.verdict]
+    if diagnosis.verdict not in ("ambiguous", "described") or not open_ones:
+        return [], []
+    judgement = open_ones[-1]
+    rivals = rivals_of(judgement)
+    if len(rivals) < 2:
+        return [], []
+    noise = (float(np.sqrt(np.mean(judgement.noise.repeat**2))), judgement.noise.clamping)
+    try:
+        plan = plan_measurements(
+            diagnosis.machine, rivals, noise, poses, menu=Menu.of(diagnosis.data), costs=Costs(), seed=seed,
+            effect_files=diagnosis.predictor.effect_files, strut_spread=judgement.noise.strut_spread,
+        )  # fmt: skip
+    except InputError as error:
+        return [], [f"no plan could be made: {error}"]
+    if not plan.gains:
+        return [], [nothing_gained(plan)]
+    rows = plan_rows(plan.visits, plan.chosen, set(diagnosis.data.point.tolist()))
+    for row in rows:
+        row["why"] = plan.why[int(row["clamp"]) - 1]
+    remarks = [
+        f"{pair.first} and {pair.second}: tip stiffness cannot tell them apart; put an indicator "
+        + " or ".join(f"{place}" for place in dict.fromkeys(pair.indicators.values()))
+        for pair in plan.pairs
+        if not pair.separable
+    ]
+    return rows, remarks
+
+
+def choice_on_path(
+    diagnosis: Diagnosis, program: Program, origin: Pose | None = None, given: Conditions | None = None
+) -> dict[str, Any]:
+    """Mean, range and minimum along a program under each plausible explanation: how much the choice matters.
+
+    Where the program is out of reach, or a model has no answer there, the reason instead. `given` is under what the
+    program runs; unless it names a set-up, the one that an explanation belongs to: there the choice matters.
+    """
+    from toolpath_stiff.analysis import analyze
+    from toolpath_stiff.analysis.statistics import stiffness_figures
+
+    names = [name for name in diagnosis.explanations if name == NONE or name in diagnosis.fits]
+    conditions = given or Conditions(diagnosis.machine.setup, diagnosis.machine.temperature)
+    if conditions.setup is None:
+        effects = [active for name in names if name != NONE for active in diagnosis.fits[name].effects]
+        conditions = replace(conditions, setup=next(filter(None, map(setup_of, effects)), None))
+    found: dict[str, Any] = {"program": program.name, "setup": conditions.setup, "explanations": {}}
+    for name in names:
+        fit = diagnosis.base if name == NONE else diagnosis.fits[name]
+        machine = diagnosis.machine.with_changes(strut_law=scaled_law(diagnosis.machine.strut_law, fit.law))
+        try:
+            model = build_model(machine, diagnosis.predictor.effect_files, fit.effects, conditions)
+            model = replace(model, instruments=())  # readings differ, the machine under the tool does not
+            analysis = analyze(model, program, origin=origin, step=PATH_STEP)
+        except TpsError as error:
+            return {"program": program.name, "reason": str(error)}
+        figures = stiffness_figures(analysis, analysis.headline)
+        found["explanations"][name] = {
+            key: round(figures[key], 1) for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
+        }
+    means = [entry["mean_N_per_mm"] for entry in found["explanations"].values()]
+    if means:
+        found["mean_spread_percent"] = round(100.0 * (max(means) - min(means)) / float(np.mean(means)), 2)
+    return found

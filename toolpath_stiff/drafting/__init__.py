@@ -1,0 +1,1 @@
+"""A portrait as the source text of an effect file."""

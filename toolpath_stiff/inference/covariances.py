@@ -1,0 +1,385 @@
+"""Covariances of readings that need no n x n matrix: own scatter, groups that scatter together, a few shared columns.
+
+    V = diag(own) + common Z Z^T + S^T S,
+
+Z has a column of ones and noughts a group (a clamping), S a row for each nuisance that all readings share (six struts,
+36 coordinates of joints). Everything follows from the blocks C = diag(own) + common Z Z^T, whose inverse is known, by
+
+    V^-1  = C^-1 - F^T F,       F = L^-1 S C^-1,   L L^T = 1 + S C^-1 S^T   (Woodbury 1950),
+    ln|V| = ln|C| + ln|1 + S C^-1 S^T|                                      (matrix determinant lemma)
+
+(Golub and Van Loan 2013, Matrix Computations, 2.1.4; Harville 1997, Matrix Algebra from a Statistician's Perspective,
+18.1 and 18.2). What a least-squares fit leaves of readings has an inverse covariance of the same shape with a few more
+rows in F, so that a fit costs as much as there are readings. Readings always run along the last axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+
+Rows = NDArray[np.int64]
+
+
+MOST_RANKS = 64  # by which an inverse is changed before it is worked out anew
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Readings in groups: `of` (n,), the number of each reading's group, from 0 on without a gap."""
+
+    of: Rows
+
+    @classmethod
+    def by(cls, labels: NDArray[Any]) -> Groups:
+        """Readings with equal labels (n,) together."""
+        return cls(np.unique(labels, return_inverse=True)[1].reshape(-1).astype(np.int64))
+
+    @cached_property
+    def _order(self) -> Rows:
+        return np.argsort(self.of, kind="stable")
+
+    @cached_property
+    def _starts(self) -> Rows:
+        return np.flatnonzero(np.diff(self.of[self._order], prepend=-1))
+
+    @property
+    def count(self) -> int:
+        """How many groups there are."""
+        return len(self._starts)
+
+    @cached_property
+    def alone(self) -> bool:
+        """Whether every reading is a group of its own."""
+        return self.count == len(self.of)
+
+    def members(self) -> list[Rows]:
+        """Readings of each group."""
+        return np.split(self._order, self._starts[1:])
+
+    @cached_property
+    def _width(self) -> int:
+        """How many readings each group has; 0 where they have different numbers."""
+        sizes = np.diff(self._starts, append=len(self.of))
+        return int(sizes[0]) if len(sizes) and (sizes == sizes[0]).all() else 0
+
+    @cached_property
+    def _in_order(self) -> bool:
+        """Whether each group's readings follow each other, the groups in the order of their numbers."""
+        return bool((np.diff(self.of) >= 0).all())
+
+    def sums(self, rows: FloatArray) -> FloatArray:
+        """(..., groups) of rows (..., n)."""
+        ordered = rows if self._in_order else rows[..., self._order]
+        if not self._width:
+            return np.asarray(np.add.reduceat(ordered, self._starts, axis=-1))
+        # A third of the time of `reduceat`, which goes from group to group.
+        return np.asarray(np.einsum("...gk->...g", ordered.reshape(*rows.shape[:-1], self.count, self._width)))
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """Covariance of n readings, V as above.
+
+    Attributes
+    ----------
+    own
+        (n,) variance of each reading's own scatter, more than 0.
+    groups, common
+        Readings that scatter together, and the variance that they have in common.
+    shared
+        (q, n) by how much one standard deviation of each shared nuisance moves each reading.
+    """
+
+    own: FloatArray
+    groups: Groups
+    common: float
+    shared: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.own)
+
+    @property
+    def diagonal(self) -> FloatArray:
+        """(n,) variance of each reading."""
+        return np.asarray(self.own + self.common + (self.shared**2).sum(axis=0))
+
+    def dense(self) -> FloatArray:
+        """(n, n), for a few readings only."""
+        same = self.groups.of[:, None] == self.groups.of[None, :]
+        return np.asarray(np.diag(self.own) + self.common * same + self.shared.T @ self.shared)
+
+    def squares(self, rows: FloatArray) -> FloatArray:
+        """(...,) x V x^T of rows (..., n): variances of these combinations of readings."""
+        own = (rows**2 * self.own).sum(axis=-1) + self.common * (self.groups.sums(rows) ** 2).sum(axis=-1)
+        return np.asarray(own + ((rows @ self.shared.T) ** 2).sum(axis=-1))
+
+    def widened(self, rows: Rows, variance: FloatArray) -> Covariance:
+        """With more scatter of their own for some readings."""
+        own = self.own.copy()
+        own[rows] += variance
+        return replace(self, own=own)
+
+    def select(self, kept: NDArray[np.bool_] | Rows) -> Covariance:
+        """Of some of the readings."""
+        return Covariance(self.own[kept], Groups.by(self.groups.of[kept]), self.common, self.shared[:, kept])
+
+    def draw(self, rng: np.random.Generator, draws: int) -> FloatArray:
+        """(draws, n) normal scatter that readings have in common, without that of each reading on its own."""
+        common = np.sqrt(self.common) * rng.standard_normal((draws, self.groups.count))[:, self.groups.of]
+        return np.asarray(common + rng.standard_normal((draws, len(self.shared))) @ self.shared)
+
+    @cached_property
+    def precision(self) -> Precision:
+        """V^-1."""
+        return self._inverted[0]
+
+    @property
+    def log_determinant(self) -> float:
+        """Its logarithm, ln |V|."""
+        return self._inverted[1]
+
+    @cached_property
+    def _inverted(self) -> tuple[Precision, float]:
+        none = np.zeros((0, len(self.own)))
+        blocks = Precision(self.own, self.groups, self.common, none, none)
+        solved = blocks.times(self.shared)
+        lower = np.linalg.cholesky(np.eye(len(self.shared)) + solved @ self.shared.T)
+        determinant = np.log(self.own).sum() + np.log1p(self.common * blocks.weights).sum()
+        determinant += 2.0 * np.log(np.diag(lower)).sum()
+        return replace(blocks, factors=np.linalg.solve(lower, solved)), float(determinant)
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Inverse covariance of n readings, C^-1 - F^T F as above.
+
+    Attributes
+    ----------
+    own, groups, common
+        The blocks C, as in `Covariance`.
+    factors
+        F (q, n).
+    fitted
+        (p, n) X, of what a fit leaves: combinations of its unknowns with P = A - A X^T X A. Their rows X A are the last
+        of `factors`.
+    """
+
+    own: FloatArray
+    groups: Groups
+    common: float
+    factors: FloatArray
+    fitted: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.own)
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """(groups,) sum of 1 / own over each group."""
+        return self.groups.sums(1.0 / self.own)
+
+    @cached_property
+    def pull(self) -> FloatArray:
+        """(groups,) by how much of its weighted sum a group moves each of its readings.
+
+        (diag(d) + c 1 1^T)^-1 x = (x - 1 c sum(x / d) / (1 + c sum(1 / d))) / d   (Sherman and Morrison 1950).
+        """
+        return np.asarray(self.common / (1.0 + self.common * self.weights))
+
+    def _of_blocks(self, rows: FloatArray) -> FloatArray:
+        """C^-1 x of rows (..., n)."""
+        if self.groups.alone:
+            return rows / (self.own + self.common)
+        moved = self.pull * self.groups.sums(rows / self.own)
+        return np.asarray((rows - moved[..., self.groups.of]) / self.own)
+
+    def times(self, rows: FloatArray) -> FloatArray:
+        """(..., n) rows times the matrix."""
+        flat = rows.reshape(-1, rows.shape[-1])  # one product, not one for each leading index
+        shared = (flat @ self.factors.T) @ self.factors
+        return np.asarray(self._of_blocks(rows) - shared.reshape(rows.shape))
+
+    def squares(self, rows: FloatArray) -> FloatArray:
+        """(...,) of rows (..., n): each with itself."""
+        flat = rows.reshape(-1, rows.shape[-1])
+        over = flat / self.own
+        blocks = np.einsum("in,in->i", flat, over) - self.groups.sums(over) ** 2 @ self.pull
+        shared = flat @ self.factors.T
+        return np.asarray(blocks - np.einsum("iq,iq->i", shared, shared)).reshape(rows.shape[:-1])
+
+    def products(self, rows: FloatArray) -> FloatArray:
+        """(..., k, k) of rows (..., k, n): each with each of the same leading index. Cheaper than by `times`."""
+        over = rows / self.own
+        sums = self.groups.sums(over)
+        flat = rows.reshape(-1, rows.shape[-1]) @ self.factors.T
+        shared = flat.reshape(*rows.shape[:-1], len(self.factors))
+        found = rows @ np.swapaxes(over, -1, -2) - (sums * self.pull) @ np.swapaxes(sums, -1, -2)
+        return np.asarray(found - shared @ np.swapaxes(shared, -1, -2))
+
+    @cached_property
+    def diagonal(self) -> FloatArray:
+        """(n,)."""
+        blocks = (1.0 - self.pull[self.groups.of] / self.own) / self.own
+        return np.asarray(blocks - (self.factors**2).sum(axis=0))
+
+    def block(self, at: Rows) -> FloatArray:
+        """(..., k, k) some of its columns, of the same rows, for rows (..., k)."""
+        own, of, factors = self.own[at], self.groups.of[at], np.moveaxis(self.factors[:, at], 0, -2)
+        same = of[..., :, None] == of[..., None, :]
+        blocks = -(same * (self.pull[of] / own)[..., None, :]) / own[..., :, None]
+        diagonal = np.arange(at.shape[-1])
+        blocks[..., diagonal, diagonal] += 1.0 / own
+        return np.asarray(blocks - np.swapaxes(factors, -1, -2) @ factors)
+
+    def beside(self, fitted: FloatArray, prior: FloatArray) -> Precision:
+        """P = A - A J (J^T A J + prior)^-1 J^T A: of what a fit of p unknowns leaves of the readings.
+
+        `fitted` (p, n): J^T, by how much each unknown moves each reading; `prior` (p, p) information.
+        """
+        combined = inverse_root(self.times(fitted) @ fitted.T + prior).T @ fitted
+        factors = np.concatenate([self.factors, self.times(combined)])
+        return replace(self, factors=factors, fitted=np.concatenate([self.fitted, combined]))
+
+    def white(self, rows: FloatArray) -> FloatArray:
+        """(..., n) rows x R^T, where R^T R is this matrix: plain products of what comes out are weighted ones.
+
+        The blocks have the root (1 - u 1 1^T / d) / sqrt(d) with (1 - u sum(1 / d))^2 = 1 / (1 + c sum(1 / d)); what
+        the factors take is taken along their principal axes in that basis.
+        """
+        taken, share = self._axes
+        found = self._whitened_by_blocks(rows)
+        return np.asarray(found - ((found @ taken.T) * share) @ taken)
+
+    @cached_property
+    def _axes(self) -> tuple[FloatArray, FloatArray]:
+        """Principal axes (q, n) of the factors where the blocks are white, and the share to be taken off each."""
+        # F = G R with the blocks' root R, so that the rows of G are those of F brought back by the blocks.
+        back = self._whitened_by_blocks(self._times_blocks(self.factors))
+        _, length, axes = np.linalg.svd(back, full_matrices=False)
+        return axes, 1.0 - np.sqrt(np.maximum(1.0 - length**2, 0.0))
+
+    def _whitened_by_blocks(self, rows: FloatArray) -> FloatArray:
+        lost = (1.0 - 1.0 / np.sqrt(1.0 + self.common * self.weights)) / self.weights
+        moved = lost * self.groups.sums(rows / self.own)
+        return np.asarray((rows - moved[..., self.groups.of]) / np.sqrt(self.own))
+
+    def _times_blocks(self, rows: FloatArray) -> FloatArray:
+        """C x of rows (..., n)."""
+        return np.asarray(rows * self.own + self.common * self.groups.sums(rows)[..., self.groups.of])
+
+
+class Widening:
+    """The inverse covariance of n readings while some get more scatter of their own, one after the other.
+
+    More scatter v of a reading takes one rank off the inverse, its column c there times c^T v / (1 + v c_row) (Sherman
+    and Morrison 1950): another row of `Precision.factors`. After `MOST_RANKS` of them the inverse is worked out anew
+    from the covariance, so that a column costs n times their number at most, however many readings were widened before.
+    """
+
+    def __init__(self, covariance: Covariance) -> None:
+        self._groups, self._members = covariance.groups, covariance.groups.members()
+        self._begin(covariance)
+
+    def _begin(self, covariance: Covariance) -> None:
+        self._covariance, self._precision = covariance, covariance.precision
+        factors = self._precision.factors
+        self._factors = np.concatenate([factors, np.empty((MOST_RANKS, len(covariance)))])
+        self._ranks, self._first = len(factors), len(factors)
+        self._more = np.zeros(len(covariance))
+
+    def column(self, row: int) -> FloatArray:
+        """(n,) a column of the inverse as it stands."""
+        factors, own, group = self._factors[: self._ranks], self._precision.own, self._groups.of[row]
+        members = self._members[group]
+        found = -(factors[:, row] @ factors)
+        found[members] -= self._precision.pull[group] / own[row] / own[members]
+        found[row] += 1.0 / own[row]
+        return np.asarray(found)
+
+    def widen(self, row: int, variance: float) -> tuple[FloatArray, float]:
+        """Add to a reading's own variance: takes column x column^T share off the inverse; (n,) that column, the share.
+
+        Both are of the inverse as it was before.
+        """
+        column = self.column(row)
+        share = variance / (1.0 + variance * float(column[row]))
+        if self._ranks == self._first + MOST_RANKS:
+            rows = np.flatnonzero(self._more)
+            self._begin(self._covariance.widened(rows, self._more[rows]))
+        self._factors[self._ranks] = column * np.sqrt(share)
+        self._ranks += 1
+        self._more[row] += variance
+        return column, share
+
+
+def inverse_root(information: FloatArray) -> FloatArray:
+    """(p, r) R with R R^T the (pseudo-)inverse of an information matrix (p, p) of rows in very different units."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    kept = values > 1e-15 * values[-1]
+    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])
+
+
+LEFT = 1e-10  # share of a covariance's variance that its features may leave
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A covariance between n readings by its columns: `column(i)` (n,), and its `diagonal` (n,)."""
+
+    column: Callable[[int], FloatArray]
+    diagonal: FloatArray
+
+    def __mul__(self, other: Kernel) -> Kernel:
+        """Element by element, which is a covariance again (Schur's product theorem)."""
+        return Kernel(lambda i: self.column(i) * other.column(i), self.diagonal * other.diagonal)
+
+    @property
+    def varies(self) -> bool:
+        """Whether it is finite, and more than one number throughout."""
+        first, scale = self.column(0), float(self.diagonal.mean())
+        finite = np.isfinite(first).all() and np.isfinite(self.diagonal).all()
+        off = max(np.abs(first - self.diagonal[0]).max(), np.abs(self.diagonal - self.diagonal[0]).max())
+        return bool(finite and scale > 1e-12 and off > 1e-9 * scale)
+
+    def features(self, most: int) -> FloatArray:
+        """(n, r) L with L L^T the covariance, scaled to a mean diagonal of 1.
+
+        By Cholesky's factorisation with complete pivoting: features of the readings that are known least come first
+        (Higham 2002, Accuracy and Stability of Numerical Algorithms, 10.3).
+        """
+        scale = float(self.diagonal.mean())
+        left = self.diagonal / scale
+        found = np.empty((min(most, len(left)), len(left)))
+        for r in range(len(found)):
+            at = int(np.argmax(left))
+            if left.sum() <= LEFT * len(left) or left[at] <= 0.0:
+                return found[:r].T
+            column = self.column(at) / scale - found[:r, at] @ found[:r]
+            found[r] = column / np.sqrt(left[at])
+            left = np.maximum(left - found[r] ** 2, 0.0)
+            left[at] = 0.0
+        return found.T
+
+
+def gaussian_kernel(x: FloatArray) -> Kernel:
+    """Smooth in x (n, k), whose range is 1."""
+    return Kernel(lambda i: np.exp(-0.5 * ((x - x[i]) ** 2).sum(axis=1)), np.ones(len(x)))
+
+
+def linear_kernel(x: FloatArray, power: int = 1) -> Kernel:
+    """Linear in x (n, k), or a power of that."""
+    return Kernel(lambda i: (x @ x[i]) ** power, (x**2).sum(axis=1) ** power)
+
+
+def same_kernel(labels: NDArray[Any]) -> Kernel:
+    """Alike for readings with the same label (n,)."""
+    return Kernel(lambda i: (labels == labels[i]).astype(float), np.ones(len(labels)))

@@ -1,0 +1,154 @@
+"""Effects whose form was read off measurements: the same measurements cannot confirm them.
+
+A form that was drawn through residuals fits them; that it does says nothing of other readings. So an effect carries the
+marks of the readings that it was drawn from (`Effect.described_from`), and where they are among the readings that are
+judged, it is `described`, not `identified`, until the others confirm it. They do if they are foretold better with the
+effect than by any explanation without it that was tested, `none` among them: each of their points is left out in turn,
+sizes and strut law are fitted to all the rest, and the log probability of what was left out, added up over the points,
+must be higher by more than `CONFIRMS`.
+
+A form that says nothing true of new readings, sized by the old ones, loses with them on average; that it gains
+`CONFIRMS` all the same has a chance below 1 %: its gain is normal of mean -s^2 / 2 and variance s^2, and
+(3 + s^2 / 2) / s is never less than sqrt(6). Where none of the readings is among those that it was drawn from, it is an
+effect like any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypedDict
+
+import numpy as np
+
+from toolpath_stiff.arrays import BoolArray
+from toolpath_stiff.inference.covariances import Groups
+from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.fits import held_out
+from toolpath_stiff.inference.noise import Scatter
+from toolpath_stiff.readings.measurements import Measurements, reading_marks
+from toolpath_stiff.stiffness.contract import Effect, joined
+from toolpath_stiff.units import json_number
+
+CONFIRMS = 3.0  # log probability that new readings must gain: odds of 20 to 1, strong evidence (Kass and Raftery 1995)
+
+
+FEWEST_POINTS = 2  # of new readings: one pose alone cannot confirm a form
+
+
+class DrawnEntry(TypedDict):
+    """Effects whose form was read off some of the readings, and what the others say of them."""
+
+    effects: list[str]
+    readings_seen: int
+    readings_new: int
+    gain: float | None
+    rival: str
+    confirmed: bool
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """An explanation with effects that were drawn from some of the readings that judge it.
+
+    Attributes
+    ----------
+    names
+        Those effects.
+    seen, new
+        How many readings they were drawn from, and how many others there are.
+    gain, rival
+        Log probability of the new readings above that under the best explanation without these effects, and which that
+        is; nan and "" where too few points are new.
+    """
+
+    names: tuple[str, ...]
+    seen: int
+    new: int
+    gain: float = np.nan
+    rival: str = ""
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the new readings confirm them."""
+        return self.gain > CONFIRMS
+
+    @property
+    def document(self) -> DrawnEntry:
+        """The same for `diagnose.json`."""
+        return {
+            "effects": list(self.names),
+            "readings_seen": self.seen,
+            "readings_new": self.new,
+            "gain": json_number(self.gain, 4),
+            "rival": self.rival,
+            "confirmed": self.confirmed,
+        }
+
+    @property
+    def reason(self) -> str:
+        """Why it is confirmed or not, a sentence without its full stop."""
+        said = f"the form of {joined(self.names)} was read off "
+        if not self.new:
+            return f"{said}these very readings, and that it fits them says nothing of others"
+        said += f"{self.seen} of these {self.seen + self.new} readings"
+        if np.isnan(self.gain):
+            return f"{said}, and the {self.new} others are of fewer than {FEWEST_POINTS} points: too few to confirm it"
+        against = f"{self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms it)"
+        if self.confirmed:
+            return f"{said}; the {self.new} others confirm it: their log probability, foretold, is {against}"
+        return f"{said}; the {self.new} others do not confirm it: their log probability, foretold, is {against}"
+
+
+def seen_readings(effects: Sequence[Effect], data: Measurements) -> BoolArray:
+    """(n,) which readings any of these effects was drawn from."""
+    marks = {mark for effect in effects for mark in effect.described_from}
+    return np.isin(reading_marks(data), sorted(marks)) if marks else np.zeros(len(data), dtype=bool)
+
+
+def drawn(fit: Fit, others: Mapping[str, Fit], data: Measurements) -> Drawn | None:
+    """How an explanation stands if its effects are drawn from the readings; None if none of them is.
+
+    Parameters
+    ----------
+    fit
+        The explanation.
+    others
+        Explanations by name, `none` among them; those with effects that were drawn from these readings are passed over.
+    data
+        The n readings.
+    """
+
+    def drawn_here(one: Fit) -> list[Effect]:
+        return [c.effect for c in one.candidates if seen_readings([c.effect], data).any()]
+
+    effects = drawn_here(fit)
+    if not effects:
+        return None
+    seen = seen_readings(effects, data)
+    found = Drawn(tuple(effect.name for effect in effects), int(seen.sum()), int((~seen).sum()))
+    if len(np.unique(data.point[~seen])) < FEWEST_POINTS:
+        return found
+    gains = {
+        name: foretold(fit, data, seen, one.scatter) - foretold(one, data, seen, one.scatter)
+        for name, one in others.items()
+        if not drawn_here(one)
+    }
+    rival = min(gains, key=lambda name: gains[name])
+    return replace(found, gain=gains[rival], rival=rival)
+
+
+def foretold(fit: Fit, data: Measurements, seen: BoolArray, scatter: Scatter) -> float:
+    """Log probability of the readings that are not `seen`, each point left out in turn, up to a constant.
+
+    Given all other readings r_s, the left-out ones are normal: with A the inverse covariance of all residuals r, their
+    weighted squares are (A r)_o^T A_oo^-1 (A r)_o (Rasmussen and Williams 2006, Gaussian Processes, A.6).
+    """
+    labels = np.where(seen, "seen", np.char.add("new ", data.point))
+    moves = held_out(replace(fit, scatter=scatter), labels).moves
+    precision, squares = scatter.precision, 0.0
+    for move, out in zip(moves, Groups.by(labels).members(), strict=True):
+        if not seen[out[0]]:
+            pull = precision.times(fit.residual - fit.jacobian @ move)[out]
+            squares += float(pull @ np.linalg.solve(precision.block(out), pull))
+    return -0.5 * squares

@@ -1,0 +1,383 @@
+"""Two gates: is a model good enough, and is a candidate better than the best of many would be by chance.
+
+Both by parametric bootstrap: readings are simulated from the noise model at the fit, wild ones and the uncertainty of
+the noise itself included, and go through the same linearised refit and the same search for wild readings as the real
+ones. Compared are
+
+- the weighted sum of squares, chi-square's place without its assumptions;
+- structure: the score statistic of each form of discrepancy (locally most powerful for a little of that form; Lin 1997,
+  Variance component testing in generalised linear models with random effects), the largest of all forms;
+- for the base model, the largest gain that any candidate achieves.
+
+The bootstrapped distribution of the smallest p value makes one test of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.covariances import (
+    Covariance,
+    Kernel,
+    Precision,
+    gaussian_kernel,
+    linear_kernel,
+    same_kernel,
+)
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.noise import Noise, Scatter
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.tails import surprise
+
+DRAWS = 400
+
+
+RIDGE = 1e-12  # on the diagonal where readings are set aside: two that a fit explains entirely are not told apart
+
+
+# Squared deleted residual beyond which a reading is set aside, and share of readings that may be: what pays the price
+# of `scatter` where one reading in fifty is wild.
+WILD_SQUARED, MOST_WILD = 11.3, 0.05
+
+
+CHANCE = 0.05  # share of campaigns in which the best of all candidates gains as much by chance
+
+
+HOPELESS = 1.3  # times the largest simulated sum of squares
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Outcome of the absolute test of one fit.
+
+    Attributes
+    ----------
+    probability
+        Of residuals that look worse than these if the model were right.
+    squares, simulated
+        Weighted sum of squares, and (DRAWS,) simulated ones.
+    structure_probability, worst
+        Of the structure alone; the form that sticks out most, in words.
+    gain_probability
+        Of the largest gain of any candidate; 1 where it was not asked.
+    gain_threshold
+        Gain that the best of all candidates reaches by chance in one campaign of twenty; 0 where it was not asked.
+    """
+
+    probability: float
+    squares: float
+    simulated: FloatArray
+    squares_probability: float
+    structure_probability: float
+    worst: str
+    gain_probability: float = 1.0
+    gain_threshold: float = 0.0
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """Simulated scatter of ln readings, shared by all tests of one data set.
+
+    Attributes
+    ----------
+    draws
+        (DRAWS, n) scatter, each already divided by the error of its noise estimate.
+    """
+
+    draws: FloatArray
+
+    @classmethod
+    def of(cls, noise: Noise, covariance: Covariance, seed: int, draws: int = DRAWS) -> Simulator:
+        """From a noise model and its covariance."""
+        rng = np.random.default_rng(seed)
+        shape = (draws, len(covariance))
+        shared = covariance.draw(rng, draws)
+        wide = np.where(rng.random(shape) < noise.outliers, noise.outlier_width, 1.0)
+        scatter = shared + noise.repeat * wide * rng.standard_normal(shape)
+        if np.isfinite(noise.freedom):
+            scatter = scatter / np.sqrt(rng.chisquare(noise.freedom, draws) / noise.freedom)[:, None]
+        return cls(scatter)
+
+
+@dataclass(frozen=True)
+class Aside:
+    """Residuals r of s sets of n readings without what is wild in them.
+
+    Attributes
+    ----------
+    pulls
+        (s, n) P r as if the wild readings had not been taken.
+    taken
+        (s, n) what that takes off the residuals: nothing but at wild readings.
+    count
+        (s,) wild readings.
+    """
+
+    pulls: FloatArray
+    taken: FloatArray
+    count: FloatArray
+
+
+def set_wild_aside(pulls: FloatArray, projected: Precision, scatter: Scatter | None = None) -> Aside:
+    """Set aside in pulls P r (s, n) the readings that are far off what all others say of them, as `scatter` has it."""
+    beyond, share = (WILD_SQUARED, MOST_WILD) if scatter is None else (scatter.beyond, scatter.most)
+    squared = pulls**2 / np.maximum(projected.diagonal, 1e-12)
+    most = max(1, int(share * pulls.shape[1]))
+    taken = np.zeros_like(pulls)
+    count = np.minimum((squared > beyond).sum(axis=1), most)
+    furthest = np.argsort(-squared, axis=1, kind="stable")[:, : count.max(initial=0)]
+    for size in np.unique(count[count > 0]).tolist():
+        sets = np.flatnonzero(count == size)
+        rows = furthest[sets, :size]
+        block = projected.block(rows) * (1.0 + RIDGE * np.eye(size))
+        taken[sets[:, None], rows] = np.linalg.solve(block, np.take_along_axis(pulls[sets], rows, 1)[..., None])[..., 0]
+    return Aside(pulls - projected.times(taken), taken, count.astype(float))
+
+
+class Forms:
+    """Forms of discrepancy as the scatter sees them, worked out once for all fits to the same readings.
+
+    A form is a covariance K = L L^T between readings with features L (n, r). Under the inverse covariance P = A - G^T G
+    of what a fit leaves, G = X A, all that is asked of it are L^T P L = L^T A L - (G L)^T (G L), and L^T P r of
+    residuals r: a fit costs some products with the few rows of X.
+
+    Parameters
+    ----------
+    features
+        Form in words -> (n, r).
+    precision
+        A, inverse covariance of the readings.
+    """
+
+    def __init__(self, features: Mapping[str, FloatArray], precision: Precision) -> None:
+        self.names = tuple(features)
+        solved = [precision.times(one.T).T for one in features.values()]
+        self.own = [one.T @ mine for one, mine in zip(features.values(), solved, strict=True)]  # L^T A L
+        self.solved = np.ascontiguousarray(np.concatenate([*solved, np.zeros((len(precision), 0))], axis=1))  # A L
+        ends = np.cumsum([0, *(one.shape[1] for one in solved)])
+        self.slices = [slice(*pair) for pair in pairwise(ends.tolist())]
+        self._drawn: tuple[FloatArray | None, FloatArray] = None, np.zeros((0, 0))
+
+    def of_draws(self, draws: FloatArray) -> FloatArray:
+        """(s, all features) L^T A r of simulated residuals (s, n), kept for the next fit."""
+        if self._drawn[0] is not draws:
+            self._drawn = draws, draws @ self.solved
+        return self._drawn[1]
+
+
+class Structure:
+    """Fit statistics of the forms of discrepancy for one fit, as surprises: -ln of a tail probability.
+
+    r^T P K P r is a weighted sum of chi-squares; its tail is that of one scaled chi-square with the same mean tr(P K)
+    and variance 2 tr(P K P K) (Satterthwaite 1946). The bootstrap corrects what the approximation gets wrong.
+    """
+
+    def __init__(self, forms: Forms, projected: Precision) -> None:
+        self.forms, self.fitted = forms, projected.fitted
+        self.removed = projected.factors[len(projected.factors) - len(self.fitted) :]  # G
+        self.reached = self.fitted @ forms.solved  # G L, all forms
+        inner = [self.inner(k) for k in range(len(forms.names))]
+        self.means = np.array([np.trace(one) for one in inner])
+        self.variances = np.array([max(2.0 * (one**2).sum(), 1e-300) for one in inner])
+
+    def inner(self, k: int) -> FloatArray:
+        """(r, r) L^T P L of form k."""
+        reached = self.reached[:, self.forms.slices[k]]
+        return np.asarray(self.forms.own[k] - reached.T @ reached)
+
+    def loads(self, residuals: FloatArray, taken: FloatArray, known: FloatArray | None = None) -> FloatArray:
+        """(s, all features) L^T P (r - taken) of residuals (s, n); `known`: L^T A r."""
+        whole = residuals @ self.forms.solved if known is None else known.copy()
+        for s in np.flatnonzero(taken.any(axis=1)).tolist():
+            some = np.flatnonzero(taken[s])  # few readings of each set
+            whole[s] -= taken[s, some] @ self.forms.solved[some]
+        return np.asarray(whole - (residuals - taken) @ self.removed.T @ self.reached)
+
+    def surprises(self, loads: FloatArray) -> FloatArray:
+        """(s, forms) of loads (s, all features)."""
+        if not self.forms.names:
+            return np.zeros((len(loads), 1))
+        value = np.stack([(loads[:, part] ** 2).sum(axis=1) for part in self.forms.slices], axis=1)
+        return surprise(value * 2.0 * self.means / self.variances, 2.0 * self.means**2 / self.variances)
+
+
+def absolute_gate(
+    problem: Problem,
+    residual: FloatArray,
+    jacobian: FloatArray,
+    simulator: Simulator,
+    forms: Forms,
+    signatures: Sequence[Sequence[FloatArray]] = (),
+    gain: float = 0.0,
+) -> Gate:
+    """Test a fit, its residual (n,) and jacobian (n, 2 + p), against its own noise.
+
+    `signatures`: for the base model, one-sided signatures (n, p) of the candidates, to judge `gain`, the largest
+    twice-log-likelihood gain of any of them.
+    """
+    projected = problem.projected(jacobian)
+    # What the linearised refit leaves of the data is their residual; the law's prior pulls as in the simulation.
+    observed = set_wild_aside(projected.times(residual[None]), projected, problem.scatter)
+    drawn = set_wild_aside(projected.times(simulator.draws), projected, problem.scatter)
+    squares = _quadratic(problem, drawn)
+    observed_squares = float(_quadratic(problem, observed)[0])
+    structure = Structure(forms, projected)
+    seen = structure.surprises(structure.loads(residual[None], observed.taken))
+    # Squares far beyond all simulated ones settle it; what the structure would look like by chance matters no more.
+    if not signatures and observed_squares > HOPELESS * squares.max():
+        simulated = np.zeros((len(squares), seen.shape[1]))
+    else:
+        known = forms.of_draws(simulator.draws)
+        simulated = structure.surprises(structure.loads(simulator.draws, drawn.taken, known))
+    # Rows: the data, then every draw; columns: what may look bad, larger is worse.
+    looks = [np.concatenate([[observed_squares], squares]), np.concatenate([seen, simulated]).max(axis=1)]
+    if signatures:
+        looks.append(np.concatenate([[gain], largest_gain(drawn.pulls, projected, signatures)]))
+    ranked = np.stack([_tail(look, look[1:]) for look in looks], axis=1)
+    smallest = ranked.min(axis=1)
+    probability = float(max((smallest[1:] <= smallest[0] + 1e-12).mean(), 0.5 / len(squares)))
+    worst = forms.names[int(np.argmax(seen[0]))] if forms.names else ""
+    return Gate(
+        probability,
+        observed_squares,
+        np.asarray(squares),
+        float(ranked[0, 0]),
+        float(ranked[0, 1]),
+        worst,
+        float(ranked[0, 2]) if signatures else 1.0,
+        float(np.quantile(looks[2][1:], 1.0 - CHANCE)) if signatures else 0.0,
+    )
+
+
+def gain_threshold(
+    problem: Problem, jacobian: FloatArray, simulator: Simulator, signatures: Sequence[Sequence[FloatArray]]
+) -> float:
+    """Twice-log-likelihood gain that the best of all candidates reaches by chance in one campaign of twenty."""
+    projected = problem.projected(jacobian)
+    drawn = set_wild_aside(projected.times(simulator.draws), projected, problem.scatter)
+    return float(np.quantile(largest_gain(drawn.pulls, projected, signatures), 1.0 - CHANCE))
+
+
+def _quadratic(problem: Problem, aside: Aside) -> FloatArray:
+    """(s,) r^T P r from the pulls P r, wild readings at their price.
+
+    P V P = P but for the law's prior, which is next to nothing.
+    """
+    return problem.scatter.covariance.squares(aside.pulls) + problem.scatter.beyond * aside.count
+
+
+def _tail(values: FloatArray, simulated: FloatArray) -> FloatArray:
+    """(s,) share of the simulated values at or above each value; half of one where none is."""
+    ordered = np.sort(simulated)
+    count = len(ordered) - np.searchsorted(ordered, values - 1e-12 * np.abs(values))
+    return np.asarray(np.maximum(count, 0.5) / len(ordered))
+
+
+def largest_gain(pulls: FloatArray, projected: Precision, signatures: Sequence[Sequence[FloatArray]]) -> FloatArray:
+    """(s,) largest likelihood-ratio gain over candidates; each a list of matrices (n, p) with sizes >= 0."""
+    best = np.zeros(len(pulls))
+    for subsets in signatures:
+        for columns in subsets:
+            slope = pulls @ columns
+            information = projected.times(columns.T) @ columns
+            scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+            try:
+                sizes = np.linalg.solve(information / np.outer(scale, scale), (slope / scale).T).T
+            except np.linalg.LinAlgError:
+                continue
+            gain = np.einsum("sp,sp->s", sizes, slope / scale)
+            best = np.maximum(best, np.where((sizes > 0.0).all(axis=1), gain, 0.0))
+    return best
+
+
+# Ranges over which a smooth discrepancy stays alike; assumed: about half a workspace, half a tilting range, a few
+# turns of a screw, a third of a campaign.
+RANGE_POSITION, RANGE_ANGLE, RANGE_LENGTH, RANGE_ORDER = 0.25, np.radians(15.0), 0.05, 0.3
+
+
+# Features of a form, and of the one that has one for each point and direction: what varies faster is left out.
+MOST_FEATURES, MOST_POINTS = 300, 2000
+
+
+def discrepancy_forms(predictor: Predictor) -> dict[str, FloatArray]:
+    """What a discrepancy may look like, in words -> features (n, r) of its covariance; only forms that vary.
+
+    Worked out once for a set of readings.
+    """
+    key = ("forms of discrepancy",)
+    if key not in predictor.tables:
+        kernels = {words: kernel for words, kernel in _kernels(predictor).items() if kernel.varies}
+        predictor.tables[key] = {
+            words: kernel.features(MOST_POINTS if words == POINT_TO_POINT else MOST_FEATURES)
+            for words, kernel in kernels.items()
+        }
+    found: dict[str, FloatArray] = predictor.tables[key]
+    return found
+
+
+POINT_TO_POINT = "from point to point, different by direction"
+
+
+def _kernels(predictor: Predictor) -> dict[str, Kernel]:
+    """Every form in words, and its covariance."""
+    data = predictor.data
+    same_direction = linear_kernel(data.direction, 2)
+    near = gaussian_kernel(np.concatenate([data.position / RANGE_POSITION, data.angles / RANGE_ANGLE], axis=1))
+    place = np.concatenate([_centred(data.position / RANGE_POSITION), _centred(data.angles / RANGE_ANGLE)], axis=1)
+    linear = linear_kernel(place)
+    in_order = gaussian_kernel(np.linspace(0.0, 1.0, len(data))[:, None] / RANGE_ORDER)
+    share = predictor.strut_columns()
+    struts = linear_kernel(share)
+    forms = {
+        "smooth over the workspace": near,
+        "smooth over the workspace, different by direction": near * same_direction,
+        "linear over the workspace, different by direction": linear * same_direction,
+        "curved over the workspace, different by direction": linear_kernel(place, 2) * same_direction,
+        # Point by point: the same pose and tool, whatever the repeat.
+        POINT_TO_POINT: same_kernel(data.point) * same_direction,
+        "in the course of the campaign": in_order,
+        "in the course of the campaign, different by direction": in_order * same_direction,
+        "in the course of the campaign, over the workspace": in_order * linear * same_direction,
+        "of single struts in the course of the campaign": struts * in_order,
+        "of single struts with their length": _by_length(share, predictor.strut_lengths() / RANGE_LENGTH),
+        "of struts in tension against compression": linear_kernel(share * np.sign(predictor.strut_forces())),
+        "of single struts over the workspace": struts * near,
+    }
+    columns = {"with the load": np.log(data.force), "with the tool length": data.tool_extension}
+    if "time_min" not in data.missing:
+        columns["with the time since zeroing"] = data.time
+    if "temperature_C" not in data.missing:
+        columns["with the temperature"] = data.temperature
+    columns |= {f"with the column {name}": column for name, column in data.extra.items()}
+    for words, column in columns.items():
+        forms |= _by_column(column, words, same_direction, near)
+    if len(set(data.setup.tolist())) > 1:
+        forms["between set-ups, different by direction"] = same_kernel(data.setup) * same_direction
+    return forms
+
+
+def _by_length(share: FloatArray, length: FloatArray) -> Kernel:
+    """Each strut's own course over its length (n, 6), as far as the strut has a share (n, 6) in the compliance."""
+    return Kernel(
+        lambda i: (share * share[i] * np.exp(-0.5 * (length - length[i]) ** 2)).sum(axis=1), (share**2).sum(axis=1)
+    )
+
+
+def _by_column(column: FloatArray, words: str, same_direction: Kernel, near: Kernel) -> dict[str, Kernel]:
+    if not np.isfinite(column).all() or np.ptp(column) == 0.0:
+        return {}
+    product = linear_kernel(_centred(column[:, None] / float(np.ptp(column))))
+    return {
+        words: product,
+        f"{words}, different by direction": product * same_direction,
+        f"{words}, over the workspace": product * near * same_direction,
+    }
+
+
+def _centred(x: FloatArray) -> FloatArray:
+    return np.asarray(x - x.mean(axis=0))

@@ -1,0 +1,547 @@
+"""From readings to a verdict: the whole way on this page, a function and a type a step.
+
+| step | function | gives |
+| --- | --- | --- |
+| read | `measurements.read_measurements` | `Measurements`: readings as columns |
+| noise | `noise.noise_models` | `Noise`: how far readings scatter for reasons that no model explains |
+| | `evidence.Problem.of` | `Problem`: readings, model and scatter together |
+| candidates | `find_candidates` | `Candidates`: every effect fitted as far as a table of its compliance goes |
+| fits | `Fits` | `Fit`: the likely ones once more with the model itself, each when it is asked for |
+| gates | `apply_gates` | `Gates`: which explanations leave no more than noise would |
+| probabilities | `weigh` | `Probabilities` of those that pass |
+| verdict | `decide` | `Judgement`: the verdict, the explanations that hold the truth, all of the above |
+
+`judge` takes the steps from the candidates on, under one noise model; `diagnosis.diagnose` all of them, under each
+noise model that the data allow.
+
+Two gates. Absolute: a hypothesis must leave residuals that its own noise explains. Relative: among those that do, the
+posterior probabilities decide; only a name far ahead of all others is given as the answer.
+
+adequate      nothing is missing that these data could show
+identified    one effect (or pair, or triple) explains the data, far likelier than any other
+described     the same, but its form was read off these very readings, and no others have confirmed it (`drawn`)
+ambiguous     several explain them, and none is far likelier than the others
+unexplained   something is missing, and nothing in the catalogue accounts for it; or the readings do not look as if
+              they were of this machine at all (`question`)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import comb
+
+import numpy as np
+
+from toolpath_stiff.inference.candidates import EXPECTED
+from toolpath_stiff.inference.doubts import noise_doubt
+from toolpath_stiff.inference.drawn import Drawn, drawn
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.fits import refine
+from toolpath_stiff.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.inference.hypotheses import (
+    Family,
+    Unexcluded,
+    discrepancy_evidence,
+    not_excluded,
+    probabilities,
+    score_families,
+    signatures,
+)
+from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.several import Combination, search_pairs, search_triples
+from toolpath_stiff.stiffness.contract import Effect
+
+NONE = "none"
+
+
+OUTSIDE = "outside the catalogue"
+
+
+# What is expected before anything is measured; assumed. Whoever measures has a reason, but most machines are sound.
+PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_TRIPLES, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.03, 0.10
+
+
+FALSE_ALARM = 0.05  # of the base model's gate
+
+
+ADEQUATE = 0.005  # below this probability an explanation does not explain the data
+
+
+NAMED = 0.90  # probability from which a single name is the answer
+
+
+HELD = 0.95  # probability that the plausible set adds up to where it is not a single name
+
+
+STANDS = 0.05  # probability from which something outside the catalogue, or another pair, is not ruled out
+
+
+TESTED = 4  # candidates, besides all those that matter, that go through the absolute gate
+
+
+FAR = 8.0  # log evidence behind the best adequate candidate at which the others cannot matter
+
+
+SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alone
+
+
+# Odds below which a second effect is not considered where one suffices: "positive" evidence begins at 3 (Kass and
+# Raftery 1995, Bayes factors).
+POSITIVE = 3.0
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the data say under one noise model.
+
+    Attributes
+    ----------
+    verdict
+        See above.
+    explanations
+        Hypotheses, the most likely first, that hold the truth with 95 % probability: effects, `none`, "a + b".
+    problem, noise
+        Data and scatter.
+    base, base_gate
+        The model with its strut law refitted, and its absolute test.
+    families
+        All effects, most likely first.
+    gates, fits
+        Effect (or "a + b") -> its absolute test and final fit, where they were made.
+    pairs
+        Pairs tried, and triples, most likely first.
+    probability
+        Hypothesis -> posterior probability: effects, `none`, "a + b", `OUTSIDE`. Hypotheses that fail the absolute gate
+        have none unless nothing passes.
+    form
+        The form of discrepancy that stands out, in words; "" if none was looked for.
+    question
+        Whether these are readings of this machine, and why it is asked; "" where nothing says that they are not.
+    doubt, noise_factor
+        That the noise is not what was stated; "" where nothing says so. And how many times as large a stated one would
+        have to be for the model alone to leave what it leaves; 1 where it may be right, or repeats tell.
+    drawn
+        How the answer stands if its form was read off these readings; None otherwise.
+    """
+
+    verdict: str
+    explanations: tuple[str, ...]
+    problem: Problem
+    noise: Noise
+    base: Fit
+    base_gate: Gate
+    families: tuple[Family, ...]
+    gates: dict[str, Gate]
+    fits: dict[str, Fit]
+    pairs: tuple[Combination, ...]
+    probability: dict[str, float]
+    form: str
+    question: str = ""
+    doubt: str = ""
+    noise_factor: float = 1.0
+    drawn: Drawn | None = None
+
+    @property
+    def explained(self) -> bool:
+        """Whether an explanation stands, the model alone among them."""
+        return self.verdict != "unexplained"
+
+    @property
+    def plausible(self) -> tuple[str, ...]:
+        """Names of the effects in `explanations`, each once."""
+        return tuple(dict.fromkeys(name for one in self.explanations for name in one.split(" + ")))
+
+    @property
+    def likeliest(self) -> Fit:
+        """The fit of the likeliest hypothesis: of those left standing, else the closest."""
+        for name in self.explanations:
+            if name == NONE or name in self.fits:
+                return self.fits.get(name, self.base)
+        return max(self.fits.values(), key=lambda fit: fit.log_posterior, default=self.base)
+
+    def family(self, name: str) -> Family:
+        """The family of an effect."""
+        return next(family for family in self.families if family.name == name)
+
+
+def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) -> Judgement:
+    """Search all candidates, test them, and come to a verdict under one noise model.
+
+    Parameters
+    ----------
+    problem, noise
+        Readings, model and scatter; the noise model behind the scatter.
+    effects
+        What may be missing.
+    seed
+        Of the simulated readings.
+    """
+    candidates = find_candidates(problem, effects)
+    fits = Fits(problem)
+    gates = apply_gates(problem, noise, candidates, fits, seed)
+    weighed = weigh(problem, noise, candidates, gates)
+    asked = question(problem.predictor)
+    verdict, explanations = ("unexplained", ()) if asked else decide(gates, weighed)
+    doubt, factor = ("", 1.0) if asked else noise_doubt(problem, noise, gates.base, verdict, seed)
+    described = None
+    if verdict == "identified":
+        described = drawn(fits.made[explanations[0]], {NONE: candidates.base, **fits.made}, problem.predictor.data)
+        verdict = verdict if described is None or described.confirmed else "described"
+    return Judgement(
+        verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked, noise.remark or doubt, factor, described,
+    )  # fmt: skip
+
+
+FACTOR = float(np.exp(4.0 * LAW_PRIOR))  # of the median reading to the model: four standard deviations of the strut law
+
+
+# Correlation of ln measured with ln modelled below which the readings do not follow the model. Hidden effects that
+# change the stiffness by 30 % leave 0.8 and more, readings of other machines or in another order 0.3 and less.
+FOLLOWS = 0.5
+
+
+NOTHING = 1e-6  # of the model's own variation: less is rounding
+
+
+TELLS = EXPECTED[1]  # sd of ln modelled over the readings from which it is asked: as large as the largest effect
+
+
+FEWEST_FOLLOWING = 6  # readings that differ in what mechanics sees
+
+
+def question(predictor: Predictor) -> str:
+    """Whether these are readings of this machine, with the reason to ask; "" where there is none."""
+    reason = _unlike(predictor)
+    return f"Are these readings of this machine? {reason}." if reason else ""
+
+
+def _unlike(predictor: Predictor) -> str:
+    """In what the readings are unlike the model's, a sentence without its full stop; "" where they may be its own."""
+    tip = predictor.data.tip
+    model, which = predictor.log_stiffness()[tip], np.unique(predictor.distinct[tip], return_inverse=True)[1]
+    residual = np.log(predictor.data.stiffness[tip]) - model
+    if not np.isfinite(residual).all():
+        return ""
+    ratio = float(np.exp(np.median(residual)))
+    if not 1.0 / FACTOR < ratio < FACTOR:
+        times = f"{ratio:.2g} times" if ratio > 1.0 else f"1 / {1.0 / ratio:.2g} of"
+        return f"The median reading is {times} what the model says"
+    count = np.bincount(which)
+    modelled = np.bincount(which, weights=model) / count
+    measured = modelled + np.bincount(which, weights=residual) / count
+    if len(count) < FEWEST_FOLLOWING or float(modelled.std()) < TELLS:
+        return ""
+    spread = float(measured.std())
+    centred = (measured - measured.mean()) @ (modelled - modelled.mean()) / len(count)
+    correlation = float(centred) / (spread * float(modelled.std())) if spread > NOTHING * float(modelled.std()) else 0.0
+    if correlation >= FOLLOWS:
+        return ""
+    if correlation == 0.0:
+        return "The readings are all alike, where the model says that they differ"
+    return (
+        f"They do not follow the model from pose to pose and direction to direction: the correlation of "
+        f"their logarithms is {correlation:.2f}, of this machine it would be {FOLLOWS:g} or more"
+    )
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Everything that was searched, on tables of added compliance.
+
+    Attributes
+    ----------
+    base
+        The model with its strut law refitted, without a further effect.
+    families
+        All effects that do something to these data, the most likely first.
+    forms
+        Forms that a discrepancy may take which no effect describes.
+    """
+
+    base: Fit
+    families: tuple[Family, ...]
+    forms: Forms
+
+    @property
+    def offered(self) -> list[Family]:
+        """Effects that fit best when they are there."""
+        return [family for family in self.families if family.best is not None]
+
+
+def find_candidates(problem: Problem, effects: Sequence[Effect]) -> Candidates:
+    """Fit every effect with each of its choices beside the strut law."""
+    base = problem.score_base()
+    families = score_families(problem, effects, base)
+    forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
+    return Candidates(base, tuple(families), forms)
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Final fits with the model itself; each is made when it is first asked for, since few of them are needed."""
+
+    problem: Problem
+    made: dict[str, Fit] = field(default_factory=dict)
+
+    def of(self, name: str, found: Fit) -> Fit:
+        """The final fit of a hypothesis from what the search has found."""
+        if name not in self.made:
+            self.made[name] = refine(self.problem, found)
+        return self.made[name]
+
+
+@dataclass(frozen=True)
+class Gates:
+    """Which explanations leave no more than noise would.
+
+    Attributes
+    ----------
+    base
+        The absolute test of the model without a further effect.
+    none_stands
+        Whether that model stays in the running.
+    singles, pairs
+        Effects that pass, the most likely first; pairs that pass and beat each of their members.
+    tried
+        All pairs that were fitted, the most likely first.
+    by_name
+        Effect (or "a + b") -> its absolute test, where it was made.
+    """
+
+    base: Gate
+    none_stands: bool
+    singles: tuple[str, ...] = ()
+    pairs: tuple[Combination, ...] = ()
+    tried: tuple[Combination, ...] = ()
+    by_name: Mapping[str, Gate] = field(default_factory=dict)
+
+    @property
+    def enough(self) -> bool:
+        """Whether the model explains the data without a further effect."""
+        return self.base.probability > FALSE_ALARM
+
+
+def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
+    """The model alone, then single effects, then all pairs, then triples where no single effect is enough."""
+    simulator = Simulator.of(noise, problem.scatter.covariance, seed)
+    base, families, forms = candidates.base, candidates.families, candidates.forms
+    signs = signatures(problem, (table for family in families for table in family.tables))
+    # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
+    gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
+    alone = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signs, gain)
+    if alone.probability > FALSE_ALARM:
+        return Gates(alone, none_stands=True)
+    by_name: dict[str, Gate] = {}
+
+    def passes(name: str, found: Fit) -> bool:
+        fit = fits.of(name, found)
+        by_name[name] = absolute_gate(problem, fit.residual, fit.jacobian, simulator, forms)
+        return by_name[name].probability > ADEQUATE
+
+    singles: list[Family] = []
+    for count, family in enumerate(candidates.offered):
+        assert family.best is not None
+        if count >= TESTED and (not singles or family.log_evidence < singles[0].log_evidence - FAR):
+            break
+        if passes(family.name, family.best):
+            singles.append(family)
+    evidence: dict[tuple[str, ...], float] = {(f.name,): f.log_evidence for f in families}
+    tried, search = search_pairs(problem, families, base)
+    pairs, tried = _standing(tried, evidence, fits, passes)
+    least = singles[0].log_evidence + _price_of_a_second(families) if singles else -np.inf
+    if not singles or any(pair.log_evidence > least for pair in pairs):
+        # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
+        evidence |= {pair.names: pair.log_evidence for pair in tried}
+        triples, found = _standing(search_triples(problem, search, base, bool(pairs)), evidence, fits, passes)
+        pairs, tried = [*pairs, *triples], [*tried, *found]
+    # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
+    none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
+    return Gates(alone, none_stands, tuple(f.name for f in singles), tuple(pairs), tuple(tried), by_name)
+
+
+def _standing(
+    found: Sequence[Combination],
+    evidence: Mapping[tuple[str, ...], float],
+    fits: Fits,
+    passes: Callable[[str, Fit], bool],
+) -> tuple[list[Combination], list[Combination]]:
+    """Those of the likeliest that beat each of their parts and pass; and all of them.
+
+    What two effects do to each other is not in their tables: the final fit says how much more likely it makes the data.
+    """
+    standing, tried = [], list(found)
+    for k, one in enumerate(found[:TESTED]):
+        parts = [log for names, log in evidence.items() if set(names) < set(one.names)]
+        if one.log_evidence <= max(parts) + SURVIVES:
+            continue
+        passed = passes(one.name, one.score)
+        more = fits.made[one.name].log_posterior - one.score.log_posterior
+        tried[k] = replace(one, log_evidence=one.log_evidence + more)
+        if passed:
+            standing.append(tried[k])
+    return standing, sorted(tried, key=lambda one: (-one.log_evidence, one.names))
+
+
+@dataclass(frozen=True)
+class Probabilities:
+    """Hypothesis -> posterior probability: effects, `none`, "a + b", `OUTSIDE`; 0 for those that a gate keeps out.
+
+    `form` is the form of discrepancy that stands out, in words; "" if none was looked for.
+    """
+
+    by_name: Mapping[str, float]
+    form: str = ""
+
+
+def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) -> Probabilities:
+    """Probabilities of the explanations that pass, a further effect at odds of 3 to 1 only.
+
+    Where no single effect passes, something outside the catalogue is weighed, too.
+    """
+    families = candidates.families
+    if gates.enough:
+        return Probabilities(_posterior(problem, noise, candidates, True, [f.name for f in families]))
+    outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
+
+    def posterior(standing: Sequence[Combination]) -> dict[str, float]:
+        if gates.singles:
+            return _posterior(problem, noise, candidates, gates.none_stands, gates.singles, standing)
+        evidences = {OUTSIDE: outside} | {one.name: one.log_evidence for one in standing}
+        prior = {OUTSIDE: PRIOR_OUTSIDE} | {one.name: _prior(families, len(one.names)) for one in standing}
+        return probabilities(evidences, prior)
+
+    found = _sparing(gates, posterior)
+    if gates.pairs and found.get(OUTSIDE, 1.0) < STANDS:  # ruled out
+        del found[OUTSIDE]
+    return Probabilities(found, form)
+
+
+def _sparing(gates: Gates, posterior: Callable[[Sequence[Combination]], dict[str, float]]) -> dict[str, float]:
+    """Probabilities without triples that are not likelier enough than the best pair, and pairs than the best effect."""
+    standing: Sequence[Combination] = gates.pairs
+    found = posterior(standing)
+    for count in (2, 1):
+        fewer = gates.singles if count == 1 else [one.name for one in standing if len(one.names) == count]
+        more = sum(found[one.name] for one in standing if len(one.names) > count)
+        if fewer and more < POSITIVE * max(found[name] for name in fewer):
+            standing = [one for one in standing if len(one.names) <= count]
+            found = posterior(standing)
+    return found
+
+
+def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
+    """Log evidence that something outside the catalogue is missing, and the likeliest form of it.
+
+    Alone, or beside one of the two best effects. That a further one is missing beside an effect is as rare as of two
+    effects, and it may be any of them: who picks the best of fifteen without that price makes the unknown too likely.
+    """
+    beside = PRIOR_PAIRS / PRIOR_SINGLES / max(len(candidates.families), 1)
+    found = [discrepancy_evidence(problem, candidates.base, candidates.forms)]
+    for family in candidates.offered[:2]:
+        assert family.best is not None
+        evidence, words = discrepancy_evidence(problem, family.best, candidates.forms)
+        found.append((evidence + float(np.log(beside)), words))
+    return float(np.logaddexp.reduce([evidence for evidence, _ in found])), max(found, key=lambda one: one[0])[1]
+
+
+def _posterior(
+    problem: Problem,
+    noise: Noise,
+    candidates: Candidates,
+    none: bool,
+    names: Sequence[str],
+    pairs: Sequence[Combination] = (),
+) -> dict[str, float]:
+    """Probabilities of the base model (if it stands), of single effects and of pairs; 0 for all others."""
+    base, families = candidates.base, candidates.families
+
+    def evidence(log_evidence: float, fit: Fit) -> float:
+        return _with_unknown_noise(problem, noise, log_evidence, fit)
+
+    found = {f.name: evidence(f.log_evidence, f.best or base) for f in families}
+    found |= {pair.name: evidence(pair.log_evidence, pair.score) for pair in pairs}
+    prior = {name: _prior(families, 1) for name in names}
+    prior |= {pair.name: _prior(families, len(pair.names)) for pair in pairs}
+    return probabilities(
+        {NONE: evidence(base.log_evidence, base)} | found, prior | ({NONE: PRIOR_NONE} if none else {})
+    )
+
+
+def _prior(families: Sequence[Family], count: int) -> float:
+    """Prior probability of one effect, pair or triple of effects."""
+    return {1: PRIOR_SINGLES, 2: PRIOR_PAIRS, 3: PRIOR_TRIPLES}[count] / max(comb(len(families), count), 1)
+
+
+def _price_of_a_second(families: Sequence[Family]) -> float:
+    """Log evidence that an effect beside another must add to be considered: its prior, and odds of 3 to 1."""
+    return float(np.log(POSITIVE * _prior(families, 1) / _prior(families, 2)))
+
+
+def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:
+    """Log evidence when the size of the noise is itself known to `noise.freedom` degrees of freedom only.
+
+    Integrated over it, the normal likelihood exp(-q / 2) of the weighted squares q of n readings becomes Student's,
+    (1 + q / freedom)^(-(freedom + n) / 2): many readings that fit badly say as much of the noise as of the model.
+    """
+    freedom, n = noise.freedom, len(fit.residual)
+    if not np.isfinite(freedom):
+        return log_evidence
+    squares = -2.0 * fit.log_likelihood - problem.scatter.covariance.log_determinant
+    return log_evidence + 0.5 * squares - 0.5 * (freedom + n) * float(np.log1p(max(squares, 0.0) / freedom))
+
+
+def decide(gates: Gates, weighed: Probabilities) -> tuple[str, tuple[str, ...]]:
+    """The verdict, and the hypotheses that hold the truth with 95 % probability, the most likely first."""
+    posterior = dict(weighed.by_name)
+    if gates.enough:
+        likely = _smallest_set(posterior)
+        return "adequate", likely if NONE in likely else (*likely, NONE)
+    if gates.singles:
+        named = "identified" if max(posterior.values()) >= NAMED else "ambiguous"
+        # Above a half, what counts against the model is likelier chance than any effect.
+        return "adequate" if posterior[NONE] > 0.5 else named, _smallest_set(posterior)
+    if OUTSIDE in posterior:
+        return "unexplained", ()
+    if max(posterior.values()) >= NAMED and sum(weight > STANDS for weight in posterior.values()) == 1:
+        return "identified", _smallest_set(posterior)
+    return "ambiguous", _smallest_set(posterior, named=HELD)
+
+
+def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
+    """Effects that may be there beside the likeliest explanation at a size that matters, and are not plausible yet.
+
+    A further effect is as likely beforehand as one effect is beside none, a pair beside one of its effects, a triple
+    beside one of its pairs. Where the readings say nothing of it, it keeps that probability: a few per cent. So it is
+    in no set that holds the truth with 95 %, and a name stays a name.
+    """
+    name = next((name for name in judgement.explanations if name == NONE or name in judgement.fits), "")
+    if not name:
+        return ()
+    count = 0 if name == NONE else len(name.split(" + "))
+    families = judgement.families
+    odds = (
+        _prior(families, 1) / PRIOR_NONE
+        if not count
+        else _prior(families, min(count + 1, 3)) / _prior(families, min(count, 2))
+    )
+    fit = judgement.base if name == NONE else judgement.fits[name]
+    found = not_excluded(judgement.problem, families, fit, odds)
+    return tuple(one for one in found if one.effect.name not in judgement.plausible)
+
+
+def _smallest_set(posterior: dict[str, float], named: float = NAMED) -> tuple[str, ...]:
+    """The one hypothesis that holds `named`, else the fewest that hold `HELD`."""
+    ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
+    if ranked and ranked[0][1] >= named:
+        return (ranked[0][0],)
+    found: list[str] = []
+    held = 0.0
+    for name, weight in ranked:
+        if held >= HELD or weight <= 0.0:
+            break
+        found.append(name)
+        held += weight
+    return tuple(found)

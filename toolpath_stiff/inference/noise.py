@@ -1,0 +1,449 @@
+"""How far readings scatter for reasons that no model should explain.
+
+The logarithm of a reading carries, beside what the machine does,
+
+    repeat noise      of every reading on its own,
+    clamping          common to the readings of one clamping,
+    strut spread      six struts are never quite alike: a nuisance with one column a strut,
+    joint positions   never quite where the machine file has them: one column a coordinate,
+
+the last two the same for all readings of a machine. Now and then a reading is wild. Who takes all of this for
+independent scatter finds effects that are not there: in dense data, in every second campaign.
+
+Repeat noise and clamping are estimated from repeats where there are any (restricted maximum likelihood of the
+differences between repeats; Patterson and Thompson 1971), else taken from what the file or the user states, else
+guessed low and high.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import both_names
+from toolpath_stiff.inference.covariances import Covariance, Groups, Precision, Widening
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, copied, from_repeats
+from toolpath_stiff.readings.measurements import Measurements
+
+if TYPE_CHECKING:
+    from toolpath_stiff.inference.repeats import Repeats
+
+
+At = TypeVar("At")  # where a fit stands
+
+
+JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
+
+
+# Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
+# 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
+GUESSES = {"low": 0.02, "high": 0.10}
+
+
+LARGEST = 0.5  # relative sd that a user may state
+
+
+# Relative sd of a reading below which nobody measures: the paper's best readings, not clamped anew, scatter by 44 N/mm,
+# 0.1 %. With less, the last digit of the readings would decide.
+LEAST = 1e-3
+
+
+# Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
+# states it, within a third where it is guessed; assumed.
+STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
+
+
+CONTRADICTED = 3.3  # standard deviations of the logarithm of their ratio from which repeats overrule a stated noise
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Scatter of ln readings.
+
+    Attributes
+    ----------
+    name
+        "measured", "stated", or the guesses "low" and "high".
+    repeat
+        (n,) relative standard deviation of each reading's own scatter.
+    clamping
+        Relative standard deviation common to the readings of one clamping.
+    strut_spread
+        Relative standard deviation of the struts' stiffnesses.
+    joint_error
+        m, standard deviation of each coordinate of each joint.
+    outliers, outlier_width
+        Share of wild readings and how many times wider they scatter.
+    freedom
+        Degrees of freedom behind `repeat`: how far it is to be trusted.
+    origin
+        Where the figures come from, a sentence.
+    remark
+        That a stated noise is not what the repeats show; "" where nothing is to be said.
+    tip
+        (n,) readings of the tip among those of other loops, which are what is told of; None: all.
+    """
+
+    name: str
+    repeat: FloatArray
+    clamping: float
+    strut_spread: float
+    joint_error: float
+    outliers: float
+    outlier_width: float
+    freedom: float
+    origin: str
+    remark: str = ""
+    tip: NDArray[np.bool_] | None = None
+
+    @property
+    def guess(self) -> str:
+        """Which guess it is, "low" or "high"; "" where it is none."""
+        return self.name if self.name in GUESSES else ""
+
+    @property
+    def reading(self) -> FloatArray:
+        """(n,) relative standard deviation of one reading, re-clamping included."""
+        return np.hypot(self.repeat, self.clamping)
+
+    @property
+    def floor_percent(self) -> float:
+        """Mean error that scatter alone would leave, %."""
+        return 100.0 * MEAN_OVER_SD * self.typical
+
+    @property
+    def typical_repeat(self) -> float:
+        """Root mean square of `repeat`."""
+        return float(np.sqrt(np.mean(self._of_tip(self.repeat) ** 2)))
+
+    @property
+    def typical(self) -> float:
+        """Root mean square of `reading`."""
+        return float(np.sqrt(np.mean(self._of_tip(self.reading) ** 2)))
+
+    def _of_tip(self, values: FloatArray) -> FloatArray:
+        return values if self.tip is None or not self.tip.any() else values[self.tip]
+
+    def select(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Noise:
+        """The noise of some of the readings."""
+        return replace(self, repeat=self.repeat[rows], tip=None if self.tip is None else self.tip[rows])
+
+
+def noise_models(
+    data: Measurements,
+    stated: float | tuple[float, float] | None = None,
+    strut_spread: float = STRUT_SPREAD,
+    joint_error: float = JOINT_ERROR,
+) -> tuple[Noise, ...]:
+    """The noise of the data: one model, or a low and a high guess where nothing is known.
+
+    Parameters
+    ----------
+    data
+        n readings; those of loops beside the tip have a noise of their own, `Measurements.sd`.
+    stated
+        Relative sd of one reading, re-clamping included; or (repeat, clamping). Wins over the data.
+    strut_spread, joint_error
+        Relative sd of the struts' stiffnesses; m.
+
+    Raises
+    ------
+    InputError
+        A stated noise that cannot be.
+    """
+    found = _noise_of_tip(data.of_tip, stated, strut_spread, joint_error)
+    if data.beside is None:
+        return found
+    return tuple(_with_loops(noise, data) for noise in found)
+
+
+def _with_loops(noise: Noise, data: Measurements) -> Noise:
+    """The noise of the tip's readings, and that of the loops beside it: each scatters on its own."""
+    repeat = np.empty(len(data))
+    repeat[data.tip] = noise.repeat
+    relative = data.sd[~data.tip] / data.stiffness[~data.tip]
+    # A loop reading is a clamping of its own (`measurements.with_offsets`), whose scatter is counted beside this one.
+    repeat[~data.tip] = np.sqrt(np.maximum(relative**2 - noise.clamping**2, LEAST**2))
+    return replace(noise, repeat=repeat, tip=data.tip)
+
+
+def _noise_of_tip(
+    data: Measurements,
+    stated: float | tuple[float, float] | None,
+    strut_spread: float,
+    joint_error: float,
+) -> tuple[Noise, ...]:
+    def model(
+        name: str, repeat: FloatArray, clamping: float, freedom: float, origin: str, wild: float = OUTLIERS,
+        remark: str = "",
+    ) -> Noise:  # fmt: skip
+        if repeat.min() < LEAST:
+            repeat = np.maximum(repeat, LEAST)
+            origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
+        return Noise(name, repeat, clamping, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark)
+
+    n = len(data)
+    repeats = None if copied(data) else from_repeats(data)
+    remark = ""
+    if stated is not None:
+        both = stated if isinstance(stated, tuple) else _shared(stated)
+        if not (0.0 < both[0] <= LARGEST and 0.0 <= both[1] <= LARGEST):
+            raise InputError(f"a noise of {stated!r}", expected=f"more than 0 and at most {100 * LARGEST:g} %")
+        remark = (
+            ""
+            if repeats is None
+            else _disagreement(repeats, both[0], both[1], f"noise stated with {both_names('--noise')}")
+        )
+        if not remark:
+            wild = OUTLIERS if repeats is None else repeats.wild
+            return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}", wild),)
+    relative = data.sd / data.stiffness
+    rows = np.isfinite(relative) & (stated is None)  # that state how far they scatter
+    if repeats is not None:
+        if rows.any():
+            total = float(np.sqrt(np.mean(relative[rows] ** 2)))
+            used = "instead" if rows.all() else "for the readings that state nothing"
+            remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file", used)
+        origin = _origin(repeats)
+        repeat, freedom = np.full(n, repeats.repeat), repeats.freedom
+        if rows.any() and not rows.all():  # of other readings, mostly: both count
+            repeat, freedom = _both(relative, rows, repeats, trusted=not remark)
+            origin += f", and from sd_N_per_mm of {int(rows.sum())} readings, {_percent(*_shared(total))}"
+        return (model("measured", repeat, repeats.clamping, freedom, origin, repeats.wild, remark),)
+    if rows.any():
+        repeat, clamping = _parts(relative[rows])
+        every = np.full(n, np.sqrt(np.mean(repeat**2)))
+        every[rows] = repeat
+        mean = float(np.sqrt(np.mean(relative[rows] ** 2)))
+        origin = f"sd_N_per_mm of the readings, {100 * mean:.2g} % in the mean, of "
+        origin += f"which {100 * clamping:.2g} % is assumed to be clamping"
+        if not rows.all():
+            origin += f"; {n - int(rows.sum())} readings do not state it and are assumed to scatter as the others do"
+        return (model("stated", every, clamping, STATED_FREEDOM, origin),)
+    why = "the repeats agree exactly, as copies do" if copied(data) else "the data hold neither repeats nor sd_N_per_mm"
+    guesses = []
+    for name, guess in GUESSES.items():
+        both = _shared(guess)
+        origin = f"a {name} guess, {_percent(*both)}: {why}"
+        guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
+    return tuple(guesses)
+
+
+def _origin(repeats: Repeats) -> str:
+    origin = f"estimated from {repeats.differences} differences between repeats: "
+    origin += _percent(repeats.repeat, repeats.clamping)
+    return origin if repeats.clamps else origin + " (clamping assumed: no point was clamped twice)"
+
+
+def _parts(relative: FloatArray) -> tuple[FloatArray, float]:
+    """Stated relative sds (n,) as repeat noise (n,) and clamping."""
+    clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
+    return np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2)), float(clamping)
+
+
+def _both(relative: FloatArray, rows: NDArray[np.bool_], repeats: Repeats, trusted: bool) -> tuple[FloatArray, float]:
+    """Repeat noise (n,) where some `rows` state theirs, and what it is worth.
+
+    Two estimates of one thing are weighed by their degrees of freedom. Where they contradict each other, each stands
+    for its own readings, and both are trusted as far as the less certain one.
+    """
+    repeat = np.full(len(relative), repeats.repeat)
+    repeat[rows] = _parts(relative[rows])[0]
+    if not trusted:
+        return repeat, min(STATED_FREEDOM, repeats.freedom)
+    level = float(np.sqrt(np.mean(repeat[rows] ** 2)))
+    freedom = STATED_FREEDOM + repeats.freedom
+    pooled = float(np.sqrt((STATED_FREEDOM * level**2 + repeats.freedom * repeats.repeat**2) / freedom))
+    repeat[rows] *= pooled / level
+    repeat[~rows] = pooled
+    return repeat, freedom
+
+
+def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str, used: str = "instead") -> str:
+    """That repeats contradict a stated noise, in a sentence; "" where they do not. `used`: where theirs is taken.
+
+    Both are estimates: the stated one to `STATED_FREEDOM`, the repeats' to theirs (sd of a ratio's logarithm).
+    """
+    told, found = repeat, repeats.repeat
+    if repeats.clamps:
+        told, found = float(np.hypot(repeat, clamping)), float(np.hypot(repeats.repeat, repeats.clamping))
+    ratio = found / told
+    sd = np.sqrt(0.5 / STATED_FREEDOM + 0.5 / repeats.freedom)
+    if abs(np.log(ratio)) < CONTRADICTED * sd:
+        return ""
+    small = ratio > 1.0
+    return (
+        f"the {what} is too {'small' if small else 'large'}: {100 * told:.2g} %, where {repeats.differences} "
+        f"differences between repeats scatter {ratio:.2g} times as much; what the repeats show is used {used}"
+    )
+
+
+def _shared(total: float) -> tuple[float, float]:
+    """A total relative sd as repeat noise and clamping."""
+    clamping = min(CLAMPING, total / np.sqrt(2.0))
+    return float(np.sqrt(max(total**2 - clamping**2, 0.0))), float(clamping)
+
+
+def _percent(repeat: float, clamping: float) -> str:
+    return f"{100 * repeat:.2g} % a reading, {100 * clamping:.2g} % a clamping"
+
+
+def covariance(noise: Noise, predictor: Predictor) -> Covariance:
+    """Of ln readings."""
+    struts = noise.strut_spread * predictor.strut_columns()
+    shifted = noise.joint_error * predictor.joint_columns()
+    shared = np.ascontiguousarray(np.concatenate([struts, shifted], axis=1).T)
+    return Covariance(noise.repeat**2, Groups.by(predictor.data.clamp), noise.clamping**2, shared)
+
+
+MOST_WILD = 0.05  # share of readings that may be taken for wild; more where more of them are
+
+
+OFTEN_WILD = 2.0  # times the expected share
+
+
+NEVER = 1e12  # price of a wild reading where there are none
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """The scatter of ln readings, with some readings taken for wild.
+
+    Attributes
+    ----------
+    covariance
+        With the wild readings' own scatter widened.
+    widening
+        (n,) variance that a wild reading adds.
+    price
+        Minus the log odds of a reading being wild.
+    wild
+        Readings taken for wild.
+    beyond
+        Squared deviation beyond which a reading's widening pays that price.
+    most
+        Share of readings that may be taken for wild.
+    """
+
+    covariance: Covariance
+    widening: FloatArray
+    price: float
+    wild: tuple[int, ...] = ()
+    beyond: float = np.inf
+    most: float = MOST_WILD
+
+    @classmethod
+    def of(cls, noise: Noise, covariance: Covariance) -> Scatter:
+        """From a noise model and its covariance."""
+        widening = (noise.outlier_width**2 - 1.0) * noise.repeat**2
+        price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
+        wide = noise.outlier_width**2
+        beyond = (2.0 * price + np.log(wide)) * wide / (wide - 1.0)
+        return cls(covariance, widening, float(price), (), float(beyond), max(MOST_WILD, OFTEN_WILD * noise.outliers))
+
+    @property
+    def precision(self) -> Precision:
+        """Inverse covariance."""
+        return self.covariance.precision
+
+    @property
+    def log_price(self) -> float:
+        """What a log likelihood loses by the width of the scatter and by the readings taken for wild."""
+        return -0.5 * self.covariance.log_determinant - len(self.wild) * self.price
+
+    def with_wild(self, residual: FloatArray, known: Scatter | None = None) -> Scatter:
+        """With those readings taken for wild whose widening pays its price at these residuals (n,).
+
+        Where these are the wild readings of `known`, that is the answer: nothing is worked out again. One by one, the
+        most wild first, each beside those before it.
+        """
+        diagonal, wild = self.precision.diagonal, list(self.wild)
+        pull, taken = self.precision.times(residual), np.zeros(len(residual))
+        taken[wild] = -np.inf
+        widening: Widening | None = None
+        for _ in range(int(self.most * len(residual)) + 1):
+            own = 1.0 + self.widening * diagonal
+            gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price
+            gain += taken
+            row = int(np.argmax(gain))
+            if gain[row] <= 0.0:
+                break
+            widening = widening or Widening(self.covariance)
+            column, share = widening.widen(row, float(self.widening[row]))
+            pull = pull - column * (share * pull[row])
+            diagonal = diagonal - column**2 * share
+            wild.append(row)
+            taken[row] = -np.inf
+        if known is not None and set(known.wild) == set(wild):
+            return known
+        rows = np.array(wild[len(self.wild) :], dtype=np.int64)
+        return replace(self, covariance=self.covariance.widened(rows, self.widening[rows]), wild=tuple(wild))
+
+    def log_likelihood(self, residual: FloatArray) -> FloatArray:
+        """(...,) of residuals (..., n), the price of wild readings included, without the constant n ln(2 pi) / 2."""
+        squared = self.precision.squares(residual)
+        return np.asarray(-0.5 * (squared + self.covariance.log_determinant) - len(self.wild) * self.price)
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """At one point: jacobian (n, q) of ln k to q unknowns, information (q, q) and gradient (q,), priors included."""
+
+    jacobian: FloatArray
+    information: FloatArray
+    gradient: FloatArray
+
+    @property
+    def scale(self) -> FloatArray:
+        """(q,) of the unknowns, whose units may be very different."""
+        return np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+
+
+def gauss_newton(
+    start: At,
+    equations: Callable[[At], NormalEquations],
+    move: Callable[[At, NormalEquations], tuple[At, FloatArray] | None],
+    steps: int,
+    tolerance: float,
+) -> tuple[At, NormalEquations]:
+    """Least squares step by step: on tables (`evidence`) and with the model itself (`fits`).
+
+    Parameters
+    ----------
+    start
+        Where to begin, whatever `equations` and `move` understand.
+    equations
+        The normal equations at a point.
+    move
+        The next point and the step (q,) that was wanted; None where no step helps.
+    steps, tolerance
+        At most so many, and until a step is so small in standard deviations.
+
+    Returns
+    -------
+    The last point, and the equations of the last step.
+    """
+    at = start
+    for _ in range(steps):
+        here = equations(at)
+        moved = move(at, here)
+        if moved is None:
+            break
+        at, step = moved
+        if np.abs(step * here.scale).max() < tolerance:
+            break
+    return at, here
+
+
+def scaled_inverse(matrix: FloatArray) -> FloatArray:
+    """Inverse of a covariance or information matrix (p, p) whose rows may have very different units."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))

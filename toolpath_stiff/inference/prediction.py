@@ -1,0 +1,308 @@
+"""What the model says each reading should show, and how that hangs on strut law, struts and joints.
+
+Everything is on the logarithm of stiffness: effects are factors of a few to thirty per cent, and so is the noise. The
+strut law enters as the logarithms of the factors on its two stiffnesses, `law`, which are dimensionless: a
+least-squares fit of constants in N/m would stop at once, its gradient being tiny. Of a constant law the second does
+nothing, and its prior holds it at 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.readings.measurements import Measurements, measured_path, mechanical_stiffness, shown_by
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.contract import Effect, LoadPath
+from toolpath_stiff.stiffness.loop_response import law_products
+from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, idle_on_readings
+from toolpath_stiff.stiffness.trial import failures, own_effects
+
+NO_CHANGE = (0.0, 0.0)  # of the strut law
+
+
+ANSWERS_KEPT = 64
+
+
+JOINT_STEP = 0.5e-3  # m, for differences: the size of the joint errors that the columns are used for
+
+
+def scaled_law(law: StrutLaw, logs: ArrayLike) -> StrutLaw:
+    """The strut law with its two stiffnesses multiplied by exp(logs)."""
+    first, second = np.exp(np.asarray(logs, dtype=float)).tolist()
+    return replace(law, stiffness_1=law.stiffness_1 * first, stiffness_2=law.stiffness_2 * second)
+
+
+def at_both_ends(law: StrutLaw, values: FloatArray) -> FloatArray:
+    """Values (..., 2) of a law's two logarithms at its two lengths: a constant law's first one at both."""
+    return values[..., [0, 0]] if law.constant else values
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """Rows without those that are mechanically the same, what effects see of them, the strut forces per unit load.
+
+    `products` (m, 6): what each strut's own compliance counts in a reading, at the tip the squared force.
+    """
+
+    data: Measurements
+    which: NDArray[np.int64]
+    path: LoadPath
+    forces: FloatArray
+    products: FloatArray
+
+
+class Predictor:
+    """The model's answer to a set of measurements, for any strut law and any effects.
+
+    Parameters
+    ----------
+    machine
+        The machine with the effects of its file.
+    data
+        n readings.
+    effect_files
+        A user's own effects.
+
+    Raises
+    ------
+    InputError
+        The machine's effects are wrong, or the strut law leaves a strut no stiffness at a measured pose.
+
+    Attributes
+    ----------
+    data
+        The readings, with a warning for each effect of the machine file that adds nothing to them.
+    tables
+        What `candidates.table_of` has worked out for these readings: every noise model asks for the same.
+    """
+
+    def __init__(self, machine: Machine, data: Measurements, effect_files: Sequence[str | Path] = ()) -> None:
+        self.machine = machine
+        self.effect_files = tuple(effect_files)
+        self.base = build_model(machine, self.effect_files)
+        own = failures(own_effects(self.base, self.effect_files), machine)
+        told = (*own, *data.warnings, *idle_on(self.base, data).values())
+        self.data = replace(data, warnings=tuple(dict.fromkeys(told)))
+        self._timeless = _prepare(self.base, data, timed=False)
+        self._timed = _prepare(self.base, data, timed=True)
+        self.tables: dict[tuple[Any, ...], Any] = {}
+        self._answers: dict[tuple[Any, ...], FloatArray] = {}
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    @property
+    def distinct(self) -> NDArray[np.int64]:
+        """(n,) number of what mechanics sees of each reading: repeats share it."""
+        return self._timeless.which
+
+    @property
+    def effects_that_act(self) -> list[str]:
+        """Effects and instruments of the machine file that change these readings, for headings."""
+        idle = idle_on(self.base, self.data)
+        return [one.effect.name for one in (*self.base.effects, *self.base.instruments) if one.effect.name not in idle]
+
+    def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
+        """(n,) ln(N/m) that the readings should show; nan where the model has no answer.
+
+        `effects` come on top of those of the machine file; instruments among them change the readings only. The last
+        answers are kept: a fit begins where the one before it ended, and asks for the same again.
+        """
+        chosen = tuple((active.effect.name, *active.values.items()) for active in effects)
+        key = (*np.asarray(law, dtype=float).tolist(), chosen)
+        if key not in self._answers:
+            while len(self._answers) >= ANSWERS_KEPT:
+                self._answers.pop(next(iter(self._answers)))
+            self._answers[key] = self._solved(law, effects)
+        return self._answers[key].copy()
+
+    def _solved(self, law: ArrayLike, effects: Sequence[ActiveEffect]) -> FloatArray:
+        machine = self.machine.with_changes(strut_law=scaled_law(self.machine.strut_law, law))
+        model = build_model(machine, self.effect_files, effects)
+        prepared = self._timed if any("time_min" in a.effect.needs for a in model.effects) else self._timeless
+        try:
+            stiffness = self._mechanics(model, prepared)[prepared.which]
+        except InputError:  # no pose, or no stiffness left: a fit walks away from there
+            return np.full(len(self), np.nan)
+        if model.instruments:
+            path = replace(self.full_path(), machine=model.machine)
+            for active in model.instruments:
+                stiffness = shown_by(active, stiffness, path, self.data)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(np.where(stiffness > 0.0, np.log(stiffness), np.nan))
+
+    def _mechanics(self, model: StiffnessModel, prepared: _Prepared) -> FloatArray:
+        """(m,) N/m at the distinct rows."""
+        same_geometry = (
+            model.machine.platform_joints is self.base.machine.platform_joints
+            and model.machine.frame_joints is self.base.machine.frame_joints
+        )
+        if same_geometry:
+            path = replace(prepared.path, machine=model.machine)
+            return mechanical_stiffness(model, path, prepared.data, prepared.forces)
+        return mechanical_stiffness(model, measured_path(model, prepared.data), prepared.data)
+
+    def full_path(self) -> LoadPath:
+        """What instruments see of every row."""
+        return self._full_path
+
+    @cached_property
+    def _full_path(self) -> LoadPath:
+        prepared = self._timeless
+        path = prepared.path.take(prepared.which)
+        missing = self.data.missing
+        return replace(
+            path,
+            time=None if "time_min" in missing else self.data.time,
+            temperature=None if "temperature_C" in missing else self.data.temperature,
+        )
+
+    def strut_lengths(self) -> FloatArray:
+        """(n, 6) m."""
+        return np.asarray(self._timeless.path.struts.lengths[self._timeless.which])
+
+    def strut_forces(self) -> FloatArray:
+        """(n, 6) force in each strut per unit load, tension positive."""
+        return np.asarray(self._timeless.forces[self._timeless.which])
+
+    def strut_columns(self) -> FloatArray:
+        """(n, 6) d ln k / d ln(stiffness of strut i) at the machine file's strut law: its share of the compliance."""
+        prepared = self._timeless
+        compliance = 1.0 / self.machine.strut_law.stiffness(prepared.path.struts.lengths)
+        share = prepared.products * compliance * np.exp(self._base_log())[prepared_first(prepared)][:, None]
+        return np.asarray(share[prepared.which])
+
+    def struts_carry_all(self, effects: Iterable[Effect]) -> bool:
+        """Whether these effects and the machine file's leave geometry, equilibrium and readings as they are."""
+        hooks = ("geometry", "parallel_stiffness", "reading")
+        mine = (active.effect for active in (*self.base.effects, *self.base.instruments))
+        return not any(
+            getattr(type(effect), hook) is not getattr(Effect, hook) for effect in (*effects, *mine) for hook in hooks
+        )
+
+    def law_columns(self, log_stiffness: FloatArray, law: ArrayLike = NO_CHANGE) -> FloatArray:
+        """(n, 2) d ln k / d law where the model says `log_stiffness` (n,).
+
+        The struts' forces are those of equilibrium, so this is exact unless a stiffness parallel to the struts
+        shares the load or the geometry differs; good enough there for a Gauss-Newton step.
+        """
+        prepared = self._timeless
+        rule = scaled_law(self.machine.strut_law, law)
+        lengths = prepared.path.struts.lengths
+        first, second = rule.weights(lengths)
+        stiffness = rule.stiffness(lengths)
+        energy = prepared.products / stiffness**2
+        columns = [
+            (energy * rule.stiffness_1 * first).sum(axis=1),
+            (energy * rule.stiffness_2 * second).sum(axis=1),
+        ]
+        return np.asarray(np.stack(columns, axis=1)[prepared.which] * np.exp(log_stiffness)[:, None])
+
+    def strut_part(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
+        """(..., n) m/N that the struts contribute to the compliance along each reading, for laws (..., 2)."""
+        first, second = self._law_terms(law)
+        return np.asarray((self._squared_forces / (first + second)).sum(axis=-2)[..., self._timeless.which])
+
+    def strut_part_and_slopes(self, law: ArrayLike = NO_CHANGE) -> tuple[FloatArray, FloatArray]:
+        """`strut_part`, and its derivatives (..., 2, n) to the law's logarithms: they add up to minus the part."""
+        first, second = self._law_terms(law)
+        stiffness = first + second
+        energy = self._squared_forces / stiffness
+        part = energy.sum(axis=-2)
+        by_first = (energy * (first / stiffness)).sum(axis=-2)
+        which = self._timeless.which
+        return part[..., which], -np.stack([by_first, part - by_first], axis=-2)[..., which]
+
+    def _law_terms(self, law: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """(..., 6, m) N/m each: what the law's two constants, scaled by laws (..., 2), give each strut."""
+        logs = np.asarray(law, dtype=float)
+        rule, (first, second) = self.machine.strut_law, self._law_shares
+        return (
+            rule.stiffness_1 * np.exp(logs[..., 0, None, None]) * first,
+            rule.stiffness_2 * np.exp(logs[..., 1, None, None]) * second,
+        )
+
+    @cached_property
+    def _law_shares(self) -> tuple[FloatArray, FloatArray]:
+        """(6, m) shares of the law's two constants in each strut's stiffness, by its length."""
+        return self.machine.strut_law.weights(np.ascontiguousarray(self._timeless.path.struts.lengths.T))
+
+    @cached_property
+    def _squared_forces(self) -> FloatArray:
+        """(6, m) squared strut forces per unit load; of loops beside the tip, products of real and virtual ones."""
+        return np.ascontiguousarray(self._timeless.products.T)
+
+    def joint_columns(self) -> FloatArray:
+        """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
+
+        The platform stands where struts of the commanded lengths put the true joints. Worked out once.
+        """
+        return self._joint_columns
+
+    @cached_property
+    def _joint_columns(self) -> FloatArray:
+        base, columns = self._base_log(), []
+        for name in ("frame_joints", "platform_joints"):
+            for strut in range(6):
+                for axis in range(3):
+                    joints = np.array(getattr(self.base.machine, name))
+                    joints[strut, axis] += JOINT_STEP
+                    true = self.base.machine.with_changes(**{name: joints})
+                    moved = replace(self.base, machine=true, control=self.base.control or self.base.machine)
+                    prepared = self._timeless
+                    path = measured_path(moved, prepared.data)
+                    stiffness = mechanical_stiffness(moved, path, prepared.data)
+                    columns.append((np.log(stiffness)[prepared.which] - base) / JOINT_STEP)
+        return np.stack(columns, axis=1)
+
+    def _base_log(self) -> FloatArray:
+        """(n,) ln k of the machine file's model, before instruments."""
+        prepared = self._timeless
+        return np.asarray(np.log(self._mechanics(self.base, prepared))[prepared.which])
+
+
+def idle_on(model: StiffnessModel, data: Measurements) -> dict[str, str]:
+    """Effects of the model that add nothing to these readings -> a sentence for people."""
+    return idle_on_readings(model, data.missing, set(data.setup.tolist()))
+
+
+def prepared_first(prepared: _Prepared) -> NDArray[np.int64]:
+    """Index of one row for each distinct row."""
+    first = np.zeros(len(prepared.data), dtype=np.int64)
+    first[prepared.which[::-1]] = np.arange(len(prepared.which))[::-1]
+    return first
+
+
+def _prepare(model: StiffnessModel, data: Measurements, timed: bool) -> _Prepared:
+    """Rows that differ in nothing that mechanics sees are solved once: repeats cost nothing."""
+    setups = np.unique(data.setup, return_inverse=True)[1].astype(float)
+    columns = [data.position, data.angles, data.direction, data.force[:, None], data.tool_extension[:, None]]
+    columns += [setups[:, None], np.nan_to_num(data.temperature, nan=-1e3)[:, None]]
+    if timed:
+        columns.append(np.nan_to_num(data.time, nan=-1.0)[:, None])
+    beside = data.beside
+    if beside is not None:
+        columns += [beside.which[:, None].astype(float), beside.offset[:, None], beside.toward[:, None]]
+        columns.append(np.nan_to_num(beside.length)[:, None])
+    keys = np.concatenate(columns, axis=1)
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    distinct = data.select(first)
+    path = measured_path(model, distinct)
+    wrenches = np.zeros((len(distinct), 6, 1))
+    wrenches[:, :3, 0] = distinct.direction
+    _, forces = exact.respond(path, exact.assemble_links(model, path), wrenches)
+    products = forces[..., 0] ** 2
+    if distinct.beside is not None:
+        few = distinct.beside
+        products = law_products(forces[..., 0], few.loops, few.which) * few.toward[:, None]
+    return _Prepared(distinct, which.reshape(-1).astype(np.int64), path, forces[..., 0], products)

@@ -1,0 +1,265 @@
+"""What repeats tell of the noise: repeat noise, clamping, and the share of wild readings.
+
+By restricted maximum likelihood of the differences between repeats (Patterson and Thompson 1971), in which what the
+machine does cancels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.defaults import CLAMPING
+from toolpath_stiff.inference.covariances import Groups
+from toolpath_stiff.inference.minima import bounded_minimum
+from toolpath_stiff.readings.measurements import Measurements
+
+# Share of wild readings where repeats do not tell, and how much wider they scatter; assumed. Where repeats tell, their
+# share is expected about the assumed one (sd of its logarithm), within the ends.
+OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0
+
+
+OUTLIER_SPREAD, OUTLIER_ENDS = 1.5, (0.005, 0.20)
+
+
+# The grid on which scatter and share are weighed: factors on the first estimate of the scatter, shares.
+FACTORS, SHARES = np.geomspace(0.3, 3.3, 61), np.geomspace(*OUTLIER_ENDS, 16)
+
+
+# Degrees of freedom that a difference is worth for the scatter when it may be wild: what 300 simulations each of 6 to
+# 71 differences, 2 % of the readings wild, give (0.74 to 0.62).
+WORTH = 0.63
+
+
+FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
+
+
+MOST_TRIMS = 8
+
+
+# Standard deviations as which a larger deviation counts: how far off the wildest is tells nothing of the others.
+FARTHEST = 1.5 * OUTLIER_WIDTH
+
+
+WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
+
+
+def repeat_groups(data: Measurements) -> NDArray[np.int64]:
+    """(n,) number of each reading's group: the same pose, direction, load, tool, set-up and loop."""
+    columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
+    columns += [data.force[:, None], data.tool_extension[:, None]]
+    for labels in (data.setup, data.loop):
+        columns.append(np.unique(labels, return_inverse=True)[1].reshape(-1, 1).astype(float))
+    groups = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
+    return np.asarray(groups.reshape(-1), dtype=np.int64)
+
+
+def copied(data: Measurements) -> bool:
+    """Whether every repeat is the same number as the reading that it repeats: that tells nothing of any scatter."""
+    groups = repeat_groups(data)
+    _, first = np.unique(groups, return_index=True)
+    again = np.bincount(groups)[groups] > 1
+    return bool(again.any() and (data.stiffness == data.stiffness[first][groups])[again].all())
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """What repeats tell.
+
+    Attributes
+    ----------
+    repeat, clamping
+        Relative standard deviations.
+    differences
+        Differences between repeats: degrees of freedom if no reading were wild.
+    clamps
+        Whether clamping was estimated.
+    wild
+        Share of wild readings.
+    """
+
+    repeat: float
+    clamping: float
+    differences: int
+    clamps: bool
+    wild: float
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom that the scatter is worth: fewer than differences, as any of them may be wild."""
+        return WORTH * self.differences
+
+
+def from_repeats(data: Measurements) -> Repeats | None:
+    """Noise from repeats, or None without enough of them.
+
+    What differs between repeats beside chance, the time since zeroing and the order, is projected out first, so that
+    a drift is not taken for noise. Differences beyond `WILD` standard deviations are set aside as wild for a first
+    estimate; scatter and share of wild readings are then weighed together over all differences.
+    """
+    groups = repeat_groups(data)
+    every = kept = np.bincount(groups)[groups] > 1
+    kept = kept.copy()
+    result = None
+    for _ in range(MOST_TRIMS):
+        if not kept.any():
+            break
+        contrasts = _Contrasts.of(data.select(kept), groups[kept])
+        if contrasts.count < FEWEST_CONTRASTS:
+            break
+        repeat, clamping, found = _maximum_likelihood(contrasts)
+        result = Repeats(repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found, OUTLIERS)
+        wild = contrasts.deviations(result.repeat, result.clamping) > WILD
+        if not wild.any():
+            break
+        indices = np.flatnonzero(kept)
+        kept[indices[wild]] = False
+        kept &= np.bincount(groups, weights=kept, minlength=groups.max() + 1)[groups] > 1
+    if result is None:
+        return None
+    whole = _Contrasts.of(data.select(every), groups[every])
+    factor, share = _mixture(whole.deviations(result.repeat, result.clamping), np.bincount(groups)[groups[every]])
+    return replace(result, repeat=factor * result.repeat, wild=share)
+
+
+def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, float]:
+    """Factor on the scatter, and share of wild readings, from deviations (n,) of repeats.
+
+    A reading's deviation from the others of its group of `size` (n,) is wild with itself or with one of them; for pairs
+    that is exact. Each group counts with its degrees of freedom. Factor and share are the posterior means of their
+    logarithms; the factor's prior is flat in its logarithm.
+    """
+    squared, wide = np.minimum(deviations, FARTHEST)[:, None, None] ** 2, OUTLIER_WIDTH**2
+    factors, shares = FACTORS[:, None], SHARES
+    own = 1.0 - 1.0 / size[:, None, None]  # of the variance of a deviation
+    total = np.zeros(np.broadcast_shapes(squared.shape, factors.shape, shares.shape))
+    for mine, chance in ((wide, shares), (1.0, 1.0 - shares)):
+        for others, odds in ((wide, shares), (1.0, 1.0 - shares)):
+            sd = factors * np.sqrt(own * mine + (1.0 - own) * others)
+            total = total + chance * odds * np.exp(-0.5 * squared / sd**2) / sd
+    logs = (np.log(np.maximum(total, 1e-300)) * own).sum(axis=0)
+    logs = logs - 0.5 * (np.log(shares / OUTLIERS) / OUTLIER_SPREAD) ** 2
+    weights = np.exp(logs - logs.max())
+    of_factor, of_share = weights.sum(axis=1) / weights.sum(), weights.sum(axis=0) / weights.sum()
+    return float(np.exp(of_factor @ np.log(FACTORS))), float(np.exp(of_share @ np.log(SHARES)))
+
+
+@dataclass(frozen=True)
+class _Contrasts:
+    """Differences between repeats: what is left of n ln readings y beside group means, time and order, M y.
+
+    M takes least squares' residuals. Their covariance is M (repeat^2 + clamping^2 Z Z^T) M, Z with a column of ones and
+    noughts a clamping; all that a likelihood asks of it are the eigenvalues of Z^T M Z, as many as there are
+    clampings, and the shares of M y along its eigenvectors.
+
+    Attributes
+    ----------
+    left, own
+        (n,) M y; diagonal of M.
+    reached, values
+        (n, k) M Z E for eigenvectors E of Z^T M Z, and its eigenvalues (k,) that are not 0. None where every reading
+        was clamped by itself, which cannot be told from repeat noise, or where all repeats are of one clamping.
+    count
+        Rank of M: degrees of freedom.
+    alone
+        Whether every reading was clamped by itself: the differences then hold clamping too.
+    """
+
+    left: FloatArray
+    own: FloatArray
+    reached: FloatArray
+    values: FloatArray
+    count: int
+    alone: bool
+
+    @classmethod
+    def of(cls, data: Measurements, groups: NDArray[np.int64]) -> _Contrasts:
+        """Of readings in groups (n,) of repeats."""
+        means, clamps = Groups.by(groups), Groups.by(data.clamp)
+
+        def centred(columns: FloatArray) -> FloatArray:
+            sizes = np.bincount(means.of)
+            return np.asarray(columns - (means.sums(columns.T) / sizes)[:, means.of].T)
+
+        logs = np.log(data.stiffness)[:, None]
+        axes, size, _ = np.linalg.svd(centred(_drifts(data, np.exp(logs - centred(logs))[:, 0])), full_matrices=False)
+        fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(np.bincount(means.of).max()))]
+
+        def left(columns: FloatArray) -> FloatArray:
+            found = centred(columns)
+            return np.asarray(found - fixed @ (fixed.T @ found))
+
+        n, count = len(groups), len(groups) - means.count - fixed.shape[1]
+        clamped = np.zeros((n, 0)) if clamps.alone else left((clamps.of[:, None] == np.arange(clamps.count)) * 1.0)
+        values, vectors = np.linalg.eigh(clamped.T @ clamped)
+        largest = np.bincount(clamps.of).max(initial=0)  # of the eigenvalues, if nothing were projected out
+        kept = values > largest * n * np.finfo(float).eps
+        own = 1.0 - 1.0 / np.bincount(means.of)[means.of] - (fixed**2).sum(axis=1)
+        return cls(
+            left(logs)[:, 0],
+            own,
+            clamped @ vectors[:, kept],
+            values[kept],
+            count,
+            clamps.alone,
+        )
+
+    @property
+    def tells(self) -> bool:
+        """Whether the differences tell clamping from repeat noise."""
+        rank = len(self.values)
+        spread = float(np.ptp(self.values)) if rank == self.count else float(self.values.max(initial=0.0))
+        return spread > 1e-6 and rank >= 3
+
+    @property
+    def loads(self) -> FloatArray:
+        """(k,) squared shares of M y along the eigenvectors."""
+        return np.asarray((self.left @ self.reached) ** 2 / self.values)
+
+    def deviations(self, repeat: float, clamping: float) -> FloatArray:
+        """(n,) how far each reading is off, in standard deviations, where it is left out itself."""
+        repeat = max(repeat, 1e-12)
+        ratio, own = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if self.alone else 0.0)
+        weights = ratio / (1.0 + ratio * self.values)
+        pull = (self.left - self.reached @ (weights * (self.left @ self.reached))) / own
+        scale = np.sqrt(np.maximum(self.own - self.reached**2 @ weights, 0.0) / own)
+        return np.asarray(np.abs(pull) / np.maximum(scale, 1e-12))
+
+
+def _drifts(data: Measurements, stiffness: FloatArray) -> FloatArray:
+    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing.
+
+    `stiffness` (n,) is the mean of each reading's repeats: a reading's own would carry its noise into the regressor,
+    which then takes that very noise away.
+    """
+    regressors = [np.linspace(-1.0, 1.0, len(data))]
+    if "time_min" not in data.missing:
+        # A drift adds rate * time to the deflection: to the logarithm, rate * time * k / F and its square.
+        drift = data.time * stiffness / data.force
+        drift = drift / max(float(np.abs(drift).max()), 1e-300)
+        regressors += [drift, drift**2, data.time / max(float(data.time.max()), 1e-300)]
+    return np.stack(regressors, axis=1)
+
+
+def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
+    """Repeat noise and clamping that make the contrasts most likely, and whether they tell of clamping at all."""
+    values, loads = contrasts.values, contrasts.loads
+    rest = max(float(contrasts.left @ contrasts.left) - float(loads.sum()), 0.0)
+
+    def repeat_at(ratio: float) -> float:
+        return float(np.sqrt((rest + (loads / (1.0 + ratio * values)).sum()) / contrasts.count))
+
+    def minus_log_likelihood(root: float) -> float:
+        ratio = root**2
+        return contrasts.count * float(np.log(max(repeat_at(ratio), 1e-12))) + 0.5 * float(
+            np.log1p(ratio * values).sum()
+        )
+
+    if not contrasts.tells:
+        return repeat_at(0.0), 0.0, False
+    best = bounded_minimum(minus_log_likelihood, 0.0, 5.0)
+    root = best if minus_log_likelihood(best) < minus_log_likelihood(0.0) else 0.0
+    return repeat_at(root**2), root * repeat_at(root**2), True

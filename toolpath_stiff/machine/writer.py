@@ -1,0 +1,156 @@
+"""Machines to commented machine files; what `parse_machine` reads back is the same machine."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.machine.model import EffectEntry, Machine, Uncertainty
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
+
+# `tps machine new` puts it in every section; what still has it was not replaced.
+TEMPLATE_REMARK = "value of the template, not of this machine"
+
+
+HEADINGS = {
+    "frame_joints": "Base frame: Z up. Row i is strut i + 1: x, y, z in mm\n"
+    "# (or cylindrical_mm_deg: rows of radius in mm, angle in degrees, height in mm).",
+    "platform_joints": "Platform frame: origin at the tip of the reference tool, spindle along Z. Rows as above.",
+    "reference_tool": "The tool whose tip the platform joints refer to: length from the spindle nose in mm.\n"
+    "# Tools of other lengths (G43 with a tool table) move the tip along the spindle.",
+    "strut_law": "Stiffness of a strut, linear in its length: two lengths in mm and the stiffness at each in N/um.\n"
+    "# Outside the two lengths it is extrapolated, and every result says how often.",
+    "strut_law, a table": "Stiffness of a strut by its length: lengths in mm and the stiffness at each in N/um,\n"
+    "# linear between. Outside it is extrapolated along the end segments, and every result says how often.",
+    "strut_law, constant": "Stiffness of a strut in N/um, the same at every length.",
+    "platform": "Stiffness in N/m of each of the 19 bars that stand for platform, spindle and tool; inf is rigid.",
+    "limits.strut_length": "Travel of the struts, between the joint centres, in mm.",
+    "limits.joint_angle": "Largest swing of the joints in degrees from the direction that each strut has at the\n"
+    "# neutral pose (x, y, z in mm, roll, pitch, yaw in degrees); inf is no limit.",
+    "limits.workspace": "Box that the tool tip may not leave: lower and upper corner x, y, z in mm.",
+    "limits.singularity": "Smallest |det J| relative to the neutral pose; 0 is singular.",
+    "setup": "Where program zero sits unless the user or the program says so (x, y, z in mm[, A, B, C in degrees]);\n"
+    "# feed of rapid moves in mm/min, for times only.",
+    "uncertainty": "What was fitted to measurements: standard deviations in the units of the keys, and correlations.",
+}
+
+
+def machine_toml(machine: Machine, preamble: str = "") -> str:
+    """The text of a machine file. `preamble` lines are put before it as comments."""
+    limits = machine.limits
+    law = machine.strut_law
+    sections: dict[str, dict[str, str]] = {
+        "frame_joints": {"mm": _rows(mm_from_m(machine.frame_joints))},
+        "platform_joints": {"mm": _rows(mm_from_m(machine.platform_joints))},
+        "reference_tool": {"length_mm": _number(mm_from_m(machine.reference_tool_length))},
+        "strut_law": {
+            "length_mm": _list([mm_from_m(length) for length, _ in law.points]),
+            "stiffness_N_per_um": _list([n_per_um_from_n_per_m(k) for _, k in law.points]),
+        }
+        if not law.constant
+        else {"stiffness_N_per_um": _number(n_per_um_from_n_per_m(law.stiffness_1))},
+        "platform": {"bar_stiffness_N_per_m": _number(machine.platform_bar_stiffness)},
+        "limits.strut_length": {
+            "min_mm": _number(mm_from_m(limits.strut_length[0])),
+            # A file needs a longest strut: 100 m stands for none.
+            "max_mm": _number(min(mm_from_m(limits.strut_length[1]), 1e5)),
+        },
+        "limits.joint_angle": {
+            "frame_max_deg": _number(deg_from_rad(limits.frame_joint_angle)),
+            "platform_max_deg": _number(deg_from_rad(limits.platform_joint_angle)),
+            "neutral_pose_mm_deg": _list(_pose_text(limits.neutral_pose)),
+        },
+        "limits.singularity": {"min_index": _number(limits.singularity)},
+        "setup": {
+            "default_origin_mm": _list(_pose_text(machine.default_origin)),
+            "rapid_mm_per_min": _number(mm_per_min_from_m_per_s(machine.rapid_feed)),
+            **_conditions(machine),
+        },
+    }
+    if np.isfinite(limits.workspace).all():
+        low, high = mm_from_m(limits.workspace)
+        sections["limits.workspace"] = {"min_mm": _list(low), "max_mm": _list(high)}
+    lines = [f"# {line}".rstrip() for line in preamble.splitlines()]
+    lines += [
+        f"{key} = {toml_text(getattr(machine, key))}" for key in ("name", "title", "source") if getattr(machine, key)
+    ]
+    kind_of_law = ", constant" if law.constant else ", a table" if law.shape else ""
+    for name, values in sections.items():
+        heading = HEADINGS[name + kind_of_law if name == "strut_law" else name]
+        lines += ["", f"# {heading}", f"[{name}]", *(f"{key} = {value}" for key, value in values.items())]
+        lines.append(f"origin = {toml_text(machine.origins.get(name, 'assumed'))}")
+        if name in machine.remarks:
+            lines.append(f"remark = {toml_text(machine.remarks[name])}")
+    for kind, entries in (("effect", machine.effects), ("instrument", machine.instruments)):
+        for entry in entries:
+            lines += ["", *_entry_text(kind, entry)]
+    if machine.uncertainty is not None:
+        lines += ["", f"# {HEADINGS['uncertainty']}", *_uncertainty(machine.uncertainty)]
+    return "\n".join([*lines, ""])
+
+
+def _conditions(machine: Machine) -> dict[str, str]:
+    """What the machine file says of set-ups and temperature, if anything."""
+    given = {"name": machine.setup, "names": machine.setups or None, "temperature_C": machine.temperature}
+    return {key: _value_text(value) for key, value in given.items() if value is not None}
+
+
+def _entry_text(kind: str, entry: EffectEntry) -> list[str]:
+    lines = [f"[[{kind}]]", f"name = {toml_text(entry.name)}"]
+    lines += [f"{key} = {_value_text(value)}" for key, value in entry.parameters.items()]
+    if entry.provenance:
+        lines += [f"[{kind}.provenance]", *(f"{key} = {_value_text(value)}" for key, value in entry.provenance.items())]
+    return lines
+
+
+def _uncertainty(uncertainty: Uncertainty) -> list[str]:
+    return [
+        "[uncertainty]",
+        f"parameters = {_value_text(uncertainty.names)}",
+        f"sd = {_list(uncertainty.sd)}",
+        f"correlation = {_rows(uncertainty.correlation)}",
+    ]
+
+
+def _pose_text(pose: Pose) -> list[float]:
+    return [*(mm_from_m(v) for v in pose[:3]), *(deg_from_rad(v) for v in pose[3:])]
+
+
+def _number(value: float) -> str:
+    """The shortest text that reads back as the same number to 14 digits: 304.77, not 304.77000000000004."""
+    if math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    rounded = float(f"{value:.14g}") + 0.0
+    return repr(rounded)
+
+
+def _list(values: Any) -> str:
+    return "[" + ", ".join(_number(float(v)) for v in values) + "]"
+
+
+def _rows(values: FloatArray) -> str:
+    return "[\n" + "".join(f"    {_list(row)},\n" for row in values) + "]"
+
+
+def toml_text(value: str) -> str:
+    """A TOML basic string; JSON's escapes are TOML's."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _value_text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return _number(value)
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value_text(v) for v in value) + "]"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_value_text(v)}" for key, v in value.items()) + "}"
+    return toml_text(str(value))

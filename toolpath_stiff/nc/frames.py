@@ -1,0 +1,211 @@
+"""Coordinates of a control: program, work offsets, G92 and G52, tool length, machine. mm and degrees.
+
+As LinuxCNC: control = Rz(rotation) (program + g92) + offset, and the spindle nose = control + tool length; G68 turns
+the program's X and Y about its own centre before all that. The "control" coordinates are those in which the work
+offsets are numbers; the set-up frame of `Moves` is the control frame shifted so that G54 (its value at the first
+motion) is zero; the machine frame places that at the origin.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar
+
+from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.tables import Offsets
+from toolpath_stiff.units import ShopPose
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+Numbers = TypeVar("Numbers", float, "NDArray[np.float64]")
+
+
+Rotation = tuple[float, float, float]  # of G68: centre X, Y in program coordinates, angle in degrees
+
+
+@dataclass
+class Frames:
+    """The coordinate systems in force, and the tool tip in control coordinates.
+
+    Attributes
+    ----------
+    offsets
+        Work offsets and reference points.
+    option, default
+        Where G54's zero sits on the machine as the caller says, and by default; mm and degrees.
+    active
+        Index of the work offset in force, as `Offsets.at` counts.
+    g92
+        Shift of G92 or G52; `g92_kept` remembers it while G92.2 suspends it.
+    rotation
+        Rotation of G68 in force.
+    tool
+        Tool length offset in force along Z.
+    position
+        Controlled point in control coordinates.
+    from_machine
+        Axes of `position` that were given in machine coordinates.
+    reference
+        G54's zero in control coordinates, fixed at the first motion.
+    posted
+        The machine that the program was posted for, whose coordinates these are; None: this one.
+    tip_held
+        Whether tool centre point control is on (G43.4): positions are then those of the tip on the part.
+    """
+
+    offsets: Offsets
+    option: ShopPose | None
+    default: ShopPose
+    active: int = 0
+    g92: list[float] = field(default_factory=lambda: [0.0] * 6)
+    g92_kept: list[float] = field(default_factory=lambda: [0.0] * 6)
+    rotation: Rotation | None = None
+    tool: float = 0.0
+    position: list[float] = field(default_factory=lambda: [0.0] * 6)
+    from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
+    reference: tuple[float, float, float] | None = None
+    source: str = ""
+    posted: PostedKinematics | None = None
+    tip_held: bool = False
+
+    @property
+    def bound(self) -> bool:
+        """Whether the present point was given in machine coordinates, an axis of it at least."""
+        # The rotary axes of a machine that is not this one have one zero for both.
+        return any(self.from_machine if self.posted is None else self.from_machine[:3])
+
+    def to_control(self, program: list[float]) -> list[float]:
+        """Control coordinates of a point in program coordinates."""
+        offset = self.offsets.at(self.active)
+        if self.rotation is not None:
+            program = _about(self.rotation, program, self.rotation[2])
+        if not offset.rotation:
+            return [shifted(p, g, o) for p, g, o in zip(program, self.g92, offset.axes, strict=True)]
+        moved = [p + g for p, g in zip(program, self.g92, strict=True)]
+        moved[0], moved[1] = _turned(moved[0], moved[1], offset.rotation)
+        return [m + o for m, o in zip(moved, offset.axes, strict=True)]
+
+    def to_program(self, control: list[float]) -> list[float]:
+        """Program coordinates of a point in control coordinates."""
+        offset = self.offsets.at(self.active)
+        if not offset.rotation:
+            program = [shifted_back(c, g, o) for c, g, o in zip(control, self.g92, offset.axes, strict=True)]
+        else:
+            moved = [c - o for c, o in zip(control, offset.axes, strict=True)]
+            moved[0], moved[1] = _turned(moved[0], moved[1], -offset.rotation)
+            program = [m - g for m, g in zip(moved, self.g92, strict=True)]
+        return program if self.rotation is None else _about(self.rotation, program, -self.rotation[2])
+
+    def axis_to_control(self, axis: int, program: Numbers) -> Numbers:
+        """`to_control` of one axis of many points at once, where nothing is rotated."""
+        return shifted(program, self.g92[axis], self.offsets.at(self.active).axes[axis])
+
+    def axis_to_program(self, axis: int, control: Numbers) -> Numbers:
+        """`to_program` of one axis of many points at once, where nothing is rotated."""
+        return shifted_back(control, self.g92[axis], self.offsets.at(self.active).axes[axis])
+
+    def axis_to_setup(self, axis: int, control: Numbers) -> Numbers:
+        """`to_setup` of one axis of many points at once."""
+        return control - self.fix_reference()[axis] if axis < 3 else control
+
+    @property
+    def rotated(self) -> bool:
+        """Whether a work offset or G68 turns the program's X and Y."""
+        return self.rotation is not None or self.offsets.at(self.active).rotation != 0.0
+
+    @property
+    def turned(self) -> float:
+        """Degrees by which the program's X and Y axes are turned from the control's: work offset and G68."""
+        return self.offsets.at(self.active).rotation + (self.rotation[2] if self.rotation else 0.0)
+
+    def turn_direction(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
+        """A direction of the program's axes in control axes."""
+        rotation = self.turned
+        if not rotation:
+            return vector
+        return (*_turned(vector[0], vector[1], rotation), vector[2])
+
+    def fix_reference(self) -> tuple[float, float, float]:
+        """G54's zero at the first motion, from then on the set-up frame's."""
+        if self.reference is None:
+            g54 = self.offsets.table[0]
+            x, y, z = g54.axes[:3]
+            self.reference = (x, y, z)
+            self.source = "option" if self.option is not None else "program" if g54.given else "default"
+        return self.reference
+
+    @property
+    def origin(self) -> ShopPose:
+        """Where G54's zero sits on the machine, mm and degrees."""
+        x, y, z = self.fix_reference()
+        if self.option is not None:
+            return self.option
+        return (x, y, z, 0.0, 0.0, 0.0) if self.source == "program" else self.default
+
+    def to_setup(self, control: list[float]) -> list[float]:
+        """Set-up coordinates of a point in control coordinates."""
+        reference = self.fix_reference()
+        return [*(c - r for c, r in zip(control[:3], reference, strict=True)), *control[3:]]
+
+    def machine_position(self) -> list[float]:
+        """The spindle's place in machine coordinates, as a control shows it: without the tool length in force."""
+        point = self.to_setup(self.position)
+        point[2] += self.tool
+        origin = self.origin
+        turned = _rotate(_matrix(origin), point[:3])
+        return [*(t + o for t, o in zip(turned, origin[:3], strict=True)), *point[3:]]
+
+    def control_of_machine(self, machine: list[float]) -> list[float]:
+        """Control coordinates of a point in machine coordinates."""
+        origin, reference = self.origin, self.fix_reference()
+        shifted = [m - o for m, o in zip(machine[:3], origin[:3], strict=True)]
+        matrix = _matrix(origin)
+        back = _rotate([[matrix[j][i] for j in range(3)] for i in range(3)], shifted)
+        x, y, z = (b + r for b, r in zip(back, reference, strict=True))
+        return [x, y, z - self.tool, *machine[3:]]
+
+    def set_tool(self, length: float) -> None:
+        """Another tool length: the machine stands still, the controlled point's numbers change."""
+        self.position[2] += self.tool - length
+        self.tool = length
+
+
+def shifted(program: Numbers, shift: float, offset: float) -> Numbers:
+    """A program coordinate in control coordinates: G92 or G52 first, then the work offset."""
+    return (program + shift) + offset
+
+
+def shifted_back(control: Numbers, shift: float, offset: float) -> Numbers:
+    """A control coordinate in program coordinates."""
+    return (control - offset) - shift
+
+
+def _turned(x: float, y: float, degrees: float) -> tuple[float, float]:
+    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return (cos * x - sin * y, sin * x + cos * y)
+
+
+def _about(rotation: Rotation, point: list[float], degrees: float) -> list[float]:
+    """A point (6) turned by `degrees` about the centre of a rotation."""
+    x, y = _turned(point[0] - rotation[0], point[1] - rotation[1], degrees)
+    return [rotation[0] + x, rotation[1] + y, *point[2:]]
+
+
+def _matrix(origin: ShopPose) -> list[list[float]]:
+    """Q = Rz(C) Ry(B) Rx(A) of a placement; plain floats, faster than arrays for one matrix."""
+    (ca, sa), (cb, sb), (cc, sc) = (
+        (math.cos(math.radians(v)), math.sin(math.radians(v))) if v else (1.0, 0.0) for v in origin[3:]
+    )
+    return [
+        [cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa],
+        [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
+        [-sb, cb * sa, cb * ca],
+    ]
+
+
+def _rotate(matrix: list[list[float]], vector: list[float]) -> list[float]:
+    return [sum(m * v for m, v in zip(row, vector, strict=True)) for row in matrix]

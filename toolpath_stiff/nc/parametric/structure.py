@@ -1,0 +1,215 @@
+"""What belongs together in a parametric program: O words, DO and END; and the letters of a macro call to its variables.
+
+LinuxCNC's manual, "O Codes"; Fanuc's operator's manuals, "Custom macro" ("Branch and repetition", "Macro call").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.words import Word
+
+if TYPE_CHECKING:
+    from toolpath_stiff.nc.parametric.statements import Steering
+
+
+Fail = Callable[..., InputError]  # (line from 0, found, expected, hint, column)
+
+
+OPENERS = {"ENDSUB": "SUB", "ENDIF": "IF", "ENDWHILE": "WHILE", "ENDREPEAT": "REPEAT"}
+
+
+SHOWN = 40  # characters of a label in a message
+
+
+LOOPS = ("WHILE", "DO", "REPEAT")
+
+
+# Macro B, argument specification I and II ("Macro call", "Argument specification").
+ARGUMENTS = {
+    "A": 1, "B": 2, "C": 3, "D": 7, "E": 8, "F": 9, "H": 11, "I": 4, "J": 5, "K": 6, "M": 13, "Q": 17, "R": 18, "S": 19,
+    "T": 20, "U": 21, "V": 22, "W": 23, "X": 24, "Y": 25, "Z": 26,
+}  # fmt: skip
+
+
+SECOND_KIND = {"A": 1, "B": 2, "C": 3}  # then I, J, K up to ten times, from #4
+
+
+LAST_LOCAL = 33
+
+
+WHOLE_ARGUMENTS = frozenset("DHMST")  # numbers of tools, offsets and speeds: no decimal point belongs to them
+
+
+@dataclass
+class Structure:
+    """Where O words of RS274/NGC belong to each other; lines from 0.
+
+    Attributes
+    ----------
+    subs
+        Label -> line of `sub`.
+    end
+        Line of `sub`, `if`, `while`, `do`, `repeat` -> line that closes it.
+    start
+        The other way round.
+    branches
+        Line of `if` -> lines of its `elseif`, `else` and `endif`; each of those -> line of the `if`.
+    inside
+        Line of `break` or `continue` -> line that opens its loop.
+    faults
+        Line that fits nowhere -> what to say if the run comes to it.
+    """
+
+    subs: dict[str, int] = field(default_factory=dict)
+    end: dict[int, int] = field(default_factory=dict)
+    start: dict[int, int] = field(default_factory=dict)
+    branches: dict[int, list[int]] = field(default_factory=dict)
+    branch_of: dict[int, int] = field(default_factory=dict)
+    inside: dict[int, int] = field(default_factory=dict)
+    faults: dict[int, InputError] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """A structure that is not closed yet."""
+
+    kind: str
+    label: str
+    at: int
+
+
+def structure_of(steerings: Iterable[tuple[int, Steering]], firsts: set[int], fail: Fail) -> Structure:
+    """Where the O words of a program belong to each other.
+
+    Parameters
+    ----------
+    steerings
+        The blocks that steer, with their lines (from 0), in order.
+    firsts
+        First lines of files, which have labels of their own.
+    fail
+        Makes the error of a line.
+    """
+    structure = Structure()
+    opened: list[_Opened] = []
+    labels: list[dict[str, int]] = [{}]  # of the file, and of the sub that is open
+    for at, steering in steerings:
+        if at in firsts:
+            labels = [{}]
+        fault = _pair(structure, opened, labels, at, steering)
+        if fault:
+            structure.faults[at] = fail(at, *fault, column=steering.column)
+    endless = {start.at: f"o{start.label.lower()[:SHOWN]} {start.kind.lower()} has no end" for start in opened}
+    # `break` and `continue` go to that end.
+    leaving = {row: f"{endless[loop]} (line {loop + 1})" for row, loop in structure.inside.items() if loop in endless}
+    for row, text in (endless | leaving).items():
+        structure.faults[row] = fail(row, text)
+    return structure
+
+
+def _pair(
+    structure: Structure, opened: list[_Opened], labels: list[dict[str, int]], at: int, steering: Steering
+) -> tuple[str, ...]:
+    """Add one O word; returns what is wrong with it and what was expected, nothing if it fits."""
+    kind, label = steering.kind, steering.label.text
+    last = opened[-1] if opened else _Opened("", "", 0)
+    closes_do = kind == "WHILE" and (last.kind, last.label) == ("DO", label)
+    if kind in ("SUB", "IF", "DO", "REPEAT") or (kind == "WHILE" and not closes_do):
+        return _open(structure, opened, labels, _Opened(kind, label, at))
+    if kind in OPENERS or closes_do:
+        if last.label != label or not (closes_do or last.kind == OPENERS[kind]):
+            return _unpaired(steering)
+        opened.pop()
+        if kind == "ENDSUB":
+            labels.pop()
+        structure.end[last.at], structure.start[at] = at, last.at
+        if kind == "ENDIF":
+            structure.branches[last.at].append(at)
+    elif kind in ("ELSE", "ELSEIF"):
+        if (last.kind, last.label) != ("IF", label):
+            return _unpaired(steering)
+        structure.branches[last.at].append(at)
+        structure.branch_of[at] = last.at
+    elif kind in ("BREAK", "CONTINUE"):
+        loops = [one.at for one in opened if one.label == label and one.kind in LOOPS]
+        if not loops:
+            return _unpaired(steering)
+        structure.inside[at] = loops[-1]
+    return ()
+
+
+def _open(structure: Structure, opened: list[_Opened], labels: list[dict[str, int]], one: _Opened) -> tuple[str, ...]:
+    if one.label in labels[-1] or not one.label:
+        place = f"is in line {labels[-1][one.label] + 1} already" if one.label else "is not known before it runs"
+        return (f"the label o{one.label.lower()[:SHOWN]} {place}", "each label once")
+    labels[-1][one.label] = one.at
+    opened.append(one)
+    if one.kind == "SUB":
+        structure.subs[one.label] = one.at
+        labels.append({})
+    elif one.kind == "IF":
+        structure.branches[one.at] = []
+    return ()
+
+
+def _unpaired(steering: Steering) -> tuple[str, ...]:
+    return (
+        f"o{steering.label.text.lower()[:SHOWN]} {steering.kind.lower()} does not belong to what is open before it",
+    )
+
+
+def loops_of(steerings: Iterable[tuple[int, Steering]], fail: Fail) -> dict[int, int]:
+    """Line of WHILE DO or DO -> line of its END, and back; from 0. Raises `InputError` for one without the other."""
+    loops: dict[int, int] = {}
+    opened: list[tuple[str, int]] = []
+    for at, steering in steerings:
+        label = steering.label.text
+        if steering.kind in ("WHILE", "DO"):
+            opened.append((label, at))
+        elif steering.kind == "END":
+            if not opened or opened[-1][0] != label:
+                raise fail(at, f"END{label} without DO{label}", column=steering.column)
+            _, start = opened.pop()
+            loops[at], loops[start] = start, at
+    for label, at in opened:
+        raise fail(at, f"DO{label} has no END{label}")
+    return loops
+
+
+def arguments_of(
+    words: Iterable[Word], increments: bool, fault: Callable[[Word, str, str], InputError]
+) -> dict[int, float | None]:
+    """The local variables that the words of a macro call give.
+
+    Parameters
+    ----------
+    words
+        Those after G65 or G66.
+    increments
+        Whether numbers without a decimal point count increments on the control.
+    fault
+        Makes the error of a word: what is wrong with it, what was expected.
+    """
+    words = [word for word in words if word.letter not in "PL"]
+    letters = [word.letter for word in words]
+    second = any(letters.count(letter) > 1 for letter in "IJK")
+    found: dict[int, float | None] = {}
+    triple, previous = -1, "K"
+    for word in words:
+        if second and word.letter in "IJK":
+            triple += word.letter <= previous
+            previous = word.letter
+            place = 4 + 3 * triple + "IJK".index(word.letter)
+        else:
+            place = (SECOND_KIND if second else ARGUMENTS).get(word.letter, 0)
+        if not 1 <= place <= LAST_LOCAL or place in found:
+            expected = "each letter once; with I, J, K repeated no other ones than A, B, C"
+            raise fault(word, "cannot be an argument of this call", expected)
+        if increments and word.value and "." not in word.text and word.letter not in WHOLE_ARGUMENTS:
+            raise fault(word, "has no decimal point, and parameters of the control scale it", f"{word.text}.")
+        found[place] = word.value
+    return found

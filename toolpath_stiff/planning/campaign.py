@@ -1,0 +1,283 @@
+"""A good first campaign, before anything is known of a machine.
+
+What it must hold, so that most effects can be told from each other later: at least four heights and half of the
+poses tilted by 15 to 25 degrees (links above the platform against links below); two loads (what depends on the load);
+two tool lengths at some poses; one pose with and without a riser; one pose with its images turned by 120 and 240
+degrees about the machine's axis, which only a machine that is not threefold tells apart; places that are clamped anew,
+so that the scatter is known; random order, so that a drift looks like nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
+from pathlib import Path
+
+import numpy as np
+from numpy.random import Generator
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.inference.evidence import LAW_PRIOR
+from toolpath_stiff.inference.judgement import NONE
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.planning.gaps import ReadingNoise, pair_shares, repeat_and_clamping
+from toolpath_stiff.planning.rivals import forecast_all, unfitted_rivals
+from toolpath_stiff.planning.visits import (
+    AXES,
+    READING_EVERY,
+    Costs,
+    Menu,
+    Visits,
+    axis_levels,
+    draw_poses,
+    images,
+    planned_readings,
+    reachable,
+)
+from toolpath_stiff.stiffness.contract import Effect
+from toolpath_stiff.units import RAD_PER_DEG
+
+FEWEST, MOST = 8, 200  # poses
+
+
+LEAST_TILT = 15.0 * RAD_PER_DEG
+
+
+IMAGES = 3
+
+
+LONG_TOOL_SHARE, RECLAMPED, CLAMPINGS = 6, 2, 3  # every sixth pose with a longer tool; 2 poses clamped 3 times a set-up
+
+
+TABLE, RISER = "table", "riser"
+
+
+TRIES = 600  # poses to choose from
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Visits in measuring order.
+
+    Attributes
+    ----------
+    visits
+        The visits, in measuring order.
+    repeats, purposes
+        Which repeat of its place each visit is; what it is for.
+    minutes
+        Work.
+    sees
+        Effect -> gap in standard deviations between it, at its usual size, and nothing.
+    """
+
+    visits: Visits
+    repeats: tuple[int, ...]
+    purposes: tuple[str, ...]
+    minutes: float
+    sees: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class _Stop:
+    pose: FloatArray
+    extension: float
+    setup: str
+    repeat: int
+    purpose: str
+
+
+def first_campaign(
+    machine: Machine,
+    n: int = 24,
+    *,
+    menu: Menu | None = None,
+    costs: Costs | None = None,
+    seed: int = 0,
+    effects: Mapping[str, Effect] | None = None,
+    noise: float | tuple[float, float] = 0.02,
+    effect_files: Sequence[str | Path] = (),
+) -> Campaign:
+    """A campaign of n poses, all reachable, along X, Y and Z under the smallest and the largest load of the menu.
+
+    Parameters
+    ----------
+    machine
+        What is to be measured.
+    n
+        Poses; some are visited again with a longer tool, on a riser, or clamped anew.
+    menu, costs
+        What may vary: radius, tilt, heights, loads, tool lengths, set-ups; minutes of work.
+    seed
+        Of poses and order.
+    effects
+        Name -> effect: which it is to be seen whether the campaign would show them.
+    noise
+        Relative sd of a reading, re-clamping included, or (repeat, clamping), for that.
+    effect_files
+        A user's own effects.
+
+    Raises
+    ------
+    InputError
+        Too few or too many poses, or the machine does not reach as many.
+    """
+    if not FEWEST <= n <= MOST:
+        raise InputError(f"a first campaign of {n} poses", expected=f"{FEWEST} to {MOST}")
+    costs = costs or Costs()
+    menu = menu or Menu(setups=(TABLE, RISER))
+    rng = np.random.default_rng(seed)
+    poses = _poses(machine, menu, n, rng)
+    stops = _ordered(_stops(machine, poses, menu), rng)
+    visits = _visits(stops, menu, rng)
+    sees = {} if effects is None else _sees(machine, visits, effects, menu, noise, effect_files)
+    return Campaign(
+        visits,
+        tuple(stop.repeat for stop in stops),
+        tuple(stop.purpose for stop in stops),
+        _minutes(stops, visits, costs),
+        sees,
+    )
+
+
+def _poses(machine: Machine, menu: Menu, n: int, rng: Generator) -> FloatArray:
+    """(n, 6): one pose and its images, then vertical ones, then n // 2 tilted ones; as unlike each other as can be."""
+    levels = menu.heights or axis_levels(machine)
+    if len(levels) < 4:
+        raise InputError(f"a first campaign at {len(levels)} heights", expected="4 or more")
+    drawn = np.concatenate([draw_poses(machine, menu, TRIES // 4, rng) for _ in range(4)])
+    tilt = np.arccos(np.clip(np.cos(drawn[:, 3]) * np.cos(drawn[:, 4]), -1.0, 1.0))
+    upright = drawn[tilt == 0.0]
+    tilted = drawn[tilt >= min(LEAST_TILT, 0.6 * menu.max_tilt)]
+    tilted = tilted if menu.max_tilt > 0.0 else drawn[:0]
+    n_tilted = n // 2 if len(tilted) else 0
+    scale = np.array([menu.radius, menu.radius, np.ptp(levels) / 2.0, *[max(menu.max_tilt, 1e-3)] * 3])
+    chosen = _images_of(machine, upright, levels, menu)
+    for pool, count in ((upright, n - n_tilted), (tilted, n)):
+        chosen = _spread(chosen, pool, count, scale)
+    if len(chosen) < n:
+        raise InputError(
+            f"machine {machine.name} reaches only {len(chosen)} of {n} poses of a first campaign",
+            hint="ask for fewer, or allow a larger radius or more tilt",
+        )
+    return chosen
+
+
+def _images_of(machine: Machine, upright: FloatArray, levels: Sequence[float], menu: Menu) -> FloatArray:
+    """(3, 6) a vertical pose off the axis, at a middle height, and its two images, if the machine reaches such."""
+    middle = levels[len(levels) // 2]
+    off = np.hypot(upright[:, 0], upright[:, 1])
+    candidates = upright[(off > 0.4 * menu.radius)]
+    order = np.lexsort((-off[off > 0.4 * menu.radius], np.abs(candidates[:, 2] - middle)))
+    for index in order:
+        three = images(candidates[index])
+        three[:, :2] = np.round(three[:, :2], 4)
+        if reachable(machine, three, 0.0).all():
+            return three
+    return np.zeros((0, 6))
+
+
+def _spread(chosen: FloatArray, pool: FloatArray, count: int, scale: FloatArray) -> FloatArray:
+    """The chosen poses and more from the pool, each the farthest from all before it."""
+    while len(chosen) < count and len(pool):
+        if len(chosen):
+            apart = np.linalg.norm((pool[:, None] - chosen[None]) / scale, axis=2).min(axis=1)
+            best = int(np.argmax(apart))
+            if apart[best] < 1e-9:
+                break
+        else:
+            best = 0
+        chosen = np.concatenate([chosen, pool[best : best + 1]])
+    return chosen
+
+
+def _stops(machine: Machine, poses: FloatArray, menu: Menu) -> list[_Stop]:
+    """What is done at which pose."""
+    n, tool, setup = len(poses), menu.tool_extensions[0], menu.setups[0]
+    stops = []
+    for k, pose in enumerate(poses):
+        purpose = "image" if k < IMAGES else "tilted" if pose[3:].any() else "vertical"
+        stops.append(_Stop(pose, tool, setup, 1, purpose))
+    for extension in menu.tool_extensions[1:]:
+        fits = np.flatnonzero(reachable(machine, poses, extension))
+        spread = np.unique(np.linspace(0, max(len(fits) - 1, 0), max(n // LONG_TOOL_SHARE, 2)).astype(int))
+        stops += [_Stop(poses[fits[k]], extension, setup, 1, "longer tool") for k in spread[: len(fits)]]
+    # Clamped anew: the first image and the last pose, which is tilted.
+    again = (0, n - 1)[:RECLAMPED]
+    for other in menu.setups[1:]:
+        stops += [_Stop(poses[k], tool, other, 1, f"set-up {other}") for k in again]
+    stops += [
+        _Stop(poses[k], tool, name, repeat, "clamped anew")
+        for name, k, repeat in product(menu.setups, again, range(2, CLAMPINGS + 1))
+    ]
+    return stops
+
+
+def _ordered(stops: list[_Stop], rng: Generator) -> list[_Stop]:
+    """At random within a set-up and a tool, which are changed as seldom as can be; repeats in their order."""
+    shuffled = [stops[k] for k in rng.permutation(len(stops))]
+    first = {(stop.setup, stop.extension): k for k, stop in reversed(list(enumerate(stops)))}
+    shuffled.sort(key=lambda stop: first[(stop.setup, stop.extension)])
+    found: list[_Stop] = []
+    counted: dict[tuple[bytes, float, str], int] = {}
+    for stop in shuffled:
+        key = (stop.pose.tobytes(), stop.extension, stop.setup)
+        counted[key] = counted.get(key, 0) + 1
+        found.append(_Stop(stop.pose, stop.extension, stop.setup, counted[key], stop.purpose))
+    return found
+
+
+def _visits(stops: Sequence[_Stop], menu: Menu, rng: Generator) -> Visits:
+    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads))))
+    jobs = list(product(AXES, loads))
+    count = len(jobs)
+    orders = [rng.permutation(count) for _ in stops]
+    names = np.array([jobs[k][0] for order in orders for k in order])
+    pose = np.array([stop.pose for stop in stops])
+    extension = np.array([stop.extension for stop in stops])
+    setup = np.array([stop.setup for stop in stops], dtype=str)
+    readings = planned_readings(
+        np.repeat(pose, count, axis=0),
+        names,
+        np.array([jobs[k][1] for order in orders for k in order]),
+        np.repeat(extension, count),
+        np.repeat(setup, count),
+        np.tile(READING_EVERY * np.arange(1.0, count + 1.0), len(stops)),
+    )
+    v = len(stops)
+    return Visits(
+        pose, extension, np.zeros(v), setup, np.full(v, ""), readings, names, np.ones(v * count, dtype=np.int64),
+        np.arange(v * count), np.arange(v) * count,
+    )  # fmt: skip
+
+
+def _minutes(stops: Sequence[_Stop], visits: Visits, costs: Costs) -> float:
+    minutes = len(stops) * costs.pose + costs.reading * len(visits.readings)
+    for before, after in pairwise(stops):
+        minutes += costs.setup * (before.setup != after.setup) + costs.tool * (before.extension != after.extension)
+    return float(minutes)
+
+
+def _sees(
+    machine: Machine,
+    visits: Visits,
+    effects: Mapping[str, Effect],
+    menu: Menu,
+    noise: float | tuple[float, float],
+    effect_files: Sequence[str | Path],
+) -> dict[str, float]:
+    """Gap between each effect at its usual size and nothing, the strut law refitted."""
+    own = {entry.name for entry in (*machine.effects, *machine.instruments)}
+    names = [name for name in effects if name not in own]
+    rivals = unfitted_rivals([NONE, *names], effects, setup=menu.setups[-1])
+    rivals = [replace(rival, covariance=LAW_PRIOR**2 * np.eye(2), free=()) for rival in rivals]
+    forecasts, _, scatter = forecast_all(machine, rivals, visits.readings, effect_files)
+    reading_noise = ReadingNoise(*repeat_and_clamping(noise), scatter)
+    everywhere = np.arange(len(visits))
+    return {
+        forecast.name: pair_shares(visits, forecasts[0], forecast, reading_noise).gap(everywhere)
+        for forecast in forecasts[1:]
+        if np.isfinite(forecast.mean).all()
+    }

@@ -1,0 +1,143 @@
+"""What else would look the same as an effect of the catalogue that is named as the answer.
+
+A name of the catalogue is a part and a way in which it gives; where poses are few, a part that is in no catalogue may
+give the same readings: without tilted poses a floor that rocks is a table that shifts. So each term of the dictionary
+is put in the place of the named effect, the strut law refitted, and those that fit as well as it does are told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.candidates import candidates_of
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.portrait.choice import ROUGH, Weighed
+from toolpath_stiff.portrait.columns import Ground
+from toolpath_stiff.portrait.selection import Selection
+from toolpath_stiff.portrait.terms import CATALOGUE_LINKS, Term
+
+# Odds beyond which what fits worse is not the same (strong evidence: Kass and Raftery 1995). A term that is one of many
+# constants or places must fit better than the plainest ones by as much as its prior weight is smaller.
+AS_WELL = float(np.log(20.0))
+
+
+ITSELF = 0.99  # correlation from which a term of the same link is the named effect itself
+
+
+MOST_TOLD, TOLD = 6, 0.03  # terms that are told, and the least share of one
+
+
+HELD = 0.90  # share that the links and variables told add up to
+
+
+@dataclass(frozen=True)
+class Alike:
+    """Terms that fit as well as a named effect.
+
+    Attributes
+    ----------
+    terms
+        Term with its size and share, the best of each link, direction and variable, the likeliest first.
+    links, variables
+        Name -> share, the likeliest first, the fewest that hold 90 %.
+    """
+
+    terms: tuple[tuple[Term, float], ...]
+    links: tuple[tuple[str, float], ...]
+    variables: tuple[tuple[str, float], ...]
+
+
+def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: int) -> Alike | None:
+    """Terms of the dictionary that fit the readings as well as a named effect does; None where there are none.
+
+    Parameters
+    ----------
+    problem, noise
+        Readings, model and scatter; the noise model behind the scatter.
+    base, named
+        The model with its strut law refitted, without and with the named effect.
+    seed
+        Of the selection.
+    """
+    if len(named.candidates) != 1:  # no single term stands for two effects
+        return None
+    selection = Selection(problem, base, noise, seed)
+    if not len(selection.dictionary):
+        return None
+    # Both under the scatter of the named fit, so that wild readings count alike.
+    start = selection.start
+    start = replace(start, fit=replace(start.fit, scatter=named.scatter))
+    entries = selection.finalists(selection.scores(start))
+    if not entries:
+        return None
+    terms = [entry.term for entry in entries]
+    found = selection.together(start, terms)
+    squares = float(start.fit.scatter.precision.squares(named.residual))
+    reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2) - _freedom(problem, named)
+    prior = np.array([entry.log_prior for entry in entries])
+    plainest = float(selection.dictionary.log_prior.max())
+    same = (found.posterior + prior - plainest >= reached - AS_WELL) & (np.abs(found.size[:, -1]) > 0.0)
+    change = np.exp(named.residual - problem.observed) - problem.predictor.strut_part(named.law) - problem.rest
+    same &= ~_itself(selection.ground, terms, named, change)
+    if not same.any():
+        return None
+    rows = np.flatnonzero(same)
+    logs = found.posterior[rows] / ROUGH + prior[rows]
+    weights = np.exp(logs - logs.max())
+    order = np.argsort(-weights, kind="stable")
+    sized = tuple(terms[i].sized(_size(selection, terms[i], float(found.size[i, -1]))) for i in rows[order].tolist())
+    weighed = Weighed(sized, weights[order] / weights.sum(), np.ones(len(rows), dtype=bool))
+    return Alike(
+        _told(weighed),
+        _fewest(weighed.summed(lambda term: term.link)),
+        _fewest(weighed.summed(lambda term: term.variable)),
+    )
+
+
+def _freedom(problem: Problem, named: Fit) -> float:
+    """Log likelihood that an effect gains by its further sizes (Schwarz 1978) and by a choice, which a term has not."""
+    data = problem.predictor.data
+    choices = len(candidates_of(named.candidates[0].effect, data))
+    return 0.5 * (len(named.free) - 1) * float(np.log(len(data))) + float(np.log(max(choices, 1)))
+
+
+def _size(selection: Selection, term: Term, scaled: float) -> float:
+    """SI size of a term from its rms change of compliance."""
+    return scaled / float(np.sqrt(np.mean((selection.ground.column(term) / selection.compliance) ** 2)))
+
+
+def _itself(ground: Ground, terms: list[Term], named: Fit, change: FloatArray) -> NDArray[np.bool_]:
+    """(G,) whether a term is what the named effect does, in its own link; `change` (n,) m/N is what it adds."""
+    links = {candidate.effect.link for candidate in named.candidates}
+    own = [CATALOGUE_LINKS.get(term.link, term.link) in links for term in terms]
+    return np.array(
+        [mine and _correlation(ground.column(t), change) > ITSELF for t, mine in zip(terms, own, strict=True)]
+    )
+
+
+def _correlation(first: FloatArray, second: FloatArray) -> float:
+    norm = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(first @ second) / norm if norm > 0.0 else 0.0
+
+
+def _told(weighed: Weighed) -> tuple[tuple[Term, float], ...]:
+    """The best of each link, direction and variable, with the shares of all of them."""
+    best: dict[tuple[str, str, str], Term] = {}
+    shares: dict[tuple[str, str, str], float] = {}
+    for term, weight in zip(weighed.terms, weighed.weights.tolist(), strict=True):
+        kind = (term.link, term.direction, term.variable)
+        best.setdefault(kind, term)
+        shares[kind] = shares.get(kind, 0.0) + weight
+    ranked = sorted(shares.items(), key=lambda item: -item[1])
+    return tuple((best[kind], share) for kind, share in ranked[:MOST_TOLD] if share >= TOLD)
+
+
+def _fewest(summed: list[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
+    """The fewest that hold `HELD`."""
+    count = 1 + int(np.searchsorted(np.cumsum([share for _, share in summed]), HELD - 1e-9))
+    return tuple(summed[:count])

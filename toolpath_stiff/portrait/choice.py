@@ -1,0 +1,254 @@
+"""Which terms of the dictionary describe what is missing: few, chosen by likelihood, held to left-out points.
+
+Terms are added one by one. A term joins where its gain is more than the best of the whole dictionary would reach by
+chance (simulated from the noise model: look-elsewhere) and where the error at left-out points falls. What is added one
+by one depends on where it began, and two or three terms that share one cause are easily begun with the wrong one: where
+one term is not enough, the search begins anew at the other links that promise most, and the best description is taken.
+
+Which link and which variable it is follows from all of these descriptions: of each, every term that may be the leading
+one, and all that could stand in its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.fits import HeldOut, held_out
+from toolpath_stiff.portrait.dictionary import Entry, crossed
+from toolpath_stiff.portrait.selection import Description, Selection
+from toolpath_stiff.portrait.terms import Term
+
+MOST_TERMS, POINTS_EACH = 3, 6  # and points for each term but the first
+
+
+LEADS = 0.01  # probability by chance below which the first term is taken for something
+
+
+BETTER = 0.98  # share of the rms at left-out points to which a further term must bring it
+
+
+BEGINNINGS = 3  # further links at which the search begins
+
+
+# By how much likelihoods are flattened: the true shape is none of the dictionary's, so that what fits a little better
+# is not that much likelier. Of a large effect the shape's error counts, which grows with the gain; assumed.
+ROUGH, SHAPE = 2.5, 0.0015
+
+
+FAINT = 0.02  # share below which a description, or a term as the leading one of it, is left out of the sums
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Terms that may be the leading one, with their posterior probabilities, the likeliest first.
+
+    Attributes
+    ----------
+    terms, weights
+        N terms, (N,) probabilities.
+    chosen
+        (N,) whether in the place of the leading term of the description that was chosen.
+    """
+
+    terms: tuple[Term, ...]
+    weights: FloatArray
+    chosen: NDArray[np.bool_]
+
+    def summed(self, of: Callable[[Term], str]) -> list[tuple[str, float]]:
+        """Name -> probability summed over the terms, the likeliest first."""
+        found: dict[str, float] = {}
+        for term, weight in zip(self.terms, self.weights.tolist(), strict=True):
+            found[of(term)] = found.get(of(term), 0.0) + weight
+        return sorted(found.items(), key=lambda item: (-item[1], item[0]))
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What was chosen.
+
+    Attributes
+    ----------
+    description
+        The terms, the leading one first.
+    chance
+        How often something as strong as the leading term comes up by chance.
+    weighed
+        What else may be the leading term.
+    held
+        Errors at left-out points.
+    """
+
+    description: Description
+    chance: float
+    weighed: Weighed
+    held: HeldOut
+
+
+def choose(selection: Selection) -> tuple[Chosen | None, float]:
+    """One to three terms, none where nothing stands out from chance; and how often chance does as much."""
+    start = selection.start
+    if not len(selection.dictionary):
+        return None, 1.0
+    gains = selection.scores(start)
+    chance, threshold = selection.chance(start, float(gains.max(initial=0.0)))
+    begun = selection.grown(start)
+    if chance > LEADS or begun is None:
+        return None, chance
+    found = [_completed(selection, begun, threshold)]
+    if _searched(found[0]) > 1:
+        others = _other_beginnings(selection, start, found[0].terms[0])
+        found += [_completed(selection, other, threshold) for other in others]
+    found = _different(sorted(found, key=lambda one: -_worth(one, threshold)))
+    found = [_leading_first(selection, one) for one in found]
+    return Chosen(found[0], chance, weigh(selection, found, threshold), _held(selection, found[0])), chance
+
+
+def _completed(selection: Selection, begun: Description, threshold: float) -> Description:
+    """With further terms as long as they join."""
+    points = len(set(selection.problem.predictor.data.point.tolist()))
+    found = _multiplied(selection, begun, 0, threshold)
+    while len(found.terms) < min(MOST_TERMS, points // POINTS_EACH):
+        more = _one_more(selection, found, threshold)
+        if more is None:
+            break
+        found = more
+    return found
+
+
+def _one_more(selection: Selection, before: Description, threshold: float) -> Description | None:
+    """With a further term, where it does more than chance and helps at left-out points."""
+    if selection.scores(before).max() <= threshold:
+        return None
+    more = selection.grown(before)
+    if more is None or 2.0 * (more.posterior - before.posterior) <= threshold:
+        return None
+    more = _swapped(selection, more)
+    return more if _held(selection, more).rms <= BETTER * _held(selection, before).rms else None
+
+
+def _multiplied(selection: Selection, description: Description, k: int, threshold: float) -> Description:
+    """The k-th term times a shape of a second variable, under what is asked of a further term."""
+    if description.terms[k].times is not None:
+        return description
+    before = selection.without(description, k)
+    more = selection.multiplied(before, description, k)
+    if more is None or 2.0 * (more.posterior - description.posterior) <= threshold:
+        return description
+    return more if _held(selection, more).rms <= BETTER * _held(selection, description).rms else description
+
+
+def _swapped(selection: Selection, description: Description) -> Description:
+    """The first term once more the best beside the others: it was chosen without them."""
+    again = selection.grown(selection.without(description, 0))
+    return again if again is not None and again.posterior > description.posterior else description
+
+
+def _other_beginnings(selection: Selection, start: Description, first: Term) -> list[Description]:
+    """Single terms of other links than that of `first` that promise most together with a further term."""
+    entries = selection.finalists(selection.scores(start))
+    posterior = selection.together(start, [entry.term for entry in entries]).posterior
+    seen: set[tuple[str, str]] = set()
+    outlook: list[tuple[float, Entry, Description]] = []
+    for i in np.argsort(-posterior, kind="stable").tolist():
+        entry = entries[i]
+        kinds = {("link", entry.local.link), ("variable", entry.variable)}
+        if entry.local.link == first.link or kinds <= seen:
+            continue
+        seen |= kinds
+        begun = selection.extended(start, entry.term)
+        gain = float(selection.scores(begun).max(initial=0.0))
+        outlook.append((begun.posterior + 0.5 * gain, entry, begun))
+    outlook.sort(key=lambda one: -one[0])
+    links: dict[str, Description] = {}
+    for _, entry, begun in outlook:
+        links.setdefault(entry.local.link, begun)
+    return [selection.settled(start, begun) for begun in list(links.values())[:BEGINNINGS]]
+
+
+def _worth(description: Description, threshold: float) -> float:
+    """Log posterior less what chance would gain by further terms and second variables."""
+    return description.posterior - 0.5 * threshold * (_searched(description) - 1)
+
+
+def _searched(description: Description) -> int:
+    """How often the dictionary was searched for it: terms and second variables."""
+    return len(description.terms) + sum(term.times is not None for term in description.terms)
+
+
+def _different(descriptions: Sequence[Description]) -> list[Description]:
+    """The first of those that differ by constants only."""
+    found: dict[frozenset[tuple[object, ...]], Description] = {}
+    for one in descriptions:
+        kinds = frozenset((t.link, t.where, t.direction, t.variables, t.column, t.shape) for t in one.terms)
+        found.setdefault(kinds, one)
+    return list(found.values())
+
+
+def _costs(selection: Selection, description: Description) -> FloatArray:
+    """(p,) of log posterior that the absence of each term costs."""
+    left = [selection.without(description, k).posterior for k in range(len(description.terms))]
+    return description.posterior - np.array(left)
+
+
+def _leading_first(selection: Selection, description: Description) -> Description:
+    """Terms by what their absence would cost."""
+    if len(description.terms) < 2:
+        return description
+    rows = np.argsort(-_costs(selection, description), kind="stable").tolist()
+    return selection.described(
+        [description.terms[k] for k in rows], description.columns[rows], description.scale[rows],
+        description.fit.law, description.fit.scatter,
+    )  # fmt: skip
+
+
+def _held(selection: Selection, description: Description) -> HeldOut:
+    return held_out(description.fit, selection.problem.predictor.data.point)
+
+
+def temper(selection: Selection, description: Description, gain: float) -> float:
+    """By how much less a likelihood is to be trusted where shapes are rough, for a gain in log likelihood."""
+    squares = float(description.fit.scatter.precision.squares(description.fit.residual))
+    left = squares / max(len(selection.compliance) - 2 - len(description.terms), 1)
+    return ROUGH * max(left, 1.0) + SHAPE * max(gain, 0.0)
+
+
+def weigh(selection: Selection, descriptions: Sequence[Description], threshold: float) -> Weighed:
+    """Posterior probabilities of what may be the leading term, over descriptions, the chosen one first."""
+    costs = [_costs(selection, one) for one in descriptions]
+    flat = temper(selection, descriptions[0], float(costs[0].max()))
+    terms: list[Term] = []
+    logs: list[FloatArray] = []
+    chosen: list[NDArray[np.bool_]] = []
+    worths = np.array([one.posterior / flat - 0.5 * threshold * _searched(one) for one in descriptions])
+    for number, (one, cost) in enumerate(zip(descriptions, costs, strict=True)):
+        leads = np.exp((cost - cost.max()) / flat)
+        leads /= leads.sum()
+        for k in np.flatnonzero(leads >= FAINT).tolist():
+            if np.exp(worths[number] - worths.max()) * leads[k] < FAINT and (number, k) != (0, 0):
+                continue
+            own, log = _in_place(selection, one, k, flat)
+            terms += own
+            logs.append(log - 0.5 * threshold * (_searched(one) - 1) + np.log(leads[k]))
+            chosen.append(np.full(len(own), (number, k) == (0, 0)))
+    every = np.concatenate(logs)
+    weights = np.exp(every - every.max())
+    order = np.argsort(-weights, kind="stable")
+    return Weighed(
+        tuple(terms[i] for i in order.tolist()), weights[order] / weights.sum(), np.concatenate(chosen)[order]
+    )
+
+
+def _in_place(selection: Selection, description: Description, k: int, flat: float) -> tuple[list[Term], FloatArray]:
+    """Terms in the place of the k-th one, beside the others, with their flattened log posterior."""
+    others = selection.scattered(selection.without(description, k), description)
+    entries = selection.finalists(selection.scores(others)) + crossed(description.terms[k], selection.ground)
+    entries = list({entry.term: entry for entry in entries}.values())
+    found = selection.together(others, [entry.term for entry in entries])
+    posterior = found.posterior + description.fit.scatter.log_price
+    logs = posterior / flat + np.array([entry.log_prior for entry in entries])
+    return [entry.term for entry in entries], np.where(np.abs(found.size[:, -1]) > 0.0, logs, -np.inf)

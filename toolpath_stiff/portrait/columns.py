@@ -1,0 +1,363 @@
+"""What terms do to readings: the shapes over the values that occur, and the compliance that a unit of a term adds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.portrait.terms import (
+    AXES,
+    IN_SERIES,
+    PINS,
+    PLACE,
+    SWINGS,
+    VARIABLES,
+    Constants,
+    Term,
+    along_pins,
+    carriers,
+    coupled,
+    coupling_share,
+    factor_values,
+    multiplied,
+    reading_share,
+    shape_values,
+    variable_values,
+)
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
+
+Shapes = tuple[tuple[tuple[str, Constants], ...], FloatArray]  # shape and constants; (s, n) or (s, n, 6) values
+
+
+BUMPS, MOST_EDGES = 5, 5
+
+
+SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
+
+
+MOST_TURNS = 5  # of a wave over a place: clamps and grooves of a table
+
+
+TURNED = 0.1  # rms change of stiffness at which a resistance to turning is looked for: it is not linear in its size
+
+
+PHASES = 3  # of half a turn; the other half is the other sign's
+
+
+def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "") -> list[tuple[str, Constants]]:
+    """Shapes over the values that a variable takes, with their constants; none where it does not vary.
+
+    `signed`: of what may change to both sides, where one side of each shape says it all; `column`: of a tilt. About a
+    lean few poses say more than its side and its size; a swing counts from where the joint rests.
+    """
+    if variable in ("constant", "direction", "setup"):
+        return [("offset", ())]
+    different = np.unique(np.round(values, 9))
+    if variable == "force sign":
+        return _signs(signed) if len(different) > 1 else []
+    if len(different) < 2 or different[-1] - different[0] <= 1e-9 * max(abs(different[-1]), 1e-9):
+        return []
+    low, high = float(different[0]), float(different[-1])
+    many = len(different)
+    found: list[tuple[str, Constants]] = []
+    if variable in ("load", "strut force") and not (signed and many == 2):
+        # Of what may change to both sides, less of what friction holds is play.
+        play = variable == "strut force" and not signed
+        found += _of_a_force(low, high, float(np.median(values)), many > 2, play)
+    found += _slopes(low, high, signed, many > 4)
+    return found if many == 2 else found + _bent(variable, different, signed, column)
+
+
+def _bent(variable: str, different: FloatArray, signed: bool, column: str) -> list[tuple[str, Constants]]:
+    """Shapes that are no straight lines, over three values or more of a variable, ascending."""
+    sides = (1.0,) if signed else (1.0, -1.0)
+    low, high = float(different[0]), float(different[-1])
+    many, place = len(different), variable in (*PLACE, "strut length")
+    found = _squares(low, high, place)
+    if column in SWINGS:
+        found.append(("square", (("centre", 0.0), ("reach", high))))
+    edges = [0.0] if column in AXES else _edges(different, MOST_EDGES if place else 3)
+    found += [("threshold", (("edge", edge), ("side", side))) for edge in edges for side in sides]
+    if place and many > 4:
+        found += _bumps(low, high)
+    if (place or variable not in VARIABLES) and many > 8:
+        found += _periodic(variable, low, high - low, many, signed)
+    return found
+
+
+def _signs(signed: bool) -> list[tuple[str, Constants]]:
+    """Tension or compression alone."""
+    return [("sign", (("side", side),)) for side in ((1.0,) if signed else (1.0, -1.0))]
+
+
+def _of_a_force(low: float, high: float, reference: float, several: bool, play: bool) -> list[tuple[str, Constants]]:
+    """Powers of a force, what friction holds below some of it, and play that some of it uses up."""
+    powers: list[tuple[str, Constants]] = [
+        ("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)
+    ]
+    held = [low + share * (high - low) for share in (0.05, 0.15, 0.3)] if several else [0.5 * low, 0.9 * low]
+    used_up: list[tuple[str, Constants]] = [("threshold", (("within", force),)) for force in held if play]
+    return [*powers, *(("threshold", (("beyond", force),)) for force in held), *used_up]
+
+
+def _squares(low: float, high: float, place: bool) -> list[tuple[str, Constants]]:
+    """Squares about the middle of the range, and of a place about the machine's axis."""
+    centres = [0.5 * (low + high)] + ([0.0] if low < 0.0 < high and place else [])
+    return [("square", (("centre", c), ("reach", max(high - c, c - low)))) for c in centres]
+
+
+def _bumps(low: float, high: float) -> list[tuple[str, Constants]]:
+    """Bumps over the range of a place, of two widths."""
+    return [
+        ("bump", (("centre", float(c)), ("width", (high - low) / parts)))
+        for c in np.linspace(low, high, BUMPS)
+        for parts in (4.0, 8.0)
+    ]
+
+
+def _slopes(low: float, high: float, signed: bool, within: bool) -> list[tuple[str, Constants]]:
+    """Straight lines over the range, and from its middle on."""
+    middle = 0.5 * (low + high)
+    if signed:
+        begins = (middle,) if within else ()
+        bent = [(("from", b), ("end", e)) for b in begins for e in (low, high)]
+        return [("slope", (("start", middle), ("end", high))), *(("threshold", at) for at in bent)]
+    lines = [(low, high), (high, low)] + ([(middle, high), (middle, low)] if within else [])
+    return [("slope", (("start", start), ("end", end))) for start, end in lines]
+
+
+def _edges(different: FloatArray, most: int) -> list[float]:
+    """Edges between values, and 0 where it lies among them."""
+    between = 0.5 * (different[1:] + different[:-1])
+    if len(between) > most:
+        between = between[np.unique(np.linspace(0, len(between) - 1, most + 2).round().astype(int)[1:-1])]
+    return [*between.tolist(), 0.0] if different[0] < 0.0 < different[-1] else between.tolist()
+
+
+def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -> list[tuple[str, Constants]]:
+    """Waves over the range: some turns of a place, down to a screw's lead in a strut's length."""
+    turns = np.arange(1.0, min(MOST_TURNS, many / 3.0) + 0.5)
+    if variable == "strut length":
+        # So close that between two neighbours a wave over the whole range loses a quarter of a turn at most.
+        turns = np.arange(1.0, min(span / SHORTEST_PITCH, many / 3.0), 0.5)
+    found: list[tuple[str, Constants]] = []
+    for turn in turns.tolist():
+        period = span / turn
+        phases = np.arange(PHASES if signed else 2 * PHASES) / (2.0 * PHASES)
+        found += [("periodic", (("period", period), ("crest", low + float(p) * period))) for p in phases]
+    return found
+
+
+def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
+    """The same term with constants about its own: steps of a grid's spacing times `finer`."""
+    at = term.constants
+    names = [name for name in at if name not in ("first", "second", "side", "power", "reference", "reach")]
+    if not names or term.shape == "sign":
+        return []
+    values = ground.values(term.variable, term.column)
+    low, high = float(values.min()), float(values.max())
+    step = finer * (high - low) / BUMPS
+    moves: dict[str, FloatArray] = {name: at[name] + step * np.linspace(-0.5, 0.5, 7) for name in names}
+    for name in {"width", "period"} & set(names):
+        spread = 0.7 if name == "width" else 0.25 * at["period"] / (high - low)
+        moves[name] = at[name] * np.exp(finer * np.linspace(-spread, spread, 7))
+    if "crest" in names:
+        moves["crest"] = at["crest"] + finer * at["period"] / (2 * PHASES) * np.linspace(-0.5, 0.5, 7)
+    if "end" in at:  # where it begins; its end is a matter of scale
+        begins = "from" if "from" in at else "start"
+        moves = {begins: np.clip(moves[begins], low - step, high + step)}
+        if begins == "start" and len(term.signs) > 1:
+            return []
+    found = []
+    for values_of in product(*moves.values()):
+        new = at | dict(zip(moves, (float(v) for v in values_of), strict=True))
+        if "width" in new and new["width"] < (high - low) / 30.0:
+            continue
+        if "end" in at and (new["end"] - new[begins]) * (at["end"] - at[begins]) <= 0.0:
+            continue
+        found.append(replace(term, at=tuple(new.items())))
+    return found if moves else []
+
+
+class Ground:
+    """What columns are made from: the readings as the links feel them.
+
+    Parameters
+    ----------
+    predictor
+        The model and n readings.
+    compliance, law
+        (n,) m/N of the model that a term is added to; (2,) logarithms of the factors on its strut law.
+    """
+
+    def __init__(self, predictor: Predictor, compliance: FloatArray, law: FloatArray) -> None:
+        data, path = predictor.data, predictor.full_path()
+        forces = predictor.strut_forces()
+        self.predictor, self.data, self.compliance = predictor, data, compliance
+        self.path: LoadPath = replace(path, strut_forces=forces * data.force[:, None], direction=data.direction)
+        self.forces = np.concatenate([forces, data.direction, np.zeros_like(data.direction)], axis=1)  # [f; w]
+        self.law = law
+        self.softness = 1.0 / scaled_law(predictor.machine.strut_law, law).stiffness(path.struts.lengths)
+        self._values: dict[tuple[str, str], FloatArray] = {}
+        self._shares: dict[tuple[Any, ...], FloatArray] = {}
+        self._shapes: dict[tuple[Any, ...], Shapes] = {}
+
+    def values(self, variable: str, column: str = "") -> FloatArray:
+        """(n,) or (n, 6) of a variable, SI; also the order of the readings (0 to 1) and further columns."""
+        key = (variable, column)
+        if key not in self._values:
+            if variable == "order":
+                found = np.linspace(0.0, 1.0, len(self.data))
+            elif variable in self.data.extra:
+                found = self.data.extra[variable]
+            else:
+                found = variable_values(variable, self.path, column)
+            self._values[key] = found
+        return self._values[key]
+
+    def known(self, variable: str) -> bool:
+        """Whether the readings say what a variable is."""
+        needed = {"time": "time_min", "temperature": "temperature_C", "load": "force_N", "strut force": "force_N"}
+        if variable in self.data.extra:
+            return bool(np.isfinite(self.data.extra[variable]).all())
+        return needed.get(variable, "") not in self.data.missing
+
+    def share(self, term: Term) -> FloatArray:
+        """(n,) or (n, 6) m/N that a term's link adds where its shape is 1, per unit of its size; worked out once."""
+        key = (term.link, term.action, term.direction, term.where, term.column, *term.at[:2])
+        if term.action not in ("coupling", "joint offset"):
+            key = key[:4]
+        if key not in self._shares:
+            self._shares[key] = self._share(term)
+        return self._shares[key]
+
+    def _share(self, term: Term) -> FloatArray:
+        path = self.path
+        plain = replace(term, variable="constant", shape="offset", times=None)
+        if term.action in (*IN_SERIES, "turning"):
+            each = self.forces[:, :6] ** 2
+            if term.action == "turning":
+                turns = np.einsum("nkai,nij,nj->nka", self._rotations, self._flexibility, self.forces[:, 6:])
+                each = -(turns**2).sum(axis=2) * self._seen[:, None]
+            if term.action in PINS:
+                each = each * along_pins(term.action, term.direction, path) ** 2
+            if term.action == "strut factor":
+                each = each * self.softness
+            if term.where is not None:
+                each = each * (np.arange(6) == term.where - 1)
+            return np.asarray(each)
+        if term.action == "coupling":
+            first, second = coupled(term)
+            return np.asarray(2.0 * self.forces[:, first] * self.forces[:, second] * coupling_share(plain, path))
+        if term.action == "joint offset":
+            strut, axis = (term.where or 1) - 1, "XYZ".index(term.direction)
+            at = 3 * (strut + 6 * (term.column == "platform")) + axis
+            return np.asarray(-self.compliance * self.predictor.joint_columns()[:, at])
+        if term.action in ("reading factor", "reading shift"):
+            own = reading_share(plain, path)
+            return np.asarray(own * (self.compliance if term.action == "reading factor" else 1.0 / self.data.force))
+        rows = carriers(term.link, term.action, term.direction, term.where, path)
+        return np.asarray((np.einsum("nkj,nj->nk", rows, self.forces) ** 2).sum(axis=1))
+
+    @cached_property
+    def _rotations(self) -> FloatArray:
+        return end_rotations(self.path)
+
+    @cached_property
+    def _flexibility(self) -> FloatArray:
+        """(n, 6, 6) of the tip, forces and moments."""
+        machine = self.path.machine
+        machine = machine.with_changes(strut_law=scaled_law(machine.strut_law, self.law))
+        path = replace(self.path, machine=machine)
+        links = exact.assemble_links(replace(self.predictor.base, machine=machine), path)
+        return exact.respond(path, links, np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
+
+    @cached_property
+    def _seen(self) -> FloatArray:
+        """(n,) compliance over that of `_flexibility`: where more gives way, the joints turn by as much more."""
+        wrench = self.forces[:, 6:]
+        return np.asarray(self.compliance / np.einsum("ni,nij,nj->n", wrench, self._flexibility, wrench))
+
+    def _turned_by(self, weights: FloatArray, size: float) -> tuple[FloatArray, FloatArray]:
+        """(n,) m/N per unit of size that `turning` of weights (n, 6) adds at a size, and by which it grows there.
+
+        Springs K of the rotations B x of a twist x stand parallel to what bears the load: C + dC = (C^-1 + B^T K B)^-1.
+        """
+        springs = np.einsum("nk,nkai,nkaj->nij", size * weights, self._rotations, self._rotations)
+        wrench = self.forces[:, 6:, None]
+        moved = np.linalg.solve(np.eye(6) + self._flexibility @ springs, self._flexibility @ wrench)
+        change = ((moved - self._flexibility @ wrench) * wrench).sum(axis=(1, 2))
+        slope = -(np.einsum("nij,njk->nik", springs, moved) * moved).sum(axis=(1, 2))
+        return np.asarray(change * self._seen / size), np.asarray(slope * self._seen / size)
+
+    def _turned(self, term: Term, tangents: FloatArray, shapes: FloatArray) -> FloatArray:
+        """(s, n) of `turning`, at the term's size or, where it has none, at one as it is usually found."""
+        found = []
+        for tangent, shape in zip(tangents, shapes, strict=True):
+            size = term.size or TURNED / max(float(np.sqrt(np.mean((tangent / self.compliance) ** 2))), 1e-12)
+            found.append(self._turned_by(_each(shape, term), min(size, term.bounds[1] * term.si))[0])
+        return np.array(found).reshape(tangents.shape)
+
+    def slope(self, term: Term) -> FloatArray:
+        """(n,) m/N by which what a term adds grows with its size; its `column` unless it is not linear in it."""
+        if not term.size or term.action != "turning":
+            return self.column(term)
+        return self._turned_by(_each(self.shape(term), term), term.size)[1]
+
+    def shape(self, term: Term) -> FloatArray:
+        """(n,) or (n, 6) of what a term depends on."""
+        values = self.values(term.variable, term.column)
+        first = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
+        if term.times is None:
+            return first
+        return multiplied(first, factor_values(term.times, self.values(term.times.variable, term.times.column)))
+
+    def shapes(self, variable: str, column: str, signed: bool, where: int | None) -> Shapes:
+        """All shapes of a variable over these readings, worked out once; of strut `where` where each has its own."""
+        values = self.values(variable, column)
+        own = where if values.ndim == 2 else None
+        key = (variable, column, signed, own)
+        if key not in self._shapes:
+            values = values if own is None else values[:, own - 1]
+            named = tuple(shapes_of(variable, values, signed, column if variable == "tilt" else ""))
+            rows = [shape_values(shape, values, dict(at), signed) for shape, at in named]
+            self._shapes[key] = named, np.stack(rows) if rows else np.zeros((0, *values.shape))
+        return self._shapes[key]
+
+    def columns(self, term: Term, share: FloatArray, shapes: FloatArray) -> FloatArray:
+        """(s, n) m/N per unit of size of a term's link, for shapes (s, n) or (s, n, 6); its `share` (n,) or (n, 6)."""
+        if share.ndim == 1:
+            return np.asarray(share * shapes)
+        if shapes.ndim == 3:
+            found = np.einsum("ni,sni->sn", share, shapes)
+        else:
+            found = (share.sum(axis=1) if term.where is None else share[:, term.where - 1]) * shapes
+        return self._turned(term, found, shapes) if term.action == "turning" else np.asarray(found)
+
+    def column(self, term: Term) -> FloatArray:
+        """(n,) m/N per unit (SI) of a term's size."""
+        share = self.share(term)
+        if share.ndim == 1 and any(self.values(*one).ndim == 2 for one in _asked(term)):
+            raise ValueError(f"{term.link} has no {' or '.join(term.variables)} of its own")
+        shape = self.shape(term)
+        return np.asarray(self.columns(term, share, shape[None])[0])
+
+
+def _asked(term: Term) -> list[tuple[str, str]]:
+    """Variables with their columns."""
+    own = [(term.variable, term.column)]
+    return own if term.times is None else [*own, (term.times.variable, term.times.column)]
+
+
+def _each(shape: FloatArray, term: Term) -> FloatArray:
+    """(n, 6) of a shape (n,) or (n, 6) at the struts of a term."""
+    each = shape if shape.ndim == 2 else np.repeat(shape[:, None], 6, axis=1)
+    return each if term.where is None else np.asarray(each * (np.arange(6) == term.where - 1))

@@ -1,0 +1,344 @@
+"""The dictionary: for every link of the load path its own compliance, times each shape of what it can depend on.
+
+Drawn up from the mechanics of a machine, not from any simulator: which forces a link carries says where its compliance
+shows, and a link depends on what it feels. A table feels where the work stands on it; a strut its length, its force and
+the nut's place on the screw; a platform and a tool how they lean; instruments the time, the load and where they stand.
+
+A term's prior weight is even over links, over the variables of a link, over its places and directions, over shapes and
+over the constants of a shape, so that no link is preferred for having many terms.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.portrait.terms import PINS, PLACE, SWINGS, Action, Constants, Factor, Term
+
+if TYPE_CHECKING:
+    from toolpath_stiff.portrait.columns import Ground
+
+
+WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
+
+
+ONCE = ("constant", "direction")  # variables whose every place stands in the dictionary as it is
+
+
+ALL_STRUTS, ALL_VERTICES = (None, 1, 2, 3, 4, 5, 6), (None, 1, 2, 3)
+
+
+SIDE = 0.2  # prior weight of what a link could do by a way round: a frame does not feel where the tip is
+
+
+NOTHING = 1e-4  # rms change of stiffness by the largest size below which a term does nothing to these readings
+
+
+@dataclass(frozen=True)
+class Local:
+    """A link as it gives way locally, with what it may depend on.
+
+    `side`: variables on which it depends by a way round only; `crossed`: further variables, tried where another place
+    has shown them.
+    """
+
+    link: str
+    action: Action
+    direction: str
+    where: int | None
+    variables: tuple[str, ...]
+    column: str = ""
+    at: Constants = ()
+    side: tuple[str, ...] = ()
+    crossed: tuple[str, ...] = ()
+
+    @property
+    def single(self) -> bool:
+        """Whether it is one of several places or channels: a joint, a vertex, the readings along one axis."""
+        return self.where is not None or (self.link == "instrument" and self.direction != "reading")
+
+    def term(self, variable: str, shape: str, at: Constants, column: str = "", times: Factor | None = None) -> Term:
+        """With a variable and a shape, and a second one where there is one."""
+        column = column or self.column
+        return Term(
+            self.link, self.direction, variable, shape, self.action, self.where, (*self.at, *at), column, times=times
+        )
+
+
+def locals_of(extra: Iterable[str]) -> list[Local]:
+    """Every link with its places and directions; `extra`: names of further columns, which instruments may feel."""
+    further = tuple(extra)
+    whole = (*WHOLE, *further)
+    base, turning = ("X", "Y", "Z", "horizontal", "all"), ("X", "Y", "all", "tangential")
+    return [
+        Local("instrument", "reading factor", "reading", None, (*PLACE, *whole[1:], "tilt")),
+        *(
+            Local("instrument", "reading factor", axis, None, ("direction", *PLACE, *whole[1:], "tilt"))
+            for axis in "XYZ"
+        ),
+        *(
+            Local("instrument", "reading shift", axis, None, ("constant", "time", "order", "temperature", "setup"))
+            for axis in ("reading", "X", "Y", "Z")
+        ),
+        *_of_head("tool", whole),
+        *_of_head("platform", whole),
+        *_of_vertices("platform", ("radial", "tangential", "axial", "along the struts"), (*whole, "tilt")),
+        *_of_joints(whole),
+        *_of_struts(whole),
+        *_of_vertices("frame", ("radial", "tangential", "Z", "along the struts"), whole),
+        *(Local("frame", "give", axis, None, (*whole, *PLACE), side=PLACE) for axis in base),
+        *(Local("frame", "rocking", axis, None, ("constant", "load")) for axis in turning),
+        *(Local("table", "give", axis, None, (*whole, *PLACE)) for axis in (*base, "radial", "tangential")),
+        *(Local("table", "rocking", axis, None, ("constant", "load", "setup", "z")) for axis in turning),
+    ]
+
+
+def _of_head(link: str, whole: tuple[str, ...]) -> Iterator[Local]:
+    """Tool or platform: gives across and along its axis, and tips about the middle of the joints."""
+    for direction in ("radial", "axial", "X", "Y", "all"):
+        yield Local(link, "give", direction, None, (*whole, "tilt"))
+    for direction in ("radial", "X", "Y"):
+        yield Local(link, "tilting", direction, None, ("constant", "load", "tilt"))
+
+
+def _of_vertices(link: str, directions: Iterable[str], variables: tuple[str, ...]) -> Iterator[Local]:
+    """The vertices of frame or platform, all together or one alone."""
+    for direction in directions:
+        for where in ALL_VERTICES:
+            own = ("constant", "load") if where else variables
+            yield Local(link, "vertex", direction, where, own, crossed=variables if where else ())
+
+
+def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
+    """Joints: they give along their strut or along a pin of their cross, resist turning, or stand off their place."""
+    for where in ALL_STRUTS:
+        own = ("strut force", "force sign")
+        variables = ("constant", "load", "temperature", *own) if where else (*whole, *own, "tilt")
+        yield Local("joints", "strut", "along the struts", where, variables, crossed=(*whole, *own, "tilt"))
+        turning = ("constant",) if where else ("constant", "load", "tilt")
+        yield Local("joints", "turning", "all", where, turning, crossed=(*whole, "tilt"))
+        for action, direction in product(PINS, ("radial", "tangential")):
+            yield Local("joints", action, direction, where, ("constant",), crossed=variables)
+    for axis in "XYZ":
+        for where in ALL_STRUTS[1:]:
+            for end in ("frame", "platform"):
+                yield Local("joints", "joint offset", axis, where, ("constant",), column=end)
+
+
+def _of_struts(whole: tuple[str, ...]) -> Iterator[Local]:
+    """Struts: their own share of the strut law, all together or one alone, and what couples two of them."""
+    own = (*whole[1:], "strut length", "strut force", "force sign", *PLACE)
+    yield Local("struts", "strut factor", "along the struts", None, (*own, "tilt"))
+    for first, second in combinations(range(1, 7), 2):
+        at = (("first", float(first)), ("second", float(second)))
+        yield Local("struts", "coupling", "along the struts", None, ("constant",), at=at)
+    for where in ALL_STRUTS[1:]:
+        yield Local("one strut", "strut factor", "along the struts", where, ("constant", *own))
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One term of the dictionary, not yet made: what it is, and its share of the prior."""
+
+    local: Local
+    variable: str
+    column: str
+    shape: str
+    at: Constants
+    log_prior: float
+    times: Factor | None = None
+
+    @property
+    def term(self) -> Term:
+        """The term."""
+        return self.local.term(self.variable, self.shape, self.at, self.column, self.times)
+
+
+@dataclass(frozen=True)
+class Dictionary:
+    """N terms with what they do to n readings.
+
+    Attributes
+    ----------
+    entries
+        The terms.
+    columns
+        (N, n) change of compliance over the compliance, scaled to an rms of 1.
+    scale
+        (N,) rms of that change per SI unit of size.
+    log_prior
+        (N,) weights.
+    signed
+        (N,) whether the size may go to both sides.
+    """
+
+    entries: tuple[Entry, ...]
+    columns: FloatArray
+    scale: FloatArray
+    log_prior: FloatArray
+    signed: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+
+def dictionary_of(ground: Ground) -> Dictionary:
+    """Every term that does something to these readings."""
+    entries: list[Entry] = []
+    blocks: list[FloatArray] = []
+    largest: list[FloatArray] = []
+    signs: list[NDArray[np.bool_]] = []
+    every = locals_of(ground.data.extra)
+    prior = Prior.of(every, ground)
+    for local in every:
+        plain = local.term("constant", "offset", ())
+        share, signed = ground.share(plain), len(plain.signs) > 1
+        limit = max(abs(bound) for bound in plain.bounds) * plain.si
+        for variable in local.variables:
+            every_column = columns_of(variable, ground, local.link == "joints")
+            for column in every_column:
+                named, values = ground.shapes(variable, column, signed, local.where)
+                if not named:
+                    continue
+                blocks.append(ground.columns(plain, share, values))
+                kinds = Counter(shape for shape, _ in named)
+                log = prior.place(local, variable) - float(np.log(len(kinds) * len(every_column)))
+                entries += [
+                    Entry(local, variable, column, shape, at, log - float(np.log(kinds[shape]))) for shape, at in named
+                ]
+                largest.append(np.full(len(named), limit))
+                signs.append(np.full(len(named), signed))
+    relative = np.concatenate(blocks) / ground.compliance
+    scale = np.sqrt((relative**2).mean(axis=1))
+    # A term that changes every reading alike is the strut law's affair.
+    spread = relative.std(axis=1)
+    kept = (scale * np.concatenate(largest) > NOTHING) & (spread > 1e-6 * scale)
+    chosen = [entries[i] for i in np.flatnonzero(kept).tolist()]
+    return Dictionary(
+        tuple(chosen),
+        relative[kept] / scale[kept, None],
+        scale[kept],
+        np.array([entry.log_prior for entry in chosen]),
+        np.concatenate(signs)[kept],
+    )
+
+
+def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:
+    """What a variable comes in: set-ups by name, a tilt, its two leans and swings, else once; none where unknown."""
+    if not ground.known(variable):
+        return []
+    if variable == "setup":
+        names = sorted(set(ground.data.setup.tolist()) - {""})
+        return names if len(names) > 1 or "" in ground.data.setup else []
+    return ["", "X", "Y", *(SWINGS if joints else ())] if variable == "tilt" else [""]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Logarithms of prior weights: even over links, over the variables of each, over places and directions.
+
+    `places`: link, variable and whether at one place -> how many; `variables`: link -> how many variables.
+    """
+
+    places: Mapping[tuple[str, str, bool], int]
+    variables: Mapping[str, int]
+
+    @classmethod
+    def of(cls, every: Iterable[Local], ground: Ground) -> Prior:
+        """Of the links and those of their variables that the readings tell."""
+        told: dict[str, bool] = {}
+        places: Counter[tuple[str, str, bool]] = Counter()
+        for local in every:
+            for variable in local.variables:
+                if variable not in told:
+                    told[variable] = bool(columns_of(variable, ground))
+                if told[variable]:
+                    places[local.link, variable, local.single] += 1
+        return cls(places, Counter(link for link, _ in {key[:2] for key in places}))
+
+    def place(self, local: Local, variable: str) -> float:
+        """Of a link with one place and direction and a variable, all shapes together.
+
+        A link with single places (a joint, a vertex) has half for one of them and half for all of them together.
+        """
+        both = (local.link, variable, not local.single) in self.places
+        share = (SIDE if variable in local.side else 1.0) * (0.5 if both else 1.0)
+        count = max(self.places.get((local.link, variable, local.single), 1), 1)
+        return float(np.log(share / count / self.variables[local.link] / len(self.variables)))
+
+
+def crossed(term: Term, ground: Ground) -> list[Entry]:
+    """The same variable and shape, constants included, at every other link, place and direction that may feel it."""
+    every = locals_of(ground.data.extra)
+    prior = Prior.of(every, ground)
+    found = []
+    for local in every:
+        if term.variable not in (*local.variables, *local.crossed) or term.variable in ONCE:
+            continue
+        if local.action in ("coupling", "joint offset"):
+            continue
+        if term.column in SWINGS and local.link != "joints":
+            continue
+        if term.times is not None and not _may_feel(local, term.times):
+            continue
+        signed = len(local.term("constant", "offset", ()).signs) > 1
+        log = prior.place(local, term.variable)
+        found += [
+            Entry(local, term.variable, term.column, shape, at, log, term.times)
+            for shape, at in _translated(term, signed, ground)
+        ]
+    return found
+
+
+def _may_feel(local: Local, factor: Factor) -> bool:
+    """Whether a link may depend on a second variable."""
+    if factor.column in SWINGS and local.link != "joints":
+        return False
+    return factor.variable in (*local.variables, *local.crossed)
+
+
+def products(term: Term, ground: Ground) -> list[Term]:
+    """The same term times every shape of every other variable that its link may depend on, itself not negative."""
+    if term.times is not None or term.action in ("coupling", "joint offset"):
+        return []
+    place = (term.link, term.action, term.direction, term.where)
+    every = locals_of(ground.data.extra)
+    (local,) = (one for one in every if (one.link, one.action, one.direction, one.where) == place)
+    found = []
+    for variable in dict.fromkeys((*local.variables, *local.crossed)):
+        if variable in (*ONCE, term.variable):
+            continue
+        for column in columns_of(variable, ground, local.link == "joints"):
+            named = ground.shapes(variable, column, False, local.where)[0]
+            found += [
+                replace(term, times=Factor(variable, shape, at, column)) for shape, at in named if shape != "periodic"
+            ]
+    return found
+
+
+def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Constants]]:
+    """A shape for links that give only, or whose stiffness may change to both sides, as it says the same there."""
+    at = term.constants
+    if (len(term.signs) > 1) == signed or "power" in at:
+        return [(term.shape, term.at)]
+    if term.shape == "slope" and signed:  # it begins where it is 0
+        return [("threshold", (("from", at["start"]), ("end", at["end"])))]
+    if term.shape == "threshold" and "from" in at:
+        return [("slope", (("start", at["from"]), ("end", at["end"])))]
+    values = ground.values(term.variable, term.column)
+    low, high = float(values.min()), float(values.max())
+    if term.shape == "slope":  # a straight line to both sides: up or down over the range
+        return [("slope", (("start", one), ("end", other))) for one, other in ((low, high), (high, low))]
+    if "side" in at and not signed:  # more on one side is less on the other
+        return [
+            (term.shape, tuple((name, side if name == "side" else value) for name, value in term.at))
+            for side in (1.0, -1.0)
+        ]
+    return [(term.shape, term.at)]

@@ -1,0 +1,226 @@
+"""A portrait of what is missing: which link of the load path, along what, with what it varies, how large.
+
+Where no effect of the catalogue explains the readings, or where the best explanation leaves something, one to three
+terms of a dictionary of machine mechanics (`dictionary`, `terms`) are chosen (`selection`) and put in words (`words`).
+What else would look the same is said by probabilities over the whole dictionary, summed by link and by variable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import held_out
+from toolpath_stiff.inference.gates import Simulator
+from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.portrait.choice import Chosen, choose
+from toolpath_stiff.portrait.columns import Ground
+from toolpath_stiff.portrait.selection import Description, Selection, law_prior
+from toolpath_stiff.portrait.smooth import smooth_rms
+from toolpath_stiff.portrait.terms import Term
+
+HELD = 0.90  # probability that a set of links or variables adds up to
+
+
+MOST_LINKS, MOST_VARIABLES, MOST_ALIKE = 4, 3, 4
+
+
+SHOWN = 0.03  # probability from which another term is told
+
+
+FLOOR_DRAWS = 40
+
+
+MOST_SEARCHED = 1000  # readings on which the dictionary is searched: more tell no more of which term to fit
+
+
+@dataclass(frozen=True)
+class Sized:
+    """A term with its size (SI), its 95 % interval, the rms change of stiffness that it makes, and its probability."""
+
+    term: Term
+    interval: tuple[float, float]
+    rms: float
+    probability: float | None = None
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """What the readings say of what is missing.
+
+    Attributes
+    ----------
+    terms
+        One to three, the leading one first; none where nothing stands out from chance.
+    links, variables
+        Name -> probability, the likeliest first, the fewest that hold 90 %; empty where more than four links would be
+        needed.
+    alike
+        Other leading terms that fit as well.
+    explained
+        Share of the weighted squares above noise that the terms take.
+    error, held_out_rms, noise_floor, smooth_rms
+        Mean error with the terms; rms error at left-out points; what noise alone leaves there; what a smooth
+        description reaches.
+    look_elsewhere
+        How often the best of the whole dictionary gains as much by chance.
+    before, after, signature
+        (n,) residuals of the base and with the terms; change of ln stiffness by the leading term.
+    values
+        (n,) of the leading term's variable, SI; None where each strut has its own, or it is constant.
+    """
+
+    terms: tuple[Sized, ...] = ()
+    links: tuple[tuple[str, float], ...] = ()
+    variables: tuple[tuple[str, float], ...] = ()
+    alike: tuple[Sized, ...] = ()
+    explained: float = 0.0
+    error: float = np.nan
+    held_out_rms: float = np.nan
+    noise_floor: float = np.nan
+    smooth_rms: float = np.nan
+    look_elsewhere: float = 1.0
+    before: FloatArray | None = None
+    after: FloatArray | None = None
+    signature: FloatArray | None = None
+    values: FloatArray | None = None
+
+
+def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: str = "") -> Portrait:
+    """Describe what a fit leaves.
+
+    Parameters
+    ----------
+    problem, noise
+        Readings, model and scatter; the noise model behind the scatter.
+    base
+        The fit that leaves something: the model with its strut law refitted, or the best explanation.
+    seed
+        Of the simulated campaigns.
+    form
+        The form of discrepancy that stands out most, in words, for the yardstick.
+    """
+    selection = Selection(problem, base, noise, seed)
+    start = selection.start
+    if len(base.residual) > MOST_SEARCHED:
+        chosen, chance = _chosen_from_fewer(selection)
+    else:
+        chosen, chance = choose(selection)
+    points = problem.predictor.data.point
+    smooth = smooth_rms(problem, start.fit, form)
+    if chosen is None:
+        return Portrait(
+            look_elsewhere=chance, smooth_rms=smooth, error=float(start.fit.errors.mean()),
+            held_out_rms=held_out(start.fit, points).rms, noise_floor=noise_floor(selection, start),
+            before=base.residual, after=start.fit.residual,
+        )  # fmt: skip
+    found = chosen.description
+    leading = found.terms[0]
+    values = selection.ground.values(leading.variable, leading.column)
+    return Portrait(
+        terms=tuple(_sized(selection.ground, found, k) for k in range(len(found.terms))),
+        links=_honest(chosen.weighed.summed(lambda term: term.link), MOST_LINKS),
+        variables=_honest(chosen.weighed.summed(lambda term: term.variable), MOST_VARIABLES, cut=True),
+        alike=_alike(selection, chosen),
+        explained=_explained(selection, start, found),
+        error=float(found.fit.errors.mean()),
+        held_out_rms=chosen.held.rms,
+        noise_floor=noise_floor(selection, found),
+        smooth_rms=smooth,
+        look_elsewhere=chosen.chance,
+        before=start.fit.residual,
+        after=found.fit.residual,
+        signature=-np.log1p(np.maximum(leading.size * selection.ground.column(leading) / selection.compliance, -0.9)),
+        values=None if values.ndim == 2 or leading.variable in ("constant", "direction") else values,
+    )
+
+
+def _chosen_from_fewer(whole: Selection) -> tuple[Chosen | None, float]:
+    """The search on readings spread over the campaign, what it has chosen fitted to all."""
+    base, noise = whole.base, whole.noise
+    rows = np.unique(np.linspace(0, len(base.residual) - 1, MOST_SEARCHED).round().astype(np.int64))
+    full = whole.problem.predictor
+    predictor = Predictor(full.machine, full.data.select(rows), full.effect_files)
+    problem = Problem.of(predictor, noise.select(rows))
+    residual = base.residual[rows]
+    scatter = problem.scatter.with_wild(residual)
+    fewer = replace(base, residual=residual, jacobian=base.jacobian[rows], scatter=scatter)
+    chosen, chance = choose(Selection(problem, fewer, noise.select(rows), whole.seed))
+    if chosen is None:
+        return None, chance
+    found = whole.start
+    for term in chosen.description.terms:
+        found = whole.extended(found, term)
+    return replace(chosen, description=found, held=held_out(found.fit, full.data.point)), chance
+
+
+def _sized(ground: Ground, description: Description, k: int, probability: float | None = None) -> Sized:
+    term, deviation = description.terms[k], float(description.deviations[k])
+    low, high = (bound * term.si for bound in term.bounds)
+    reach = defaults.NORMAL_95 * deviation
+    interval = max(term.size - reach, low), min(term.size + reach, high)
+    return Sized(term, interval, abs(term.size) * float(description.scale[k]), probability)
+
+
+def _honest(summed: Sequence[tuple[str, float]], most: int, cut: bool = False) -> tuple[tuple[str, float], ...]:
+    """The fewest that hold `HELD`; where that takes more than `most`, none, or the first ones if `cut`."""
+    found: list[tuple[str, float]] = []
+    for name, weight in summed:
+        found.append((name, weight))
+        if sum(w for _, w in found) >= HELD:
+            break
+    if len(found) > most:
+        return tuple(found[:most]) if cut else ()
+    return tuple(found)
+
+
+def _alike(selection: Selection, chosen: Chosen) -> tuple[Sized, ...]:
+    """Other terms in the place of the leading one, the best of each link, place, direction and variable."""
+    found = chosen.description
+    others = selection.scattered(selection.without(found, 0), found)
+    seen = {_kind(found.terms[0])}
+    alike: list[Sized] = []
+    weighed = chosen.weighed
+    for term, weight, here in zip(weighed.terms, weighed.weights.tolist(), weighed.chosen.tolist(), strict=True):
+        if weight < SHOWN or len(alike) == MOST_ALIKE:
+            break
+        if not here or _kind(term) in seen:
+            continue
+        seen.add(_kind(term))
+        fitted = selection.extended(others, term)
+        if fitted.terms[-1].size:
+            alike.append(_sized(selection.ground, fitted, len(fitted.terms) - 1, weight))
+    return tuple(alike)
+
+
+def _kind(term: Term) -> tuple[object, ...]:
+    return term.link, term.where, term.direction, term.variable
+
+
+def _explained(selection: Selection, start: Description, found: Description) -> float:
+    """Under the scatter of the description, so that wild readings count alike."""
+    precision, free = found.fit.scatter.precision, len(selection.compliance) - 2
+    fixed = selection.described((), start.columns, start.scale, start.fit.law, found.fit.scatter)
+    before, after = (float(precision.squares(one.fit.residual)) for one in (fixed, found))
+    return float(np.clip((before - after) / max(before - free, 1e-9), 0.0, 1.0)) if before > after else 0.0
+
+
+def noise_floor(selection: Selection, description: Description) -> float:
+    """Rms at left-out points that noise alone leaves: simulated campaigns through the same fit."""
+    draws = Simulator.of(selection.noise, selection.problem.scatter.covariance, selection.seed, FLOOR_DRAWS).draws
+    jacobian, precision = description.fit.jacobian, description.fit.scatter.precision
+    weighted = precision.times(jacobian.T)
+    inverse = np.linalg.pinv(weighted @ jacobian + law_prior(description.fit), hermitian=True)
+    points = selection.problem.predictor.data.point
+    squares = []
+    for draw in draws:
+        moved = inverse @ (weighted @ draw)
+        fit = replace(description.fit, residual=draw - jacobian @ moved, law=moved[:2])
+        squares.append(float(np.mean(held_out(fit, points).residual ** 2)))
+    return float(np.sqrt(np.mean(squares)))

@@ -1,0 +1,381 @@
+"""Fits of terms of the dictionary beside a base fit, and the search for the best further one.
+
+Every term's gain is first its score beside what is fitted already (Rao's score test, sizes on their allowed side); the
+best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j, exact for whatever gives way in
+series.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.covariances import Precision, inverse_root
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.gates import Simulator, set_wild_aside
+from toolpath_stiff.inference.noise import Noise, Scatter, scaled_inverse
+from toolpath_stiff.portrait.columns import Ground, shapes_near
+from toolpath_stiff.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of, products
+from toolpath_stiff.portrait.terms import Factor, Term
+
+DRAWS = 200  # simulated campaigns
+
+
+JOINS = 0.02  # probability by chance below which a further term is taken for something
+
+
+TIE = 0.5  # of log likelihood: so near, the place with the larger prior is taken
+
+
+FINALISTS, EACH = 40, 1  # terms that are fitted in full: the best of all, and of every link and variable
+
+
+STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
+
+
+NOT_LINEAR, AT_SIZE = ("turning",), 3  # actions that are not linear in their size, and fits at the size of the last
+
+
+ROUNDS = 2  # searches for wild readings
+
+
+def law_prior(fit: Fit) -> FloatArray:
+    """(2 + p, 2 + p) information of the strut law's prior beside p sizes."""
+    prior = np.zeros((fit.jacobian.shape[1],) * 2)
+    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+    return prior
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Fits of G sets of p terms each beside the law.
+
+    Attributes
+    ----------
+    law, size
+        (G, 2), (G, p) in rms change of compliance.
+    residual, gain
+        (G, n); (G,) log posterior.
+    """
+
+    law: FloatArray
+    size: FloatArray
+    residual: FloatArray
+    posterior: FloatArray
+
+
+@dataclass(frozen=True)
+class Description:
+    """Terms fitted together.
+
+    Attributes
+    ----------
+    terms
+        With their sizes.
+    columns, scale
+        (p, n) change of compliance over the base model's for an rms change of 1; (p,) that of an SI unit of size.
+    fit
+        Law, residual and so on; its jacobian (n, 2 + p) and covariance are those of the law and the scaled sizes.
+    posterior
+        Log posterior with the price of wild readings.
+    """
+
+    terms: tuple[Term, ...]
+    columns: FloatArray
+    scale: FloatArray
+    fit: Fit
+    posterior: float
+
+    @cached_property
+    def deviations(self) -> FloatArray:
+        """(p,) standard deviations of the sizes, SI."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.fit.covariance)[2:], 0.0)) / self.scale)
+
+
+@dataclass
+class Selection:
+    """The search on one set of readings, beside a base fit.
+
+    Parameters
+    ----------
+    problem, base
+        Readings, model and scatter; the fit that leaves something.
+    noise, seed
+        Of the simulated campaigns.
+    """
+
+    problem: Problem
+    base: Fit
+    noise: Noise
+    seed: int
+    compliance: FloatArray = field(init=False)
+    rest: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.compliance = np.exp(self.base.residual - self.problem.observed)
+        self.rest = self.compliance - self.problem.predictor.strut_part(self.base.law)
+        self.ground = Ground(self.problem.predictor, self.compliance, self.base.law)
+
+    @cached_property
+    def dictionary(self) -> Dictionary:
+        """All terms."""
+        return dictionary_of(self.ground)
+
+    @property
+    def start(self) -> Description:
+        """Nothing but the base fit."""
+        none = np.zeros((0, len(self.compliance)))
+        return self.described((), none, np.zeros(0), self.base.law, self.base.scatter)
+
+    # -- fits ----------------------------------------------------------------------------------------------------------
+
+    def fitted(
+        self, columns: FloatArray, low: FloatArray, high: FloatArray, law: FloatArray, precision: Precision
+    ) -> Sizes:
+        """Gauss-Newton for G sets at once: columns (G, p, n), bounds (G, p) on their sizes."""
+        sets, count, n = columns.shape
+        laws, size = np.repeat(law[None], sets, axis=0), np.zeros((sets, count))
+        prior = np.zeros((2 + count, 2 + count))
+        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+        for _ in range(STEPS):
+            residual, jacobian = self._linearised(laws, size, columns)
+            flat = jacobian.reshape(-1, n)
+            weighted = precision.times(flat).reshape(jacobian.shape)
+            information = weighted @ np.swapaxes(jacobian, 1, 2) + prior
+            gradient = (weighted @ residual[..., None])[..., 0]
+            gradient[:, :2] -= laws / LAW_PRIOR**2
+            step = _bounded_step(information, gradient, size, low, high)
+            reach = np.abs(np.einsum("gp,gpn->gn", step, jacobian)).max(axis=1)
+            done = float(np.sqrt(np.einsum("gp,gpq,gq->g", step, information, step).max()))
+            step *= np.minimum(1.0, 0.5 / np.maximum(reach, 1e-12))[:, None]
+            laws, size = laws + step[:, :2], np.clip(size + step[:, 2:], low, high)
+            if done < SETTLED:
+                break
+        residual = self._linearised(laws, size, columns)[0]
+        posterior = -0.5 * precision.squares(residual) - 0.5 * (laws**2).sum(axis=1) / LAW_PRIOR**2
+        return Sizes(laws, size, residual, posterior)
+
+    def _linearised(self, laws: FloatArray, size: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residuals (G, n) and jacobian (G, 2 + p, n) of ln stiffness."""
+        part, slopes = self.problem.predictor.strut_part_and_slopes(laws)
+        added = np.einsum("gp,gpn->gn", size, columns) * self.compliance
+        compliance = np.maximum(part + self.rest + added, 0.1 * self.compliance)
+        own = -columns * (self.compliance / compliance)[:, None]
+        return self.problem.observed + np.log(compliance), np.concatenate([-slopes / compliance[:, None], own], axis=1)
+
+    def limits(self, terms: Sequence[Term], scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(p,) each, of scaled sizes."""
+        bounds = np.array([[bound * term.si for bound in term.bounds] for term in terms]).reshape(-1, 2)
+        return bounds[:, 0] * scale, bounds[:, 1] * scale
+
+    def described(
+        self, terms: Sequence[Term], columns: FloatArray, scale: FloatArray, law: FloatArray, scatter: Scatter
+    ) -> Description:
+        """Terms fitted together, with the readings that this fit takes for wild."""
+        low, high = self.limits(terms, scale)
+        for _ in range(ROUNDS):
+            found = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
+            law, again = found.law[0], self.problem.scatter.with_wild(found.residual[0], scatter)
+            if again is scatter:
+                break
+            scatter = again
+        found = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
+        sized = tuple(t.sized(float(u / s)) for t, u, s in zip(terms, found.size[0], scale, strict=True))
+        jacobian = self._linearised(found.law, found.size, columns[None])[1][0]
+        for k, term in enumerate(sized):
+            if term.action in NOT_LINEAR:
+                grows = self.ground.slope(term) / scale[k]
+                jacobian[2 + k] = -grows * np.exp(self.problem.observed - found.residual[0])
+        information = scatter.precision.times(jacobian) @ jacobian.T
+        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
+        fit = replace(
+            self.base, law=found.law[0], residual=found.residual[0], jacobian=jacobian.T,
+            covariance=np.asarray(scaled_inverse(information)), scatter=scatter,
+        )  # fmt: skip
+        return Description(sized, columns, scale, fit, float(found.posterior[0]) + scatter.log_price)
+
+    # -- search --------------------------------------------------------------------------------------------------------
+
+    def scores(self, before: Description) -> FloatArray:
+        """(N,) twice the gain in log likelihood of each term beside a description, linearised."""
+        projected = self._projected(before)
+        pulls = set_wild_aside(projected.times(before.fit.residual[None]), projected).pulls
+        return np.asarray(self._gains(-pulls @ self.dictionary.columns.T, before)[0])
+
+    def chance(self, before: Description, gain: float) -> tuple[float, float]:
+        """How often the best of all terms gains as much by chance; the gain that it rarely reaches."""
+        projected = self._projected(before)
+        draws = Simulator.of(self.noise, self.problem.scatter.covariance, self.seed, DRAWS).draws
+        pulls = set_wild_aside(projected.times(draws), projected).pulls
+        best = self._gains(-pulls @ self.dictionary.columns.T, before).max(axis=-1)
+        return float((1.0 + (best >= gain).sum()) / (1.0 + len(best))), float(np.quantile(best, 1.0 - JOINS))
+
+    def _projected(self, before: Description) -> Precision:
+        return before.fit.scatter.precision.beside(before.fit.jacobian.T, law_prior(before.fit))
+
+    @cached_property
+    def _squares(self) -> FloatArray:
+        """(N,) information of each term by itself under the base fit's scatter."""
+        return np.asarray(self.base.scatter.precision.squares(self.dictionary.columns))
+
+    def _gains(self, slope: FloatArray, before: Description) -> FloatArray:
+        """(s, N) of slopes (s, N), where the size goes to an allowed side.
+
+        Beside a description each term has the information A - A J (J^T A J + prior)^-1 J^T A leaves of it.
+        """
+        weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
+        root = inverse_root(weighted @ before.fit.jacobian + law_prior(before.fit))
+        information = self._squares - ((self.dictionary.columns @ (weighted.T @ root)) ** 2).sum(axis=1)
+        allowed = self.dictionary.signed | (slope > 0.0)
+        seen = information > 1e-6 * self._squares
+        return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))
+
+    def finalists(self, gains: FloatArray) -> list[Entry]:
+        """The best of all terms, and of every link and variable."""
+        count: dict[tuple[str, str], int] = {}
+        chosen = []
+        order = np.argsort(-gains, kind="stable")
+        for rank, i in enumerate(order[gains[order] > 0.0].tolist()):
+            entry = self.dictionary.entries[i]
+            kind = (entry.local.link, entry.variable)
+            if rank < FINALISTS or count.get(kind, 0) < EACH:
+                chosen.append(entry)
+                count[kind] = count.get(kind, 0) + 1
+        return chosen
+
+    def together(self, before: Description, terms: Sequence[Term]) -> Sizes:
+        """Each of some terms refitted along with a description."""
+        columns = np.stack([self.ground.column(one) for one in terms]) / self.compliance
+        scale = np.maximum(np.sqrt((columns**2).mean(axis=1)), 1e-300)
+        own = np.stack(self.limits(terms, scale))  # (2, G)
+        shared = np.stack(self.limits(before.terms, before.scale))  # (2, p)
+        count = len(terms)
+        both = np.concatenate(
+            [np.repeat(before.columns[None], count, axis=0), (columns / scale[:, None])[:, None]], axis=1
+        )
+        low, high = (
+            np.concatenate([np.repeat(shared[k][None], count, axis=0), own[k][:, None]], axis=1) for k in (0, 1)
+        )
+        return self.fitted(both, low, high, before.fit.law, before.fit.scatter.precision)
+
+    def grown(self, before: Description) -> Description | None:
+        """A description with the best further term, its constants settled; None where none has a size."""
+        entries = self.finalists(self.scores(before))
+        if not entries:
+            return None
+        found = self.together(before, [entry.term for entry in entries])
+        # Under the law of few places for many constants, the likelier of two that fit alike.
+        best = int(np.argmax(found.posterior))
+        grown = self.settled(before, self.extended(before, entries[best].term))
+        return self._best_place(before, grown)
+
+    def _best_place(self, before: Description, grown: Description) -> Description:
+        """The last term's variable and shape where they fit best."""
+        entries = crossed(grown.terms[-1], self.ground)
+        if len(entries) < 2:
+            return grown
+        found = self.together(self.scattered(before, grown), [entry.term for entry in entries])
+        logs = found.posterior + np.array([entry.log_prior for entry in entries])
+        best = entries[int(np.argmax(logs))].term
+        if best == grown.terms[-1]:
+            return grown
+        better = self.extended(before, best)
+        return better if better.posterior > grown.posterior - TIE else grown
+
+    def scattered(self, before: Description, grown: Description) -> Description:
+        """A description under the scatter of another one."""
+        return replace(before, fit=replace(before.fit, scatter=grown.fit.scatter))
+
+    def extended(self, before: Description, term: Term) -> Description:
+        """A description with a term more, all refitted."""
+        column, scale = self._scaled(term)
+        grown = self.described(
+            (*before.terms, term),
+            np.concatenate([before.columns, column[None]]),
+            np.append(before.scale, scale),
+            before.fit.law,
+            before.fit.scatter,
+        )
+        if all(one.action not in NOT_LINEAR for one in grown.terms):
+            return grown
+        for _ in range(AT_SIZE):
+            scaled = [self._scaled(one) for one in grown.terms]
+            columns, scales = np.stack([column for column, _ in scaled]), np.array([scale for _, scale in scaled])
+            grown = self.described(grown.terms, columns, scales, grown.fit.law, grown.fit.scatter)
+        return grown
+
+    def _scaled(self, term: Term) -> tuple[FloatArray, float]:
+        """(n,) change of compliance over the base model's for an rms change of 1, and that of an SI unit of size."""
+        column = self.ground.column(term) / self.compliance
+        scale = float(np.sqrt(np.mean(column**2)))
+        return column / scale, scale
+
+    def settled(self, before: Description, grown: Description) -> Description:
+        """With finer constants of the last term's shape."""
+        for finer in (1.0, 0.4):
+            near = shapes_near(grown.terms[-1], self.ground, finer)
+            if not near:
+                return grown
+            found = self.together(self.scattered(before, grown), near)
+            better = self.extended(before, near[int(np.argmax(found.posterior))])
+            if better.posterior > grown.posterior:
+                grown = better
+        return grown
+
+    def multiplied(self, before: Description, whole: Description, k: int) -> Description | None:
+        """The k-th term of a whole, which `before` lacks, times the best shape of a second variable; None without."""
+        others = self.scattered(before, whole)
+        terms = products(whole.terms[k], self.ground)
+        if not terms:
+            return None
+        found = self.together(others, terms)
+        best = self.extended(before, terms[int(np.argmax(found.posterior))])
+        second = best.terms[-1].second
+        assert second is not None
+        for finer in (1.0, 0.4):
+            near = shapes_near(second, self.ground, finer)
+            if not near:
+                return best
+            factors = [replace(best.terms[-1], times=Factor(t.variable, t.shape, t.at, t.column)) for t in near]
+            found = self.together(others, factors)
+            better = self.extended(before, factors[int(np.argmax(found.posterior))])
+            if better.posterior > best.posterior:
+                best, second = better, near[int(np.argmax(found.posterior))]
+        return best
+
+    def without(self, description: Description, k: int) -> Description:
+        """A description less one of its terms, refitted."""
+        kept = [j for j in range(len(description.terms)) if j != k]
+        return self.described(
+            [description.terms[j] for j in kept], description.columns[kept], description.scale[kept],
+            description.fit.law, description.fit.scatter,
+        )  # fmt: skip
+
+
+def _bounded_step(
+    information: FloatArray, gradient: FloatArray, size: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """(G, 2 + p) Newton steps; sizes that would leave their bounds are held there and the others solved again."""
+    scale = np.sqrt(np.maximum(np.einsum("gii->gi", information), 1e-300))
+    matrix = information / (scale[:, :, None] * scale[:, None, :])
+    matrix += 1e-10 * np.eye(matrix.shape[-1])
+    right = gradient / scale
+    step = np.linalg.solve(matrix, right[..., None])[..., 0] / scale
+    moved = size + step[:, 2:]
+    goal = np.clip(moved, low, high)
+    held = np.zeros(step.shape, dtype=bool)
+    held[:, 2:] = goal != moved
+    if not held.any():
+        return np.asarray(step)
+    fixed = np.zeros(step.shape)
+    fixed[:, 2:] = np.where(held[:, 2:], goal - size, 0.0)
+    left = right - np.einsum("gij,gj->gi", matrix, fixed * scale)
+    free = ~held
+    reduced = np.where(free[:, :, None] & free[:, None, :], matrix, 0.0)
+    reduced += np.einsum("gi,ij->gij", held * 1.0, np.eye(step.shape[1]))
+    again = np.linalg.solve(reduced, np.where(free, left, 0.0)[..., None])[..., 0] / scale
+    return np.where(held, fixed, again)

@@ -1,0 +1,224 @@
+"""Readings of an indicator beside the tip: what a row of a measurement file says of them, and how they are compared.
+
+Stiffnesses are compared by their logarithms. A joint that does not give way reads zero, which has none; and a strut
+gets longer or shorter. So a loop's reading y (displacement per load, m/N) is compared as that of a spring in series
+with it, whose compliance is known,
+
+    k = 1 / (o + s y),
+
+s = 1 or -1 so that s y is positive on the plain machine. The offset o is chosen, not measured: half the compliance of
+the tip, and more where the reading's own scatter or a wrong sign asks for it. Then ln k changes by dy / (o + s y), an
+ordinary residual, and models are compared on the scale on which they add up: that of compliance. A strut measured alone
+is a stiffness of its own and has no offset.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import MeasurementError
+from toolpath_stiff.machine.kinematics import Struts
+from toolpath_stiff.stiffness.measuring_loop import TIP, WORDS, MeasuringLoop, measuring_loop
+from toolpath_stiff.units import m_from_um
+
+LARGEST_UM = 1e6
+
+
+LEAST_FORCE = 1e-3  # N, of either sign
+
+
+SOFTEST_ALONE, STIFFEST_ALONE = 1e5, 1e10  # N/m; beyond, the unit of a strut measured alone is wrong
+
+
+# Scatter of one reading where no `sd_um` says: a lever indicator or probe with its stand, and the load; assumed.
+INDICATOR_SD, LOAD_SHARE = 0.3e-6, 0.02  # m; of the reading
+
+
+OFFSET_SHARE = 0.5  # of the tip's compliance
+
+
+WIDEST = 0.05  # of offset and reading: relative sd up to which the logarithm is straight enough
+
+
+BACKWARDS = 3.0  # times a reading of the wrong sign, so that its logarithm exists
+
+
+class LoopReading(NamedTuple):
+    """One reading.
+
+    m/N per load (nan if planned), its sd in m/N (nan: not stated), N, length of a strut alone in m, and its side: 1
+    under tension, -1 under compression.
+    """
+
+    compliance: float
+    sd: float
+    force: float
+    length: float
+    side: float = 1.0
+
+
+def loop_of(text: str) -> MeasuringLoop:
+    """The loop that a cell names. Raises `InputError`."""
+    found = measuring_loop(text)
+    if found is None:
+        raise MeasurementError(f"loop {text!r}", expected=WORDS)
+    return found
+
+
+def loop_reading(
+    record: Mapping[str, str], numbers: Mapping[str, float], loop: MeasuringLoop, planned: bool
+) -> LoopReading:
+    """What a row says of a loop beside the tip.
+
+    Parameters
+    ----------
+    record
+        Column -> cell.
+    numbers
+        The same of the columns that hold numbers, nan where a cell is empty or absent: `displacement_um`,
+        `stiffness_N_per_mm`, `force_N` and `LOOP_COLUMNS`.
+    loop
+        Which loop.
+    planned
+        Whether the reading may be absent.
+
+    Raises
+    ------
+    InputError
+        There is no reading, or two that disagree, or one that cannot be.
+    """
+    alone = loop.kind == "alone"
+    own = numbers["strut_force_N"]
+    if not alone and not (math.isnan(own) and math.isnan(numbers["length_mm"])):
+        raise MeasurementError(f"strut_force_N or length_mm in a row of loop {loop}", expected="loop strut 1 alone")
+    force = own if alone and not math.isnan(own) else numbers["force_N"]
+    if abs(force) < LEAST_FORCE:
+        raise MeasurementError(f"strut_force_N = {force:g}", expected="a force: tension positive, compression negative")
+    moved, stiffness = numbers["displacement_um"], numbers["stiffness_N_per_mm"]
+    if math.isnan(moved) == math.isnan(stiffness) and not (planned and math.isnan(moved)):
+        found = "neither displacement_um nor" if math.isnan(moved) else "displacement_um and"
+        raise MeasurementError(f"loop {loop}: {found} stiffness_N_per_mm", expected="one of them")
+    if not math.isnan(moved) and math.isnan(force):
+        raise MeasurementError(f"loop {loop}: displacement_um without its load", expected="force_N")
+    compliance = m_from_um(moved) / force if math.isnan(stiffness) else 1e-3 / stiffness
+    # A sign of the direction turns what does not read along the load.
+    if record.get("direction", "").startswith("-") and not (loop.along_load or alone):
+        compliance = -compliance
+    if alone and not (planned or 1.0 / STIFFEST_ALONE <= compliance <= 1.0 / SOFTEST_ALONE):
+        raise MeasurementError(
+            f"loop {loop}: {1e9 * compliance:.4g} nm/N",
+            expected=f"{1e9 / STIFFEST_ALONE:g} to {1e9 / SOFTEST_ALONE:g} nm/N; longer under tension is positive",
+        )
+    size = abs(force)
+    side = math.copysign(1.0, force)
+    return LoopReading(compliance, m_from_um(numbers["sd_um"]) / size, size, 1e-3 * numbers["length_mm"], side)
+
+
+@dataclass(frozen=True)
+class LoopColumns:
+    """Of n readings, those of loops beside the tip among them; SI.
+
+    Attributes
+    ----------
+    loops, which
+        The loops that occur, the tip's first; and which of them each reading (n,) is of.
+    offset, toward
+        (n,) m/N and 1 or -1: o and s above; 0 and 1 at the tip.
+    length
+        (n,) m, of a strut measured alone; nan: as the pose has it.
+    side
+        (n,) 1, or -1 of a strut measured alone under compression.
+    """
+
+    loops: tuple[MeasuringLoop, ...]
+    which: NDArray[np.int64]
+    offset: FloatArray
+    toward: FloatArray
+    length: FloatArray
+    side: FloatArray
+
+    def select(self, rows: NDArray[Any]) -> LoopColumns:
+        """Of some of the readings."""
+        return LoopColumns(
+            self.loops,
+            *(getattr(self, f.name)[rows] for f in fields(self)[1:]),
+        )
+
+    @classmethod
+    def of(cls, names: Sequence[str], length: FloatArray, side: FloatArray | None = None) -> LoopColumns:
+        """Of readings' loops by name ("" is the tip), without offsets yet."""
+        loops = (TIP, *(loop_of(name) for name in dict.fromkeys(names) if name))
+        number = {"" if k == 0 else str(loop): k for k, loop in enumerate(loops)}
+        which = np.array([number[str(name)] for name in names], dtype=np.int64)
+        ones = np.ones(len(names))
+        return cls(loops, which, np.zeros(len(names)), ones, length, ones if side is None else side)
+
+    @property
+    def beside(self) -> NDArray[np.bool_]:
+        """(n,) readings of loops other than the tip's."""
+        return np.asarray(self.which > 0)
+
+    @property
+    def straight(self) -> NDArray[np.bool_]:
+        """(n,) those compared with an offset."""
+        alone = np.array([loop.kind in ("tip", "alone") for loop in self.loops])
+        return ~alone[self.which]
+
+    def on_lengths(self, struts: Struts) -> Struts:
+        """Struts of the readings' poses; where a strut was measured alone, of the length that it had."""
+        given = ~np.isnan(self.length)
+        if not given.any():
+            return struts
+        lengths = np.where(given[:, None], self.length[:, None], struts.lengths)
+        return replace(struts, lengths=lengths)
+
+    def joined(self, compliance: FloatArray) -> FloatArray:
+        """(n,) m/N with the offset in series, of readings' compliances (n,)."""
+        return np.asarray(self.offset + self.toward * compliance)
+
+    def alone(self, joined: FloatArray) -> FloatArray:
+        """(n,) m/N as read, of compliances with the offset in series: the inverse of `joined`."""
+        return np.asarray(self.toward * (joined - self.offset))
+
+
+def assumed_sd(compliance: FloatArray, force: FloatArray) -> FloatArray:
+    """(n,) m/N of loop readings whose scatter nobody states."""
+    return np.hypot(INDICATOR_SD / force, LOAD_SHARE * compliance)
+
+
+def offsets(
+    columns: LoopColumns,
+    read: FloatArray,
+    sd: FloatArray,
+    expected: FloatArray,
+    way: FloatArray,
+    tip: FloatArray,
+    widest: float = WIDEST,
+) -> LoopColumns:
+    """The same with offset and sign of every loop reading.
+
+    Parameters
+    ----------
+    columns
+        Without offsets.
+    read, sd
+        (n,) m/N, readings and their scatter; nan where they are planned.
+    expected, tip
+        (n,) m/N that the plain machine gives: of each loop, of the tip at the same pose along the same load.
+    way
+        (n,) below 0 where what a loop holds gets shorter under the load.
+    widest
+        Relative sd that no reading with its offset has more of.
+    """
+    toward = np.where(way < 0.0, -1.0, 1.0)
+    counted = np.where(np.isnan(read), expected, read) * toward
+    wanted = np.maximum.reduce([OFFSET_SHARE * tip, sd / widest - counted, -BACKWARDS * counted])
+    kept = columns.straight
+    return replace(columns, offset=np.where(kept, wanted, 0.0), toward=np.where(kept, toward, 1.0))

@@ -1,0 +1,568 @@
+"""Measured stiffnesses as columns, SI, with what the model says to each of them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray, TextArray
+from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
+from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
+from toolpath_stiff.machine.limits import reach
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.readings.dates import day_of, days_since_first
+from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
+from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows, with_dates
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.contract import Effect, LoadPath
+from toolpath_stiff.stiffness.loop_response import loop_compliance
+from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
+from toolpath_stiff.tables import Table, parse_table, read_table
+from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
+
+NIST_TABLE_1 = "nist-table1"
+
+
+RISER_ABOVE = 1.0  # m: of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser
+
+
+SINGULAR = 1e-6  # singularity index: the tip would be a million times softer than at the neutral pose
+
+
+# Section of the machine file -> the word in its limits' names.
+LIMIT_WORDS = {
+    "limits.strut_length": "length",
+    "limits.joint_angle": "angle",
+    "limits.workspace": "workspace",
+    "limits.singularity": "singularity",
+}
+
+
+NAMED = 5  # so many poses are named in a warning
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """n measured stiffnesses. SI; nan or "" where a reading does not say.
+
+    Attributes
+    ----------
+    position
+        (n, 3) m, programmed tool tip.
+    angles
+        (n, 3) rad, roll, pitch, yaw.
+    direction
+        (n, 3) unit vectors of force and displacement.
+    stiffness
+        (n,) N/m; nan where a plan leaves it empty. Of a loop beside the tip that of the loop in series with its offset
+        (`updating.loops`): what is compared.
+    force
+        (n,) N, `defaults.FORCE` where not given.
+    sd
+        (n,) N/m, total standard deviation of one reading.
+    tool_extension
+        (n,) m, longer than the machine's reference tool.
+    time, temperature
+        (n,) s since the indicator was zeroed; degrees C.
+    setup, loop, repeat
+        (n,) as in the file.
+    point
+        (n,) label of the point: as given, else one label a pose.
+    clamp
+        (n,) label of the clamping, whose rows move together: file and clamp as given, else point and set-up.
+    file, line
+        (n,) where each was read.
+    extra
+        Further numeric columns -> (n,).
+    missing
+        Optional columns that are absent, or empty in some row, so that nothing can be told from them.
+    notes, warnings
+        What was assumed or not used; what is doubtful. For the report.
+    beside
+        Which readings are of loops beside the tip, and how these are compared; None where there are none.
+    date, day
+        (n,) as in the file, "" where a reading has none; days since the first of them (nan). None where no reading has.
+    """
+
+    position: FloatArray
+    angles: FloatArray
+    direction: FloatArray
+    stiffness: FloatArray
+    force: FloatArray
+    sd: FloatArray
+    tool_extension: FloatArray
+    time: FloatArray
+    temperature: FloatArray
+    setup: TextArray
+    loop: TextArray
+    repeat: TextArray
+    point: TextArray
+    clamp: TextArray
+    file: TextArray
+    line: NDArray[np.int64]
+    extra: Mapping[str, FloatArray]
+    missing: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    beside: LoopColumns | None = None
+    date: TextArray | None = None
+    day: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    @property
+    def tip(self) -> NDArray[np.bool_]:
+        """(n,) readings of the tool tip against the work."""
+        return np.ones(len(self), dtype=bool) if self.beside is None else ~self.beside.beside
+
+    @property
+    def of_tip(self) -> Measurements:
+        """The readings of the tip alone."""
+        return self if self.beside is None else self.select(self.tip)
+
+    @property
+    def compliance(self) -> FloatArray:
+        """(n,) m/N as read: displacement over load, whatever the loop."""
+        joined = 1.0 / self.stiffness
+        return joined if self.beside is None else self.beside.alone(joined)
+
+    @cached_property
+    def rotation(self) -> FloatArray:
+        """(n, 3, 3) orientation of the platform."""
+        return rotation_matrices(self.angles)
+
+    @cached_property
+    def poses(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(p,) a row of each distinct pose with its tool, and (n,) which of them each reading was taken at."""
+        columns = np.concatenate([self.position, self.angles, self.tool_extension[:, None]], axis=1)
+        _, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
+        return first, which.reshape(-1)
+
+    def select(self, rows: NDArray[Any]) -> Measurements:
+        """Some of the rows, by mask or index."""
+        chosen = {
+            f.name: getattr(self, f.name)[rows] for f in fields(self) if isinstance(getattr(self, f.name), np.ndarray)
+        }
+        extra = {name: values[rows] for name, values in self.extra.items()}
+        beside = None if self.beside is None else self.beside.select(rows)
+        return replace(self, **chosen, extra=extra, beside=beside if beside and beside.beside.any() else None)
+
+    def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
+        """Effects that these data cannot test -> the columns that they lack."""
+        lacking = {effect.name: tuple(c for c in effect.needs if c in self.missing) for effect in effects}
+        return {name: columns for name, columns in lacking.items() if columns}
+
+
+def read_measurements(
+    paths: str | Path | Iterable[str | Path], machine: Machine, planned: bool = False
+) -> Measurements:
+    """Read measurement files.
+
+    Parameters
+    ----------
+    paths
+        One or several files, CSV or .xlsx (`FILE.xlsx#SHEET`); `nist-table1` is the paper's Table 1.
+    machine
+        The machine that was measured; its poses are checked against it.
+    planned
+        Whether the stiffness may be left empty.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, or has not the right columns.
+    InputErrors
+        Bad rows, all of them; poses that are singular or beyond what the machine can be.
+    """
+    names = [paths] if isinstance(paths, str | Path) else list(paths)
+    if not names:
+        raise MeasurementError("no measurements", expected="a CSV file, or nist-table1")
+    seen: set[str] = set()
+    for name in map(str, names):
+        if name in seen:
+            raise MeasurementError(f"{name!r} is given twice", hint="name it once")
+        seen.add(name)
+    files = _read_files([str(name) for name in names], planned)
+    errors: list[InputError] = []
+    for parsed in files:
+        if isinstance(parsed, InputErrors):
+            errors += parsed.errors
+    good = [parsed for parsed in files if isinstance(parsed, RowFile)]
+    errors = errors or duplicates([row for parsed in good for row in parsed.rows], across_files=True)
+    if errors:
+        raise InputErrors(errors)
+    return with_offsets(_checked(_columns(good, machine), machine), machine)
+
+
+def _read_files(names: list[str], planned: bool) -> list[RowFile | InputErrors]:
+    """Every file; bad rows of one are handed back, so that those of all files are reported together."""
+    found: list[Table | InputErrors] = []
+    for name in names:
+        try:
+            found.append(_table(name))
+        except InputErrors as bad:
+            found.append(bad)
+    dated = iter(with_dates([one for one in found if isinstance(one, Table)]))
+    return [one if isinstance(one, InputErrors) else _rows(next(dated), planned) for one in found]
+
+
+def _table(name: str) -> Table:
+    if name != NIST_TABLE_1:
+        return read_table(name, "measurements", COLUMNS)
+    text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
+    return parse_table(text, NIST_TABLE_1, COLUMNS)
+
+
+def _rows(table: Table, planned: bool) -> RowFile | InputErrors:
+    if table.file != NIST_TABLE_1:
+        try:
+            return read_rows(table, planned)
+        except InputErrors as bad:
+            return bad
+    own = read_rows(table)
+    rows = tuple(
+        replace(row, labels={**row.labels, "setup": "riser" if row.position[2] > RISER_ABOVE else "no riser"})
+        for row in own.rows
+    )
+    note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
+    return RowFile(rows, own.columns | {"setup"}, (*own.notes, note))
+
+
+def _columns(files: list[RowFile], machine: Machine) -> Measurements:
+    read = [row for file in files for row in file.rows]
+    rows = [_placed(row, machine) for row in read]
+
+    def numbers(name: str) -> FloatArray:
+        return np.array([getattr(row, name) for row in rows], dtype=float)
+
+    def texts(name: str) -> TextArray:
+        return np.array([row.labels[name] for row in rows], dtype=str)
+
+    force, time, temperature = numbers("force"), numbers("time"), numbers("temperature")
+    extension = numbers("tool_extension")
+    given = {
+        "force_N": ~np.isnan(force),
+        "sd_N_per_mm": ~np.isnan(numbers("sd")),
+        "time_min": ~np.isnan(time),
+        "tool_extension_mm": ~np.isnan(extension),
+        "temperature_C": ~np.isnan(temperature),
+        **{name: texts(name) != "" for name in LABELS},
+    }
+    setup, point = texts("setup"), _points(rows, texts("point"))
+    stiffness, sd, beside = _beside(rows)
+    extra, dropped = _extra_columns(rows)
+    return Measurements(
+        position=numbers("position"),
+        angles=numbers("angles"),
+        direction=numbers("direction"),
+        stiffness=stiffness,
+        force=np.where(given["force_N"], force, defaults.FORCE),
+        sd=sd,
+        tool_extension=np.where(given["tool_extension_mm"], extension, 0.0),
+        time=time,
+        temperature=temperature,
+        setup=setup,
+        loop=texts("loop"),
+        repeat=texts("repeat"),
+        point=point,
+        clamp=_clampings(rows, point, setup),
+        file=np.array([row.file for row in rows], dtype=str),
+        line=np.array([row.line for row in rows], dtype=np.int64),
+        extra=extra,
+        # Set-ups and loops may go without a name; of the other columns every reading must have its own.
+        missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
+        notes=(*(note for file in files for note in file.notes), *_incomplete(given), *dropped, *_benches(read)),
+        beside=beside,
+        **_dates(rows),
+    )
+
+
+def _dates(rows: list[Row]) -> dict[str, Any]:
+    """Dates as text and as days since the first; nothing where no reading has one."""
+    date = np.array([row.date for row in rows], dtype=str)
+    if not (date != "").any():
+        return {}
+    return {"date": date, "day": days_since_first(np.array([day_of(row.date) for row in rows]))}
+
+
+def _benches(rows: list[Row]) -> list[str]:
+    """A remark about struts on a bench of which nobody says how long they were."""
+    unknown = [r for r in rows if r.beside and np.isnan(r.beside.length) and np.isnan(r.position).all()]
+    if not unknown:
+        return []
+    return [f"{len(unknown)} readings of struts alone say neither length_mm nor a pose: taken at the neutral pose"]
+
+
+def _placed(row: Row, machine: Machine) -> Row:
+    """A strut on a bench has no pose: it is given the machine's neutral one, which its length overrules."""
+    if row.beside is None or not np.isnan(row.position).all():
+        return row
+    neutral = machine.limits.neutral_pose
+    return replace(row, position=tuple(neutral[:3]), angles=tuple(neutral[3:]))
+
+
+def _beside(rows: list[Row]) -> tuple[FloatArray, FloatArray, LoopColumns | None]:
+    """Stiffness and its sd, N/m, of loops without their offsets; the loops."""
+    stiffness = np.array([row.stiffness for row in rows])
+    sd = np.array([row.sd for row in rows])
+    if all(row.beside is None for row in rows):
+        return stiffness, sd, None
+    names, length = [row.labels["loop"] for row in rows], np.full(len(rows), np.nan)
+    side = np.array([1.0 if row.beside is None else row.beside.side for row in rows])
+    for i, row in enumerate(rows):
+        if row.beside is not None:
+            length[i] = row.beside.length
+            stiffness[i], sd[i] = row.beside.compliance, row.beside.sd  # m/N until `with_offsets`
+    return stiffness, sd, LoopColumns.of(names, length, side)
+
+
+def with_offsets(data: Measurements, machine: Machine, widest: float = WIDEST) -> Measurements:
+    """The same with the readings of loops, until then m/N with their sd in m/N, as stiffnesses with offsets.
+
+    `widest`: relative sd that no loop reading with its offset has more of.
+    """
+    if data.beside is None:
+        return data
+    rows = data.beside.beside
+    read, sd = np.where(rows, data.stiffness, np.nan), np.where(rows, data.sd, np.nan)
+    plain = StiffnessModel(machine)
+    path = measured_path(plain, data)
+    tip = exact.compliance_along(plain, path, data.direction)
+    # A joint moves the way its strut does, which the plain machine's joints, being rigid, do not say.
+    loops = [replace(one, kind="strut", where="") if one.kind == "joint" else one for one in data.beside.loops]
+    toward = loop_compliance(plain, path, data.direction, loops, data.beside.which)
+    joint = np.array([one.kind == "joint" for one in data.beside.loops])[data.beside.which]
+    expected = np.where(joint, 0.0, toward)
+    usual = assumed_sd(np.where(np.isnan(read), expected, read), data.force)
+    assumed = int((np.isnan(sd) & rows & ~np.isnan(read)).sum())
+    sd = np.where(np.isnan(sd), usual, sd)
+    beside = offsets(data.beside, read, sd, expected, toward, tip, widest)
+    stiffness = 1.0 / beside.joined(np.where(rows, read, 1.0))
+    # A loop's indicator is not clamped with the tip's gauge: its readings scatter each on its own.
+    own = np.char.add("loop reading ", np.arange(len(data)).astype(str))
+    note = (
+        f"{assumed} readings of loops beside the tip do not say how far they scatter (sd_um): "
+        f"{1e6 * INDICATOR_SD:g} um and {100 * LOAD_SHARE:g} % assumed"
+    )
+    return replace(
+        data,
+        beside=beside,
+        stiffness=np.where(rows, stiffness, data.stiffness),
+        sd=np.where(rows, sd * stiffness**2, data.sd),
+        clamp=np.where(rows, own, data.clamp),
+        notes=(*data.notes, note) if assumed else data.notes,
+    )
+
+
+def _extra_columns(rows: list[Row]) -> tuple[dict[str, FloatArray], list[str]]:
+    """Further numeric columns that every file has; remarks about those that some lack."""
+    common = set.intersection(*(set(row.extra) for row in rows))
+    dropped = sorted({name for row in rows for name in row.extra} - common)
+    columns = {name: np.array([row.extra[name] for row in rows]) for name in sorted(common)}
+    return columns, [f"column {name} is not in every file and is not used" for name in dropped]
+
+
+def _incomplete(given: Mapping[str, NDArray[np.bool_]]) -> list[str]:
+    """Remarks about columns that some readings leave empty, and about a load that is assumed."""
+    n, notes = len(given["force_N"]), []
+    if not given["force_N"].all():
+        lacking = n - int(given["force_N"].sum())
+        notes.append(f"{lacking} of {n} readings do not say at which force: {defaults.FORCE:g} N assumed")
+    for name, there in given.items():
+        if name not in ("force_N", "setup", "loop") and there.any() and not there.all():
+            notes.append(f"column {name} is empty in {n - int(there.sum())} of {n} readings: treated as absent there")
+    return notes
+
+
+def _points(rows: list[Row], labels: TextArray) -> TextArray:
+    """Labels of the points; readings without one share a label if they share the pose (to 1 um and 1e-6 rad)."""
+    poses: dict[tuple[float, ...], str] = {}
+    taken = set(labels.tolist())
+    found = []
+    for row, label in zip(rows, labels, strict=True):
+        pose = tuple(round(value, 6) + 0.0 for value in (*row.position, *row.angles))
+        if not label and pose not in poses:
+            number = len(poses) + 1
+            while f"P{number}" in taken:
+                number += 1
+            poses[pose] = f"P{number}"
+            taken.add(f"P{number}")
+        found.append(label or poses[pose])
+    return np.array(found, dtype=str)
+
+
+def _clampings(rows: list[Row], point: TextArray, setup: TextArray) -> TextArray:
+    """Labels of the clampings. Numbers start anew in every file; without a number, a point in a set-up is one."""
+    return np.array(
+        [
+            f"{row.file}: clamp {row.labels['clamp']}" if row.labels["clamp"] else f"point {p}, set-up {s}"
+            for row, p, s in zip(rows, point, setup, strict=True)
+        ],
+        dtype=str,
+    )
+
+
+def _checked(data: Measurements, machine: Machine) -> Measurements:
+    """The same with warnings about poses beyond limits; singular and impossible poses are errors."""
+    rotation = data.rotation
+    struts = solve_struts(machine, data.position, rotation, data.tool_extension + machine.reference_tool_length)
+    index = singularity_index(machine, struts)
+    stiffness = machine.strut_law.stiffness(struts.lengths)
+    errors = []
+    for i in range(len(data)):
+        where = f"pose {_shown(data, i)}"
+        if not index[i] >= SINGULAR:
+            found = f"{where} is singular: the struts cannot hold the platform"
+        elif stiffness[i].min() <= 0.0:
+            found = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
+        else:
+            continue
+        errors.append(MeasurementError(found, hint="check the pose's unit", file=data.file[i], line=int(data.line[i])))
+    if errors:
+        raise InputErrors(errors)
+    stand = reach(machine, data.position, struts, rotation)
+    beyond: dict[str, list[int]] = {}
+    for row in np.flatnonzero(~stand.reachable).tolist():
+        beyond.setdefault(stand.limits[int(stand.limit[row])].name, []).append(row)
+    warnings = []
+    for name, those in beyond.items():
+        poses = list(dict.fromkeys(_shown(data, i) for i in those))
+        more = f" and {len(poses) - NAMED} more" if len(poses) > NAMED else ""
+        warnings.append(
+            f"measured beyond a limit of the machine file ({name}, {_origin(machine, name)}): "
+            f"{'; '.join(poses[:NAMED])}{more}. {stand.describe(those[0])}"
+        )
+    return replace(data, warnings=(*data.warnings, *warnings))
+
+
+def _origin(machine: Machine, limit: str) -> str:
+    """Where a limit comes from."""
+    quantity = next((q for q, word in LIMIT_WORDS.items() if word in limit), "")
+    return machine.origins.get(quantity, "origin not stated")
+
+
+def _shown(data: Measurements, i: int) -> str:
+    mm = ", ".join(f"{mm_from_m(value):g}" for value in data.position[i])
+    degrees = np.degrees(data.angles[i])
+    return f"({mm}) mm" + (f" at ({', '.join(f'{d:.4g}' for d in degrees)}) deg" if degrees.any() else "")
+
+
+def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:
+    """Column -> values of a table of the readings, in the shop's units; those that no file has are left out."""
+    pose = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles)], axis=1)
+    columns: dict[str, NDArray[Any]] = {"file": data.file, "line": data.line, "point": data.point}
+    columns |= {name: pose[:, i] for i, name in enumerate(("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"))}
+    columns |= {f"d{axis}": data.direction[:, i] for i, axis in enumerate("xyz")}
+    with np.errstate(divide="ignore"):
+        shown = data.stiffness if data.beside is None else 1.0 / data.compliance
+    columns |= {"stiffness_N_per_mm": n_per_mm_from_n_per_m(shown), "force_N": data.force}
+    others = {
+        "sd_N_per_mm": n_per_mm_from_n_per_m(data.sd),
+        "tool_extension_mm": mm_from_m(data.tool_extension),
+        "time_min": min_from_s(data.time),
+        "temperature_C": data.temperature,
+        **{name: getattr(data, name) for name in ("setup", "clamp", "repeat", "loop")},
+    }
+    columns |= {} if data.date is None or data.day is None else {"date": data.date, "day": data.day}
+    return columns | {name: values for name, values in others.items() if name not in data.missing}
+
+
+MARK = 10  # hexadecimal digits of a reading's mark: among 5,000 readings two differ in it but for one time in 90,000
+
+
+DIGITS = {
+    "mm": 2,
+    "deg": 3,
+    "direction": 3,
+    "stiffness": 5,
+}  # to which readings are told apart: decimals; of N/m, digits
+
+
+def reading_marks(data: Measurements) -> TextArray:
+    """(n,) what tells a reading from others, however its file is called, sorted or laid out.
+
+    The first `MARK` digits of the SHA-256 of its pose (to 0.01 mm and 0.001 degrees), its direction (without sign) and
+    the measured stiffness (to five digits).
+    """
+    pose = np.concatenate(
+        [np.round(mm_from_m(data.position), DIGITS["mm"]), np.round(deg_from_rad(data.angles), DIGITS["deg"])], axis=1
+    )
+    axis = np.round(data.direction, DIGITS["direction"])
+    first = np.take_along_axis(axis, np.argmax(axis != 0.0, axis=1)[:, None], axis=1)
+    rows = np.concatenate([pose, axis * np.sign(first)], axis=1) + 0.0  # no -0
+    return np.array(
+        [
+            hashlib.sha256(f"{row} {stiffness:.{DIGITS['stiffness'] - 1}e}".encode()).hexdigest()[:MARK]
+            for row, stiffness in zip(rows.tolist(), data.stiffness.tolist(), strict=True)
+        ],
+        dtype=str,
+    )
+
+
+def measured_path(model: StiffnessModel, data: Measurements) -> LoadPath:
+    """What the model's effects see of the measurements; a column that is missing is None there.
+
+    A pose is solved once, however often it was measured.
+    """
+    first, which = data.poses
+    length = data.tool_extension + model.machine.reference_tool_length
+    path = load_path(model, data.position[first], data.rotation[first], length[first]).take(which)
+    if data.beside is not None:
+        path = replace(path, struts=data.beside.on_lengths(path.struts))
+
+    def unless_missing(name: str, values: Any) -> Any:
+        return None if name in data.missing else values
+
+    return replace(
+        path,
+        force=data.force,
+        direction=data.direction,
+        setup=unless_missing("setup", data.setup),
+        time=unless_missing("time_min", data.time),
+        temperature=unless_missing("temperature_C", data.temperature),
+    )
+
+
+def model_stiffness(model: StiffnessModel, data: Measurements) -> FloatArray:
+    """(n,) N/m that the model, its instruments included, says each reading should show.
+
+    Raises
+    ------
+    InputError
+        The strut law leaves a strut no stiffness at a measured pose.
+    """
+    path = measured_path(model, data)
+    stiffness = mechanical_stiffness(model, path, data)
+    for active in model.instruments:
+        stiffness = shown_by(active, stiffness, path, data)
+    return np.asarray(stiffness)
+
+
+def mechanical_stiffness(
+    model: StiffnessModel, path: LoadPath, data: Measurements, equilibrium: FloatArray | None = None
+) -> FloatArray:
+    """(n,) N/m of the machine alone; of loops beside the tip with their offsets, nan where that is no stiffness.
+
+    `equilibrium`: strut forces as of `exact.compliance_along`.
+    """
+    if data.beside is None:
+        return np.asarray(1.0 / exact.compliance_along(model, path, data.direction, equilibrium))
+    found = loop_compliance(model, path, data.direction, data.beside.loops, data.beside.which)
+    joined = data.beside.joined(found)
+    return np.asarray(1.0 / np.where(joined > 0.0, joined, np.nan))
+
+
+def shown_by(active: ActiveEffect, stiffness: FloatArray, path: LoadPath, data: Measurements) -> FloatArray:
+    """(n,) N/m that an instrument shows; the indicator of a loop beside the tip is another one."""
+    return np.where(data.tip, active.reading(stiffness, path), stiffness)

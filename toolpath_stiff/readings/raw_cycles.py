@@ -1,0 +1,98 @@
+"""Cycles of a loop of raw records: where the drive turns, the last closed cycle, a secant free of drift.
+
+A test rig goes up and down several times. The first way is that of a strut that was never loaded (a virgin curve), and
+seating, creep and a warm sensor carry the deflection away slowly; neither is stiffness. So with three turns or more
+(high, low, high) the secant is taken from second differences of the turns, in which a steady drift cancels, as in a
+weighing A B A (OIML R 111-1:2004, C.4), and the shape of the loop is that of its last closed cycle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+
+NEAR_TURN = 0.1  # of the range: how near to an extreme a cycle must come to turn there
+
+
+FEWEST_STILL = 3  # records, and share of the range of the force, over which an indicator stands still at its end
+
+
+STILL = 0.05
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Force in N and deflection in m between the extremes, of which the secant is taken."""
+
+    force: float
+    deflection: float
+
+
+def turns_of(drive: FloatArray) -> list[int]:
+    """Records at which the drive turns, high and low alternately; the first of equal ones."""
+    high, low, near = float(drive.max()), float(drive.min()), NEAR_TURN * float(np.ptp(drive))
+    found: list[int] = []
+    last = 0.0
+    for i in np.flatnonzero((drive >= high - near) | (drive <= low + near)):
+        side = 1.0 if drive[i] >= high - near else -1.0
+        if side != last:
+            found.append(int(i))
+        elif side * drive[i] > side * drive[found[-1]]:
+            found[-1] = int(i)
+        last = side
+    return found
+
+
+def closed_cycle(turns: list[int]) -> slice:
+    """The records of the last closed cycle; there is one from three turns on."""
+    return slice(turns[-3], turns[-1] + 1)
+
+
+def closed_cycles(turns: list[int]) -> slice:
+    """The records of all closed cycles from the first turn on."""
+    return slice(turns[0], turns[-1 - (len(turns) + 1) % 2] + 1)
+
+
+def ends_without_drift(
+    drive: FloatArray, force: FloatArray, deflection: FloatArray, turns: list[int], same: float
+) -> Ends:
+    """What lies between the extremes of three turns or more, a steady drift taken out.
+
+    Parameters
+    ----------
+    drive, force, deflection
+        (m,) the records in their order.
+    turns
+        As `turns_of` finds them.
+    same
+        Records whose drive is this close to that of their turn are averaged.
+    """
+    middles = [(one + other) // 2 for one, other in pairwise(turns)]
+    bounds = [0, *(at + 1 for at in middles), len(drive)]
+    means = []
+    for turn, start, stop in zip(turns, bounds[:-1], bounds[1:], strict=True):
+        at = start + np.flatnonzero(np.abs(drive[start:stop] - drive[turn]) <= same)
+        means.append((force[at].mean(), deflection[at].mean()))
+    second = np.diff(np.array(means), 2, axis=0)
+    signs = np.where(drive[turns[1:-1]] < drive[turns[0:-2]], 1.0, -1.0)
+    found = 0.5 * (signs[:, None] * second).mean(axis=0)
+    return Ends(float(found[0]), float(found[1]))
+
+
+def stands_still(force: FloatArray, displacement: FloatArray, turns: list[int]) -> tuple[float, float, float] | None:
+    """Displacement (m), and the forces (N) between which the indicator reads exactly that on the way to a turn.
+
+    None where it does not: an indicator at the end of its range stands still while the force goes on.
+    """
+    for start, turn in zip([0, *turns[:-1]], turns, strict=True):
+        way = slice(start, turn + 1)
+        still = displacement[way] == displacement[turn]
+        first = len(still) - int(np.argmin(still[::-1])) if not still.all() else 0
+        n = len(still) - first
+        if n >= FEWEST_STILL and abs(force[turn] - force[start + first]) >= STILL * float(np.ptp(force)):
+            return float(displacement[turn]), float(force[start + first]), float(force[turn])
+    return None

@@ -1,0 +1,393 @@
+"""Raw records of force and displacement, read: which of them are one loop, and what was set step by step."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
+from toolpath_stiff.readings.dates import day_of, like_date
+from toolpath_stiff.readings.loops import loop_of
+from toolpath_stiff.readings.raw_layouts import MISSING
+from toolpath_stiff.readings.rows import (
+    ANGLES,
+    DATE,
+    LABELS,
+    POSITION,
+    SOFTEST,
+    STIFFEST,
+    VECTOR,
+    direction_of,
+    number,
+    optional_number,
+)
+from toolpath_stiff.stiffness.measuring_loop import TIP, MeasuringLoop, measuring_loop
+from toolpath_stiff.tables import Columns, Table
+from toolpath_stiff.units import m_from_um, n_per_m_from_n_per_mm
+
+Record = tuple[int, dict[str, str], list[float]]  # line, cells, readings and conditions
+
+
+READINGS = ("jog_um", "force_N", "displacement_um")
+
+
+PLACE = (
+    *POSITION,
+    *ANGLES,
+    "direction",
+    *VECTOR,
+    *LABELS,
+    "tool_extension_mm",
+    "length_mm",
+    DATE,
+)  # what one loop has in common
+
+
+CONDITIONS = ("time_min", "temperature_C")
+
+
+STIFFNESS = ("stiffness_N_per_mm", "strut_force_N")  # of a table of struts that were reduced elsewhere
+
+
+FAILED = 0.05  # of the rows of such a table: tests that may have failed, near zero; of more the unit is wrong; assumed
+
+
+COLUMNS = Columns(
+    numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", "length_mm", *READINGS, *CONDITIONS, *STIFFNESS),
+    texts=("direction", *LABELS, DATE, "strut"),
+    converted=True,
+)
+
+
+BENCH = "strut,date,force_N,displacement_um of a strut on a bench"
+
+
+WHICH = "name the strut in a column, above the heading (`strut: 3`) or in the file's name (strut3_2021-09-16.csv)"
+
+
+SIGNED = {"force_N": 1e7, "displacement_um": 1e6, "jog_um": 1e6}  # largest magnitude, either sign
+
+
+NEAR_END = 0.02  # of the range of a force set on a bench: records this close are at its extreme, and averaged
+
+
+SHARED = 3  # records that a date-time needs to stand for a loop of its own
+
+
+SAME_JOG = 1e-9  # m: jogs this close are the same step
+
+
+DAY = len("2024-03-31")
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One test: records in the order in which they were taken. SI.
+
+    Attributes
+    ----------
+    place
+        Column -> text of what the records have in common: pose, direction, labels.
+    conditions
+        Column -> mean of time and temperature, in the file's unit.
+    jog, force, displacement
+        (m,) m, N, m, along the direction. `jog` is None of a strut on a bench.
+    line, file
+        Line of the first record, and of which file.
+    """
+
+    place: Mapping[str, str]
+    conditions: Mapping[str, float]
+    jog: FloatArray | None
+    force: FloatArray
+    displacement: FloatArray
+    line: int
+    file: str = ""
+
+    @property
+    def deflection(self) -> FloatArray:
+        """(m,) m, what the machine gave way: jog less displacement; on a bench the displacement itself."""
+        return self.displacement if self.jog is None else self.jog - self.displacement
+
+    @property
+    def drive(self) -> FloatArray:
+        """(m,) what was set step by step: the jog in m; on a bench the force in N."""
+        return self.force if self.jog is None else self.jog
+
+    @property
+    def same(self) -> float:
+        """How close two records' `drive` is at one step."""
+        return NEAR_END * float(np.ptp(self.force)) if self.jog is None else SAME_JOG
+
+    @property
+    def resolution(self) -> float:
+        """m, the smallest step between two different readings of the indicator."""
+        steps = np.diff(np.unique(self.displacement))
+        return float(steps.min()) if len(steps) else 0.0
+
+    def part(self, records: slice) -> Loop:
+        """The same test, of some of its records."""
+        jog = None if self.jog is None else self.jog[records]
+        return replace(self, jog=jog, force=self.force[records], displacement=self.displacement[records])
+
+    @property
+    def title(self) -> str:
+        """Point or position, direction, set-up, repeat: whatever is there."""
+        rest = [f"{name} {self.place[name]}" for name in ("setup", "clamp", "repeat") if self.place.get(name)]
+        rest = [self.place[DATE], *rest] if self.place.get(DATE) else rest
+        if self.jog is None:
+            return ", ".join([*filter(None, [self.place["loop"], self.place.get("point")]), *rest])
+        where = self.place.get("point") or ", ".join(self.place[name] for name in POSITION) + " mm"
+        way = self.place.get("direction") or "(" + ", ".join(self.place[name] for name in VECTOR) + ")"
+        return ", ".join([where, way, *rest])
+
+
+class RawRecords(NamedTuple):
+    """Loops in the order of their first record, and what reading them left to be said."""
+
+    loops: list[Loop]
+    notes: list[str]
+
+
+def read_raw(table: Table) -> RawRecords:
+    """Loops of a file of raw records (`tables.read_table` with `COLUMNS`).
+
+    Raises
+    ------
+    InputError
+        Columns are missing or unknown, or there are no records.
+    InputErrors
+        Bad records, all of them.
+    """
+    file = table.file
+    unused = _check_heading(list(table.heading), file, table.heading_line)
+    if DATE not in table.heading:
+        _refuse_unnamed_dates(table, unused)
+    notes = [f"{file}: column {name} is not used" for name in unused]
+    if not table.rows:
+        raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
+    groups: dict[tuple[str, ...], list[Record]] = {}
+    names = [name for name in PLACE if name != DATE and (name in table.heading or name == "loop")]
+    errors, lost = [], []
+    for line, cells in table.rows:
+        try:
+            record = table.record(cells)
+            if _is_lost(record):
+                lost.append(line)
+                continue
+            values = _values(record)
+        except InputError as error:
+            errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
+            continue
+        if DATE in record and not record[DATE]:
+            errors.append(MeasurementError("no date", expected="one in every record", file=file, line=line))
+        key = (*(record.get(name, "") for name in names), record.get(DATE, "")[:DAY])
+        groups.setdefault(key, []).append((line, record, values))
+    if errors:
+        raise InputErrors(errors)
+    if lost:
+        if not groups:
+            raise MeasurementError("no record has both a force and a displacement", file=file, line=lost[0])
+        many = f"{len(lost)} records" if len(lost) > 1 else "a record"
+        notes.append(f"{file}: {many} without force or displacement passed over, from line {lost[0]}")
+    found = [_loop(one, file) for records in groups.values() for one in _by_time(records)]
+    return RawRecords(sorted(found, key=lambda loop: loop.line), notes)
+
+
+def _refuse_unnamed_dates(table: Table, unused: list[str]) -> None:
+    """A column of dates by another name: without it the records of all dates would be one loop."""
+    for name in unused:
+        cells = {row[table.heading.index(name)] for _, row in table.rows if len(row) == len(table.heading)}
+        if len(cells) > 1 and all(like_date(cell) for cell in cells):
+            raise MeasurementError(
+                f"column {name!r} holds several dates, and there is no column date",
+                expected="date, so that the records of each are a loop of their own",
+                hint=f"rename {name} to date",
+                file=table.file,
+                line=table.heading_line,
+            )
+
+
+def is_table(table: Table) -> bool:
+    """Whether the rows are stiffnesses of struts that were reduced elsewhere."""
+    return STIFFNESS[0] in table.heading and "displacement_um" not in table.heading
+
+
+def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]]]:
+    """Struts alone of a table of stiffnesses: loops without records, and of each N/m and N (nan where not given).
+
+    A few rows with a stiffness near zero are failed tests: they are left out, with a note.
+
+    Raises
+    ------
+    InputError, InputErrors
+        Rows that are not of a strut alone, have no stiffness or none that could be; all of them.
+    """
+    heading, errors = table.heading, []
+    if "strut" not in heading and "loop" not in heading:
+        raise MeasurementError(
+            "stiffnesses without a column strut",
+            expected="strut,date,stiffness_N_per_mm of struts alone, or raw records",
+            hint="readings of the tip need no reduction: `tps compare` takes them",
+            file=table.file,
+            line=table.heading_line,
+        )
+    known = ("strut", *LABELS, DATE, "length_mm", *STIFFNESS)
+    notes = [f"{table.file}: column {name} is not used" for name in heading if name not in known]
+    loops, figures, failed = [], [], []
+    for line, cells in table.rows:
+        try:
+            record = table.record(cells)
+            if _loop_named(record).kind != "alone":
+                raise MeasurementError("a row of no strut", expected="strut 1 to 6")
+            day_of(record.get(DATE, ""))
+            optional_number(record, "length_mm")
+            if abs(number(record, STIFFNESS[0], (-STIFFEST, STIFFEST))) < SOFTEST:
+                failed.append((line, record[STIFFNESS[0]]))
+                continue
+            own = n_per_m_from_n_per_mm(number(record, STIFFNESS[0])), optional_number(record, STIFFNESS[1])
+        except InputError as error:
+            errors.append(
+                MeasurementError(error.found, expected=error.expected, hint=error.hint, file=table.file, line=line)
+            )
+            continue
+        none = np.empty(0)
+        place = {name: record[name] for name in PLACE if record.get(name)}
+        loops.append(Loop(place, {}, None, none, none, line, table.file))
+        figures.append(own)
+    many = f"{len(failed)} of {len(table.rows)} rows with a stiffness within {SOFTEST:g} N/mm of zero"
+    if len(failed) > FAILED * len(table.rows):
+        line, cell = failed[0]
+        hint = f"is the unit right? At most {100 * FAILED:g} % are left out as failed tests"
+        errors.append(MeasurementError(f"{many}, the first {cell}", hint=hint, file=table.file, line=line))
+    elif failed:
+        notes.append(f"{table.file}: {many} are left out as failed tests, from line {failed[0][0]}")
+    if errors:
+        raise InputErrors(errors)
+    if not loops:
+        raise MeasurementError("no rows below the heading", file=table.file, line=table.heading_line)
+    return RawRecords(loops, notes), figures
+
+
+def _is_lost(record: Mapping[str, str]) -> bool:
+    """Whether a record of a bench has lost its force or displacement."""
+    return not record.get("jog_um") and any(record.get(name, "").lower() in MISSING for name in READINGS[1:])
+
+
+def _values(record: dict[str, str]) -> list[float]:
+    """Jog (nan on a bench), force, displacement, conditions of a record; names its strut. Raises `InputError`."""
+    loop = _loop_named(record)
+    day_of(record.get(DATE, ""))
+    optional_number(record, "tool_extension_mm")
+    optional_number(record, "length_mm")
+    on_bench = loop.kind == "alone" and not record.get("jog_um")
+    names = (*POSITION, *(angle for angle in ANGLES if angle in record))
+    if not on_bench or any(record.get(name) for name in names):
+        for name in names:
+            number(record, name)
+    if not on_bench:
+        direction_of(record)
+    values = [math.nan if on_bench and name == "jog_um" else _signed(record, name) for name in READINGS]
+    return values + [optional_number(record, name) for name in CONDITIONS]
+
+
+def _loop_named(record: dict[str, str]) -> MeasuringLoop:
+    """The loop of a record; `strut` 3 is the loop "strut 3 alone", and the record says so afterwards."""
+    loop = loop_of(record.get("loop", ""))
+    if record.get("strut"):
+        own = measuring_loop(f"strut {record['strut'].lower().removeprefix('strut')} alone")
+        if own is None:
+            raise MeasurementError(f"strut {record['strut']!r}", expected="1 to 6")
+        if loop not in (TIP, own):
+            raise MeasurementError(f"strut {record['strut']} and loop {loop}", expected="one of them")
+        loop = own
+    if loop.kind == "alone":
+        record["loop"] = str(loop)
+    return loop
+
+
+def _by_time(records: list[Record]) -> list[list[Record]]:
+    """Records of one day by their date-times, if these are of whole loops; a logger's clock that runs on is not."""
+    times: dict[str, list[Record]] = {}
+    for one in records:
+        times.setdefault(one[1].get(DATE, ""), []).append(one)
+    return list(times.values()) if min(map(len, times.values())) >= SHARED else [records]
+
+
+def _check_heading(heading: list[str], file: str, line: int) -> list[str]:
+    """Columns that are not used. Raises `InputError` at the first thing that is wrong."""
+    known = (*PLACE, *READINGS, *CONDITIONS, "strut")
+    unused = [name for name in heading if name and name not in known]
+    _refuse_missing(heading, unused, file, line)
+    for name in heading:
+        if heading.count(name) > 1:
+            raise MeasurementError(f"column {name} stands twice", file=file, line=line)
+    for name in unused:
+        near = next(iter(difflib.get_close_matches(name, known, n=1, cutoff=0.75)), None)
+        if near and near not in heading:
+            hint = f"did you mean {near}? Otherwise give it another name"
+            raise MeasurementError(f"unknown column {name!r}", hint=hint, file=file, line=line)
+    if "direction" in heading and any(name in heading for name in VECTOR):
+        raise MeasurementError("two directions", expected="direction, or dx,dy,dz", file=file, line=line)
+    return unused
+
+
+def _refuse_missing(heading: list[str], unused: list[str], file: str, line: int) -> None:
+    """Raise `InputError` for the first column that is needed and not there."""
+    vector = "direction" not in heading
+    angles = ANGLES if any(name in heading for name in ANGLES) else ()
+    asked = (*POSITION, *angles, *(VECTOR if vector else ("direction",)), *READINGS)
+    bench = "strut" in heading or "loop" in heading  # has neither pose nor jog; others say so by record
+    if bench or not any(name in heading for name in (*POSITION, "jog_um")):
+        asked = (*(() if bench else ("strut",)), *READINGS[1:])
+    name = next((name for name in asked if name not in heading), None)
+    if name is None:
+        return
+    near = next(iter(difflib.get_close_matches(name, unused, n=1, cutoff=0.85)), None)
+    raise MeasurementError(
+        "no direction" if vector and name in VECTOR else f"column {name} is missing",
+        expected=f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}",
+        hint=f"is it {near!r}?" if near else _to_do(name, unused),
+        file=file,
+        line=line,
+    )
+
+
+def _to_do(missing: str, unused: list[str]) -> str:
+    """What to do about a missing column."""
+    parts = [WHICH] if missing == "strut" else []
+    if unused:
+        parts.append(f"{', '.join(repr(name) for name in unused)} are not known: rename what is meant")
+    return "; ".join(parts)
+
+
+def _signed(record: Mapping[str, str], name: str) -> float:
+    if name not in record:
+        raise MeasurementError(f"no column {name}", expected="it of all but a strut measured alone")
+    try:
+        value = float(record[name])
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= SIGNED[name]:
+        raise MeasurementError(f"{name} = {record[name]!r}", expected=f"a number within +-{SIGNED[name]:g}")
+    return value
+
+
+def _loop(records: list[Record], file: str) -> Loop:
+    line, record, _ = records[0]
+    jog, force, displacement, *conditions = np.array([values for _, _, values in records]).T
+    return Loop(
+        place={name: record[name] for name in PLACE if name in record},
+        conditions={n: float(v.mean()) for n, v in zip(CONDITIONS, conditions, strict=True) if not np.isnan(v).any()},
+        jog=None if np.isnan(jog).any() else m_from_um(jog),
+        force=force,
+        displacement=m_from_um(displacement),
+        line=line,
+        file=file,
+    )

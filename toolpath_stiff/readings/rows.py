@@ -1,0 +1,445 @@
+"""Rows of a measurement file: one measured stiffness each, every cell read and judged, in SI.
+
+A file is either long (one row a reading) or wide like the paper's Table 1 (one row a point, `measured_x_N_per_mm` and
+so on). A bad row is named with its line; all bad rows of a file are reported together.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
+from toolpath_stiff.readings.dates import WRITE_ISO, Order, day_of, read_dates
+from toolpath_stiff.readings.loops import LARGEST_UM, loop_of, loop_reading
+from toolpath_stiff.stiffness.measuring_loop import TIP, MeasuringLoop
+from toolpath_stiff.tables import Columns, Table
+from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
+
+if TYPE_CHECKING:
+    from toolpath_stiff.readings.loops import LoopReading
+
+
+LOOP_COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # of a measurement file, for loops beside the tip alone
+
+
+AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+
+
+POSITION = ("x_mm", "y_mm", "z_mm")
+
+
+ANGLES = ("a_deg", "b_deg", "c_deg")
+
+
+VECTOR = ("dx", "dy", "dz")
+
+
+LABELS = ("setup", "clamp", "repeat", "point", "loop")
+
+
+WIDE = tuple(f"measured_{axis}_N_per_mm" for axis in "xyz")
+
+
+WIDE_MODEL = tuple(f"modeled_{axis}_N_per_mm" for axis in "xyz")
+
+
+DATE = "date"
+
+
+OPTIONAL = ("force_N", "sd_N_per_mm", *LABELS, "time_min", "tool_extension_mm", "temperature_C")
+
+
+COLUMNS = Columns(
+    numbers=(
+        *POSITION, *ANGLES, *VECTOR, "stiffness_N_per_mm", "displacement_um", "force_N", "sd_N_per_mm", "time_min",
+        "tool_extension_mm", "temperature_C", *LOOP_COLUMNS, *WIDE, *WIDE_MODEL,
+    ),
+    texts=("direction", *LABELS, DATE),
+)  # fmt: skip
+
+
+KNOWN = (
+    *POSITION, *ANGLES, "direction", *VECTOR, "stiffness_N_per_mm", "displacement_um", *OPTIONAL, DATE,
+    *LOOP_COLUMNS,
+)  # fmt: skip
+
+
+# N/mm: no machine is softer than 0.1 N/um or stiffer than 10 kN/um; beyond, the unit is not N/mm.
+SOFTEST, STIFFEST = 1e2, 1e7
+
+
+BOUNDS = {
+    **dict.fromkeys((*POSITION, "tool_extension_mm"), (-1e5, 1e5)),
+    **dict.fromkeys(ANGLES, (-360.0, 360.0)),
+    **dict.fromkeys(("stiffness_N_per_mm", *WIDE), (SOFTEST, STIFFEST)),
+    "sd_N_per_mm": (1e-6, STIFFEST),
+    "force_N": (1e-3, 1e7),
+    "displacement_um": (1e-3, 1e6),
+    "time_min": (0.0, 1e6),
+    "temperature_C": (-50.0, 200.0),
+    "sd_um": (1e-4, 1e4),
+    "strut_force_N": (-1e7, 1e7),
+    "length_mm": (1.0, 1e5),
+}
+
+
+# Of a loop beside the tip, which may read nothing, or backwards.
+LOOP_BOUNDS = {"stiffness_N_per_mm": (-1e12, 1e12), "displacement_um": (-LARGEST_UM, LARGEST_UM)}
+
+
+LIKE_DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
+
+
+AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be their quotient, rounding allowed
+
+
+@dataclass(frozen=True)
+class Row:
+    """One reading. SI; a cell that is absent or empty is nan or "".
+
+    Attributes
+    ----------
+    position, angles
+        m; roll, pitch, yaw in rad.
+    direction
+        Unit vector of force and displacement.
+    stiffness, sd
+        N/m.
+    force
+        N, nan if not given.
+    time, temperature, tool_extension
+        s, degrees C, m.
+    labels
+        `LABELS` -> text; `loop` by its own name, "" for the tip's.
+    beside
+        What an indicator beside the tip read; `stiffness` is nan then. None for readings of the tip.
+    extra
+        Further numeric columns, as they stand.
+    file, line
+        Where it was read.
+    date
+        As in the file; a date of ISO 8601.
+    """
+
+    position: tuple[float, ...]
+    angles: tuple[float, ...]
+    direction: tuple[float, ...]
+    stiffness: float
+    sd: float
+    force: float
+    time: float
+    temperature: float
+    tool_extension: float
+    labels: Mapping[str, str]
+    file: str
+    line: int
+    extra: Mapping[str, float] = field(default_factory=dict)
+    beside: LoopReading | None = None
+    date: str = ""
+
+
+@dataclass(frozen=True)
+class RowFile:
+    """Rows of a file, the known columns that it has, and what was not used, in words."""
+
+    rows: tuple[Row, ...]
+    columns: frozenset[str]
+    notes: tuple[str, ...]
+
+
+def read_rows(table: Table, planned: bool = False) -> RowFile:
+    """Rows of a measurement file.
+
+    Parameters
+    ----------
+    table
+        As `tables.read_table` reads it with `COLUMNS`.
+    planned
+        Whether the stiffness may be left empty (a plan of measurements).
+
+    Raises
+    ------
+    InputError
+        No rows, columns missing, unknown or repeated.
+    InputErrors
+        Bad rows, all of them.
+    """
+    file, heading, line = table.file, list(table.heading), table.heading_line
+    _check_heading(heading, file, line, planned)
+    if not table.rows:
+        raise MeasurementError(
+            "no rows below the heading", expected="one row a measured stiffness", file=file, line=line
+        )
+    known = {*KNOWN, *WIDE, *WIDE_MODEL}
+    more = [name for name in heading if name not in known and _all_numbers(table, heading.index(name))]
+    notes = [*table.notes] + [
+        f"{file}: column {name} holds text and is not used"
+        for name in heading
+        if name not in known and name not in more
+    ]
+    if any(name in WIDE_MODEL for name in heading):
+        notes.append(f"{file}: the printed model values (modeled_x_N_per_mm and so on) are not used")
+    rows: list[Row] = []
+    errors: list[InputError] = []
+    for line, cells in table.rows:
+        try:
+            rows += _rows_of(table.record(cells), more, file, line, planned)
+        except InputError as error:
+            errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
+    errors += duplicates(rows)
+    if errors:
+        raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
+    columns = {name for name in heading if name in KNOWN}
+    return RowFile(tuple(rows), frozenset(columns), tuple(notes))
+
+
+def with_dates(tables: Sequence[Table], order: Order | None = None, remedy: str = WRITE_ISO) -> list[Table]:
+    """Tables of one set with their dates in ISO 8601; what was assumed stands in the notes of the first that has some.
+
+    Raises
+    ------
+    InputError
+        Dates that can be read in two ways.
+    """
+    at = [(table, table.heading.index(DATE)) for table in tables if DATE in table.heading]
+    cells = [cells[i] for table, i in at for _, cells in table.rows if i < len(cells)]
+    try:
+        dates = read_dates(cells, order, remedy)
+    except InputError as error:
+        raise MeasurementError(
+            error.found, expected=error.expected, hint=error.hint, file=at[0][0].file, line=at[0][0].heading_line
+        ) from None
+    if not dates.iso and not dates.notes:
+        return list(tables)
+    found, notes = [], dates.notes
+    for table in tables:
+        found.append(with_cells(table, DATE, dates.iso, *notes))
+        notes = [] if DATE in table.heading else notes
+    return found
+
+
+def with_cells(table: Table, column: str, cells: Mapping[str, str], *notes: str) -> Table:
+    """The table with other texts in the cells of a column, if it has that, and notes of it."""
+    if column not in table.heading:
+        return table
+    i = table.heading.index(column)
+    rows = tuple((n, (*c[:i], cells.get(c[i], c[i]), *c[i + 1 :]) if i < len(c) else c) for n, c in table.rows)
+    return replace(table, rows=rows, notes=(*table.notes, *(f"{table.file}: {note}" for note in notes if note)))
+
+
+def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> None:
+    """Raise `InputError` at the first thing that is wrong with a heading."""
+    wide = any(name in heading for name in WIDE)
+    wrong = _check_names(heading) or _check_layout(heading) or _check_groups(heading)
+    wrong = wrong or (None if wide else _check_long(heading, planned))
+    if wrong is not None:
+        found, expected, hint = wrong
+        raise MeasurementError(found, expected=expected, hint=hint, file=file, line=line)
+
+
+Wrong = tuple[str, str, str]  # what was found, what was expected, a hint
+
+
+def _check_names(heading: list[str]) -> Wrong | None:
+    """Names that are missing, there twice, or almost those of a known column."""
+    for name in heading:
+        if not name:
+            return "a column without a name", "", ""
+        if heading.count(name) > 1:
+            return f"column {name} stands twice", "", ""
+        if name not in KNOWN and name not in WIDE and name not in WIDE_MODEL:
+            near = difflib.get_close_matches(name, (*KNOWN, *WIDE), n=1, cutoff=0.75)
+            if near:
+                return f"unknown column {name}", "", f"did you mean {near[0]}? Otherwise give it another name"
+    return None
+
+
+def _check_layout(heading: list[str]) -> Wrong | None:
+    """Wide or long, not both, with the columns that the layout needs."""
+    wide = any(name in heading for name in WIDE)
+    places = () if "loop" in heading else POSITION  # a strut on a bench has none
+    missing = [name for name in (POSITION + WIDE if wide else places) if name not in heading]
+    if missing:
+        return f"column {missing[0]} is missing", "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm or more", ""
+    if wide and any(name in heading for name in ("direction", *VECTOR, "stiffness_N_per_mm", "displacement_um")):
+        return "columns of the wide layout beside those of the long one", "", "use one of the two"
+    return None
+
+
+def _check_groups(heading: list[str]) -> Wrong | None:
+    """Three angles and three components of a direction, or none."""
+    for group in (ANGLES, VECTOR):
+        absent = [name for name in group if name not in heading]
+        if absent and len(absent) < len(group):
+            return f"column {absent[0]} is missing", f"all of {', '.join(group)} or none", ""
+    return None
+
+
+def _check_long(heading: list[str], planned: bool) -> Wrong | None:
+    """One direction, and a stiffness unless it is still to be measured."""
+    directions = ("direction" in heading) + (VECTOR[0] in heading)
+    if directions == 2 or (not directions and "loop" not in heading):
+        found = "two directions" if directions else "no direction"
+        return found, "direction, or dx,dy,dz", ""
+    loaded = "displacement_um" in heading and ("force_N" in heading or "strut_force_N" in heading)
+    if not planned and "stiffness_N_per_mm" not in heading and not loaded:
+        return "no measured stiffness", "stiffness_N_per_mm, or force_N with displacement_um", ""
+    return None
+
+
+def _all_numbers(table: Table, column: int) -> bool:
+    try:
+        return all(math.isfinite(float(cells[column])) for _, cells in table.rows)
+    except (ValueError, IndexError):
+        return False
+
+
+def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, planned: bool) -> list[Row]:
+    """The one reading of a long row, the three of a wide one."""
+    loop = loop_of(record.get("loop", ""))
+    labels = {name: record.get(name, "") for name in LABELS} | {"loop": "" if loop == TIP else str(loop)}
+    on_bench = loop.kind == "alone" and (
+        bool(record.get("length_mm")) or not any(record.get(name) for name in (*POSITION, *ANGLES))
+    )
+    day_of(record.get(DATE, ""))  # refuses what is no date
+    position, angles = _pose(record, on_bench)
+    force, beside = optional_number(record, "force_N"), None
+    if loop == TIP:
+        readings = _readings(record, force, planned)
+    else:
+        beside = _beside(record, loop, planned)
+        force = beside.force
+        absent = on_bench and not record.get("direction", "Z" if VECTOR[0] in record else "")
+        readings = [(AXES["Z"] if absent else direction_of(record), math.nan)]
+    rows = []
+    for direction, stiffness in readings:
+        rows.append(
+            Row(
+                position=position,
+                angles=angles,
+                direction=direction,
+                stiffness=n_per_m_from_n_per_mm(stiffness),
+                sd=n_per_m_from_n_per_mm(optional_number(record, "sd_N_per_mm")),
+                force=force,
+                time=60.0 * optional_number(record, "time_min"),
+                temperature=optional_number(record, "temperature_C"),
+                tool_extension=m_from_mm(optional_number(record, "tool_extension_mm")),
+                labels=labels,
+                file=file,
+                line=line,
+                extra={name: float(record[name]) for name in more},
+                beside=beside,
+                date=record.get(DATE, ""),
+            )
+        )
+    return rows
+
+
+def _pose(record: Mapping[str, str], on_bench: bool) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Position and angles; of a strut on a bench, which has no pose, nan."""
+    if on_bench and not any(record.get(name) for name in (*POSITION, *ANGLES)):
+        return (math.nan,) * 3, (math.nan,) * 3
+    position = tuple(m_from_mm(number(record, name)) for name in POSITION)
+    return position, tuple(rad_from_deg(number(record, name)) if name in record else 0.0 for name in ANGLES)
+
+
+def _beside(record: Mapping[str, str], loop: MeasuringLoop, planned: bool) -> LoopReading:
+    """What an indicator beside the tip read."""
+    if record.get("sd_N_per_mm"):
+        raise MeasurementError(f"sd_N_per_mm in a row of loop {loop}", expected="sd_um, of displacement_um")
+    numbers = {name: optional_number(record, name) for name in ("force_N", *LOOP_COLUMNS)}
+    for name, bounds in LOOP_BOUNDS.items():
+        numbers[name] = number(record, name, bounds) if record.get(name) else math.nan
+    if numbers["stiffness_N_per_mm"] == 0.0:
+        raise MeasurementError("stiffness_N_per_mm = 0", expected="displacement_um, where a loop reads it")
+    return loop_reading(record, numbers, loop, planned)
+
+
+def _readings(record: Mapping[str, str], force: float, planned: bool) -> list[tuple[tuple[float, ...], float]]:
+    """Directions and stiffnesses in N/mm."""
+    if WIDE[0] in record:
+        return [(axis, number(record, name)) for axis, name in zip(AXES.values(), WIDE, strict=True)]
+    printed = optional_number(record, "stiffness_N_per_mm")
+    displacement = optional_number(record, "displacement_um")
+    quotient = force / (displacement / 1e3)  # N/mm
+    if math.isnan(printed) and math.isnan(quotient) and not planned:
+        raise MeasurementError("no stiffness", expected="stiffness_N_per_mm, or force_N and displacement_um")
+    if abs(quotient - printed) > AGREEMENT * printed:
+        raise MeasurementError(
+            f"stiffness {printed:g} N/mm, but force over displacement is {quotient:.6g} N/mm",
+            hint="correct one of them or leave one out",
+        )
+    if not math.isnan(quotient) and not SOFTEST <= quotient <= STIFFEST:
+        raise MeasurementError(
+            f"{force:g} N over {m_from_um(displacement) * 1e6:g} um is {quotient:.4g} N/mm",
+            expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm; is the unit right?",
+        )
+    return [(direction_of(record), quotient if math.isnan(printed) else printed)]
+
+
+def direction_of(record: Mapping[str, str]) -> tuple[float, ...]:
+    """Unit vector of `direction`, or of dx,dy,dz."""
+    if "direction" not in record and VECTOR[0] not in record:
+        raise MeasurementError("no direction", expected="direction, or dx,dy,dz")
+    if "direction" in record:
+        name = record["direction"].upper().removeprefix("+").removeprefix("-")
+        if name not in AXES:
+            raise MeasurementError(f"direction {record['direction']!r}", expected="X, Y or Z (others as dx,dy,dz)")
+        return AXES[name]
+    vector = [number(record, name) for name in VECTOR]
+    size = math.hypot(*vector)
+    if size == 0.0:
+        raise MeasurementError("direction 0,0,0", expected="a vector that points somewhere")
+    return tuple(component / size for component in vector)
+
+
+def number(record: Mapping[str, str], name: str, bounds: tuple[float, float] | None = None) -> float:
+    """A cell that must hold a finite number within `BOUNDS`, or within these."""
+    if name not in record:
+        raise MeasurementError(f"no column {name}", expected="x_mm,y_mm,z_mm; only a strut measured alone has no pose")
+    text = record[name]
+    try:
+        value = math.nan if "_" in text else float(text)  # Python's own "1_000" is no number of an office
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        dated = "the spreadsheet has made a date of it" if LIKE_DATE.match(text) else ""
+        raise MeasurementError(f"{name} = {text!r}", expected="a finite number", hint=dated)
+    low, high = bounds or BOUNDS.get(name, (-math.inf, math.inf))
+    if not low <= value <= high:
+        doubt = "; is the unit right?" if value > 0.0 else ""
+        raise MeasurementError(f"{name} = {text}", expected=f"{low:g} to {high:g}{doubt}")
+    return value
+
+
+def optional_number(record: Mapping[str, str], name: str) -> float:
+    """A number, or nan where the column is absent or the cell empty."""
+    return number(record, name) if record.get(name) else math.nan
+
+
+def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:
+    """Rows that say the same as an earlier one: all cells alike or, within a file, one repeat number twice."""
+    first: dict[tuple[str, ...], Row] = {}
+    errors: list[InputError] = []
+    for row in rows:
+        # repr: nan differs from itself, its text does not.
+        at = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels, row.beside,
+              row.date)  # fmt: skip
+        numbered = bool(row.labels["repeat"]) and not across_files
+        key = tuple(repr(part) for part in (at if numbered else (*at, row.stiffness)))
+        seen = first.setdefault(key, row)
+        if seen is not row:
+            errors.append(
+                MeasurementError(
+                    f"row repeats line {seen.line}" + (f" of {seen.file}" if seen.file != row.file else ""),
+                    hint="number repeated readings in a column repeat, or remove it",
+                    line=row.line,
+                    file=row.file,
+                )
+            )
+    return errors

@@ -1,0 +1,368 @@
+"""The results of one analysis: files and text."""
+
+from __future__ import annotations
+
+import json
+import math
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from toolpath_stiff.files import Content
+from toolpath_stiff.hints import both_names
+from toolpath_stiff.report.words import (
+    FIGURES,
+    LABEL,
+    READERS,
+    WIDTH,
+    aligned,
+    duration,
+    first_column_fitted,
+    labelled,
+    length_in_moves,
+    machine_text,
+    number,
+    only_plunges,
+    plain,
+    plunges_beside,
+    shortened,
+)
+from toolpath_stiff.units import n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.analysis.results import Analysis
+
+
+def names(plots: bool = True, table: str = "csv") -> tuple[str, ...]:
+    """Names of the files that `files` makes."""
+    return (f"samples.{table}", "summary.json", *(("path.png", "profile.png", "report.html") if plots else ()))
+
+
+def files(
+    analysis: Analysis,
+    *,
+    plots: bool = True,
+    table: Literal["csv", "parquet"] = "csv",
+    required: float | None = None,
+    other: Analysis | None = None,
+    show_plunges: bool = False,
+    summary: Mapping[str, Any] | None = None,
+) -> dict[str, Callable[[], Content]]:
+    """Name of each file -> what makes it: samples, summary, pictures and page.
+
+    Parameters
+    ----------
+    analysis
+        What to report.
+    plots
+        `path.png`, `profile.png` and `report.html` too.
+    table
+        Format of the samples.
+    required
+        Stiffness that every cutting move should have, N/m: drawn and listed.
+    other
+        The same program on another machine, for comparison.
+    show_plunges
+        The axes and colour scales of pictures and page hold the plunges beside the headline figures too.
+    summary
+        `summary_with_options` of the same, where it has been made already.
+    """
+    from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
+
+    document = summary_with_options(analysis, required, other) if summary is None else summary
+    contents: dict[str, Callable[[], Content]] = {
+        f"samples.{table}": lambda: samples_parquet(analysis) if table == "parquet" else samples_csv(analysis),
+        "summary.json": lambda: json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+    }
+    if plots:
+        from toolpath_stiff.report.analysis.page import page_pieces
+        from toolpath_stiff.report.analysis.path import path_picture
+        from toolpath_stiff.report.profile import profile_picture
+
+        contents["path.png"] = lambda: path_picture(analysis, show_plunges=show_plunges)
+        contents["profile.png"] = lambda: profile_picture(
+            analysis, other=other, required=required, show_plunges=show_plunges
+        )
+        contents["report.html"] = lambda: page_pieces(
+            analysis, document, required=required, other=other, show_plunges=show_plunges
+        )
+    return contents
+
+
+def text(summary: Mapping[str, Any], source: Sequence[str] = (), other: Mapping[str, Any] | None = None) -> str:
+    """What the terminal shows: the figures, the other machine beside them, the lines below the required stiffness.
+
+    `summary` and `other` (the other machine's) as in `summary.json`; `source` the program's lines.
+    """
+    lines = [terminal_table(summary), *([comparison_table(summary, other)] if other is not None else [])]
+    required = summary.get("required") or {"below": []}
+    if required["below"]:
+        lines.append(f"below the required {required['required_N_per_mm']:g} N/mm:")
+        for entry in required["below"]:
+            shown = source[entry["line"] - 1].strip() if source else ""
+            lowest = entry["min_N_per_mm"]
+            found = "no stiffness (out of reach, or no motion)" if lowest is None else f"{lowest:.0f} N/mm"
+            lines.append(f"  line {entry['line']}: {found}  {shown}")
+    return "\n".join(lines)
+
+
+def summary_with_options(analysis: Analysis, required: float | None, other: Analysis | None) -> dict[str, Any]:
+    """`analysis.summary()`, with `required` and `compare` where these were asked for; no nan, no infinity."""
+    from toolpath_stiff.analysis.results import required_stiffness_missed
+
+    summary = dict(analysis.summary())
+    if required is not None:
+        summary["required"] = {
+            "required_N_per_mm": n_per_mm_from_n_per_m(required),
+            "below": [
+                {"line": line, "min_N_per_mm": lowest} for line, lowest in required_stiffness_missed(analysis, required)
+            ],
+        }
+    if other is not None:
+        found = dict(other.summary())
+        summary["compare"] = compare_summaries(summary, found)
+        summary["warnings"] = [*analysis.warnings, *_of_other(found)]
+    finite: dict[str, Any] = _without_nan(summary)
+    return finite
+
+
+def _of_other(summary: Mapping[str, Any]) -> list[str]:
+    """What the other machine's effects wait for: without them the two machines may look the same."""
+    return [
+        f"{both_names('--compare', summary['machine'])}: {one['effect']} does not act: {one['reason']}"
+        for one in summary["effects_idle"]
+    ]
+
+
+def _without_nan(value: Any) -> Any:
+    """The same with None for every float that JSON cannot hold."""
+    if isinstance(value, dict):
+        return {key: _without_nan(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+MOST_OPERATIONS = 12  # rows; all are in summary.json
+
+
+TITLES = {
+    "mean_N_per_mm": "mean N/mm",
+    "min_N_per_mm": "min N/mm",
+    "max_N_per_mm": "max N/mm",
+    "range_N_per_mm": "range N/mm",
+    "mean_deflection_um": "deflection um",
+}
+
+
+def terminal_table(summary: Mapping[str, Any]) -> str:
+    """The figures of one analysis.
+
+    Parameters
+    ----------
+    summary
+        As in `summary.json`.
+    """
+    lines = [
+        *_entry("program", summary["program"]),
+        *(_entry("read by", READERS[summary["interpreter"]]) if summary["interpreter"] != "builtin" else ()),
+        *(_entry("posted for", f"{summary['kinematics']}, recovered") if summary["kinematics"] else ()),
+        *_entry("machine", machine_text(summary)),
+        *_entry("load", f"{summary['load']}, {summary['force_N']:g} N"),
+        *_entry("program zero", _origin(summary)),
+        *_entry("samples", f"{number(summary['samples'])}, at most {summary['step_mm']:g} mm apart"),
+        *_entry("path", _path(summary)),
+        *_entry("stiffness", _stiffness(summary)),
+        *_plunges(summary),
+        *_band(summary),
+        *_weakest(summary),
+        *_entry("limits", _limits(summary)),
+        *_entry(
+            "extrapolated", f"{summary['extrapolated_share']:.1%} of the cutting samples are outside the strut law"
+        ),
+    ]
+    if len(summary["per_tool"]) > 1:
+        lines += _tools(summary["per_tool"])
+    if len(summary["per_operation"]) > 1:
+        lines += _operations(summary["per_operation"])
+    if count := len(summary["unsupported"]):
+        words = ", ".join(sorted({str(entry["word"]) for entry in summary["unsupported"]}))
+        lines += _entry("not acted upon", f"{count} word{'s' if count > 1 else ''} (in summary.json): {words}")
+    lines += _entry("assumptions", f"{len(summary['assumptions'])}, listed in summary.json")
+    for warning in summary["warnings"]:
+        lines += _entry("warning", warning)
+    return "\n".join(lines)
+
+
+def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+    """Two machines side by side, the difference in percent of the first."""
+    compared = compare_summaries(summary, other)
+    rows = [["", *(shortened(machine_text(one), 32) for one in (summary, other)), "difference"]]
+    for name, change in zip(FIGURES, compared["difference_percent"].values(), strict=True):
+        digits = 2 if name.endswith("_um") else 0
+        difference = "-" if change is None else f"{change:+.1f} %"
+        rows.append([TITLES[name], number(summary[name], digits), number(other[name], digits), difference])
+    places = [s["weakest"] for s in (summary, other)]
+    rows += _plunges_compared(summary, other)
+    rows.append(["weakest line", *(str(place["line"]) if place else "-" for place in places), ""])
+    rows.append(["extrapolated", *(f"{s['extrapolated_share']:.1%}" for s in (summary, other)), ""])
+    if any(s["out_of_reach_samples"] for s in (summary, other)):
+        rows.append(["out of reach", *(number(s["out_of_reach_samples"]) for s in (summary, other)), ""])
+    return "\n".join(aligned(rows))
+
+
+def _entry(label: str, text: str) -> list[str]:
+    """A labelled entry, of nothing its label."""
+    return labelled(label, text) or [label]
+
+
+def _origin(summary: Mapping[str, Any]) -> str:
+    says = {"option": "as asked for", "program": "from the program", "default": "the machine's default"}
+    words = [f"{axis}{value:.10g}" for axis, value in zip("XYZABC", summary["origin_mm_deg"], strict=True)]
+    shown = words if any(summary["origin_mm_deg"][3:]) else words[:3]
+    return f"{' '.join(shown)} ({says.get(summary['origin_source'], summary['origin_source'])})"
+
+
+def _path(summary: Mapping[str, Any]) -> str:
+    cutting, rapid = number(summary["cutting_length_mm"], 1), number(summary["rapid_length_mm"], 1)
+    return f"{cutting} mm cutting, {rapid} mm rapid, {duration(summary['time_s'])}"
+
+
+def _stiffness(summary: Mapping[str, Any]) -> str:
+    mean, low, high, span = (number(summary[name]) for name in FIGURES[:4])
+    return f"mean {mean} N/mm, min {low}, max {high}, range {span} N/mm"
+
+
+def _plunges(summary: Mapping[str, Any]) -> list[str]:
+    """The plunges beside the headline figures, or that these are of plunges."""
+    if only_plunges(summary):
+        return _entry("plunges", "this program only plunges: every figure is of cuts along the tool axis")
+    plunges = plunges_beside(summary)
+    if plunges is None:
+        return []
+    text = f"{length_in_moves(plunges)}: mean {number(plunges['mean_N_per_mm'])} N/mm, "
+    text += f"min {number(plunges['min_N_per_mm'])}, max {number(plunges['max_N_per_mm'])}"
+    lowest = summary["min_N_per_mm"]
+    weaker = lowest is not None and plunges["min_N_per_mm"] < lowest
+    return _entry("plunges", f"{text}; not counted above{', though weaker than all other cuts' if weaker else ''}")
+
+
+def _plunges_compared(summary: Mapping[str, Any], other: Mapping[str, Any]) -> list[list[str]]:
+    """The row of the plunges' mean; none where no machine has plunges beside its headline."""
+    plunges = [plunges_beside(one) for one in (summary, other)]
+    if not any(plunges):
+        return []
+    change = compare_summaries(summary, other)["plunges_difference_percent"]
+    means = [number(one["mean_N_per_mm"] if one else None) for one in plunges]
+    return [["plunges N/mm", *means, "-" if change is None else f"{change:+.1f} %"]]
+
+
+def _band(summary: Mapping[str, Any]) -> list[str]:
+    """What the uncertainty of fitted parameters leaves open, where the machine file tells of it."""
+    band = summary.get("parameter_uncertainty")
+    if not band:
+        return []
+    low, high = (number(end) for end in band["mean_95_N_per_mm"])
+    lowest, highest = (number(end) for end in band["min_95_N_per_mm"])
+    return _entry(
+        "95 % band",
+        f"mean {low} to {high}, min {lowest} to {highest} N/mm, from the fitted parameters alone; widest on line "
+        f"{band['largest_sd_line']} (sd {band['largest_sd_percent']:.1f} %)",
+    )
+
+
+def _weakest(summary: Mapping[str, Any]) -> list[str]:
+    place = summary["weakest"]
+    if place is None:
+        return _entry("weakest", "-")
+    where = " ".join(f"{axis.upper()}{place[f'{axis}_mm']:.3f}" for axis in "xyz")
+    if any(place[f"{axis}_deg"] for axis in "abc"):
+        where += " " + " ".join(f"{axis.upper()}{place[f'{axis}_deg']:.3f}" for axis in "abc")
+    lines = _entry("weakest", f"{number(place['stiffness_N_per_mm'])} N/mm in line {place['line']} at {where}")
+    if place["text"]:
+        lines.append(" " * (LABEL + 2) + shortened(plain(place["text"]), WIDTH - LABEL - 2))
+    return lines
+
+
+def _limits(summary: Mapping[str, Any]) -> str:
+    text = f"nearest in line {summary['min_margin_line']}: {summary['min_margin_limit']}"
+    if summary["out_of_reach_samples"]:
+        text += f"; {number(summary['out_of_reach_samples'])} cutting samples are out of reach and left out"
+    return text
+
+
+def _tools(per_tool: Sequence[Mapping[str, Any]]) -> list[str]:
+    rows = [["tool", "length mm", "cutting mm", "mean N/mm", "min", "max", "remark"]]
+    for row in per_tool:
+        rows.append(
+            [
+                f"T{row['tool']}",
+                "reference" if row["length_mm"] is None else number(row["length_mm"], 2),
+                number(row["cutting_length_mm"], 1),
+                *(number(row[name]) for name in FIGURES[:3]),
+                shortened(plain(row["remark"]), 30),
+            ]
+        )
+    return aligned(rows, left_last=True) + _only_plunges(per_tool, [f"T{row['tool']}" for row in per_tool])
+
+
+def _only_plunges(parts: Sequence[Mapping[str, Any]], names: Sequence[str]) -> list[str]:
+    """A note on the parts whose figures are of plunges, where not all are."""
+    plunging = [name for part, name in zip(parts, names, strict=True) if only_plunges(part)]
+    if not plunging or len(plunging) == len(parts):
+        return []
+    return textwrap.wrap(f"{', '.join(plunging)}: figures of plunges, there is no other cut", WIDTH)
+
+
+def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
+    shown = per_operation[:MOST_OPERATIONS]
+    digits = len(str(shown[-1]["operation"]))
+    rows = [["operation", "tool", "lines", "cutting mm", "time", "mean N/mm", "min", "in line"]]
+    for row in shown:
+        rows.append(
+            [
+                f"{row['operation']:>{digits}} {plain(row['name'])}",
+                f"T{row['tool']}" if row["tool"] else "-",
+                f"{row['first_line']}-{row['last_line']}",
+                number(row["cutting_length_mm"], 1),
+                duration(row["time_s"]),
+                *(number(row[name]) for name in FIGURES[:2]),
+                str(row["weakest"]["line"]) if row["weakest"] else "-",
+            ]
+        )
+    more = len(per_operation) - len(shown)
+    notes = _only_plunges(shown, [f"operation {row['operation']}" for row in shown])
+    return (
+        aligned(first_column_fitted(rows)) + notes + ([f"and {more} more operations in summary.json"] if more else [])
+    )
+
+
+def compare_summaries(summary: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+    """The entry `compare` of `summary.json`.
+
+    The other machine's figures, and `difference_percent`: how much higher each is than the first machine's
+    (None where a figure is missing, or the first machine's is zero); the same for the mean of the plunges.
+    """
+    difference = {
+        name.partition("_N_per")[0].removesuffix("_um"): _higher(summary.get(name), other.get(name)) for name in FIGURES
+    }
+    plunges = [(one.get("plunges") or {}).get("mean_N_per_mm") for one in (summary, other)]
+    return {
+        "machine": other["machine"],
+        "effects": list(other.get("effects") or ()),
+        **{name: other.get(name) for name in FIGURES},
+        "weakest": other.get("weakest"),
+        "out_of_reach_samples": other.get("out_of_reach_samples"),
+        "extrapolated_share": other.get("extrapolated_share"),
+        "difference_percent": difference,
+        "headline": other.get("headline"),
+        "plunges": other.get("plunges"),
+        "plunges_difference_percent": _higher(*plunges),
+    }
+
+
+def _higher(first: float | None, second: float | None) -> float | None:
+    """By how much the second is higher, in percent of the first; None where that cannot be said."""
+    return None if first is None or second is None or not first else (second - first) / first * 100.0

@@ -1,0 +1,1 @@
+"""Many programs: one page and one table over all."""

@@ -1,0 +1,294 @@
+"""Residuals against everything that the model does not use, and the load path as a waterfall."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.comparison.compare import Comparison
+from toolpath_stiff.comparison.residuals import directions
+from toolpath_stiff.comparison.structure import SIGNIFICANT
+from toolpath_stiff.inference.fits import deviation_percent
+from toolpath_stiff.report.compare.pictures import RESIDUAL_AXIS, count_of, heading
+from toolpath_stiff.report.figure import (
+    BLUE,
+    INK,
+    LIGHT_BLUE,
+    MUTED,
+    SECOND_ORANGE,
+    UNREACHABLE_RED,
+    drawn,
+    house_style,
+    new_figure,
+)
+from toolpath_stiff.report.residuals import DIRECTION_COLOURS
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain, shortened
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from toolpath_stiff.comparison.residuals import Label, Variable
+
+
+ACROSS = 5  # panels in a row
+
+
+PITCH = 2.15  # inches from one row of panels to the next
+
+
+MOST_NAMES = 8  # levels of a label that are written out
+
+
+WIDE = 7.5  # median deviations, some 5 standard deviations: readings further off stand at the edge
+
+
+NM_PER_N = 1e9
+
+
+LONG_NAME = 10  # letters of a link from which its name, turned, needs more room below
+
+
+LINKS = (BLUE, LIGHT_BLUE)  # struts, alternating
+
+
+EFFECT = SECOND_ORANGE
+
+
+@drawn
+def variables_png(found: Comparison) -> Figure:
+    """PNG: residual against each variable, the strongest first; readings far off stand at the edge."""
+    limits = _limits(found)
+    panels: list[tuple[float, str, Variable | Label]] = []
+    held_against: list[Variable | Label] = [*found.numbers, *found.names]
+    for one in held_against:
+        tests = [t for t in found.document["tests"] if _about(t, one.name)]
+        p = min((t["p_adjusted"] for t in tests), default=1.0)
+        strongest = max((abs(t["statistic"]) for t in tests), default=0.0)
+        panels.append((-strongest, f"p = {p:.2g}" + ("" if p >= SIGNIFICANT else " *"), one))
+    panels.sort(key=lambda panel: panel[0])
+    rows = -(-len(panels) // ACROSS)
+    with house_style():
+        width, height = 15.0, 1.0 + PITCH * max(rows, 1)
+        figure = new_figure(width, height)
+        for k, (_, shown, one) in enumerate(panels):
+            i, j = divmod(k, ACROSS)
+            x, y = 0.6 + 2.88 * j, height - 1.0 - PITCH * (i + 1) + 0.42
+            axes = figure.add_axes((x / width, y / height, 2.62 / width, 1.45 / height))
+            _panel(axes, found, one, limits)
+            axes.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
+            axes.set_ylim(*limits)
+            axes.tick_params(labelsize=7.5, pad=2)
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_label_coords(0.5, 0.0)  # without a name: none is to be kept clear of the figures
+            if j:
+                axes.set_yticklabels([])
+            unit = str(getattr(one, "unit", ""))
+            name = plain(one.name.removesuffix(f"_{unit}").replace("_", " ")) + (f", {unit}" if unit else "")
+            axes.set_title(shortened(name, 30), fontsize=9, pad=3)
+            axes.set_title(
+                shown, fontsize=8.5, pad=3, loc="right", weight="bold" if shown.endswith("*") else "normal",
+                color=UNREACHABLE_RED if shown.endswith("*") else MUTED,
+            )  # fmt: skip
+        _key(figure, found)
+        heading(
+            figure,
+            "Which variable is missing?",
+            f"{RESIDUAL_AXIS}; lines: a direction's own trend; p: of the strongest pattern, corrected for all "
+            "that were looked for; triangles: beyond the frame",
+        )
+        return figure
+
+
+def _about(test: Mapping[str, Any], name: str) -> bool:
+    """Whether a pattern is about this variable, or a level of this label, or the same as one that is."""
+    about = [test["variable"], *(same.partition(": ")[2] for same in test["same"])]
+    return any(variable == name or variable.startswith(f"{name} ") for variable in about)
+
+
+def _limits(found: Comparison) -> tuple[float, float]:
+    """Range shown: all, but a few wild readings do not squeeze the others."""
+    values = deviation_percent(found.residual)
+    middle = float(np.median(values))
+    reach = WIDE * float(np.median(np.abs(values - middle)))
+    kept = values[np.abs(values - middle) <= reach] if reach > 0.0 else values
+    margin = 0.08 * max(float(np.ptp(kept)), 0.1)
+    return float(kept.min()) - margin, float(kept.max()) + margin
+
+
+def _key(figure: object, found: Comparison) -> None:
+    from matplotlib.figure import Figure
+
+    assert isinstance(figure, Figure)
+    width, height = figure.get_size_inches()
+    present = [axis for axis in DIRECTION_COLOURS if (directions(found.data) == axis).any()]
+    for i, axis in enumerate(reversed(present)):
+        figure.text(
+            1.0 - (0.4 + 0.5 * i) / width, 1.0 - 0.4 / height, "\u25cf " + axis, color=DIRECTION_COLOURS[axis], size=11,
+            weight="bold", ha="right",
+        )  # fmt: skip
+
+
+def _panel(axes: Axes, found: Comparison, one: Variable | Label, limits: tuple[float, float]) -> None:
+    """Points by direction; a trend line a direction, or the means of levels."""
+    residual, along = deviation_percent(found.residual), directions(found.data)
+    x, names = _places(one)
+    present = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
+    for k, axis in enumerate(present):
+        rows = (along == axis) & np.isfinite(x)
+        if not rows.any():
+            continue
+        shift = 0.16 * (k - (len(present) - 1) / 2.0) if 0 < len(names) <= MOST_NAMES else 0.0
+        _points(axes, x[rows] + shift, residual[rows], limits, DIRECTION_COLOURS[axis], 2.6 if len(x) > 100 else 4.0)
+        held = np.clip(residual[rows], *limits)
+        if not names:
+            _trend(axes, x[rows], held, DIRECTION_COLOURS[axis])
+        elif len(names) <= MOST_NAMES:
+            _level_means(axes, x[rows], held, shift, DIRECTION_COLOURS[axis])
+    _name_levels(axes, names)
+
+
+def _places(one: Variable | Label) -> tuple[FloatArray, list[str]]:
+    """Where the readings stand across a panel, and the names of the levels there, if it has any."""
+    if one.values.dtype.kind == "f":
+        return np.asarray(one.values, dtype=float), []
+    names = sorted(set(one.values.tolist()), key=_rank)
+    return np.array([names.index(level) for level in one.values.tolist()], dtype=float), names
+
+
+def _points(
+    axes: Axes, x: FloatArray, residual: FloatArray, limits: tuple[float, float], colour: str, size: float
+) -> None:
+    """Readings as dots; those beyond the axis as arrowheads at its edge."""
+    off = np.sign(residual) * ((residual < limits[0]) | (residual > limits[1]))
+    for side, marker in ((0, "o"), (1, "^"), (-1, "v")):
+        chosen = off == side
+        if not chosen.any():
+            continue
+        seen = np.clip(residual[chosen], limits[0] + 0.3, limits[1] - 0.3) if side else residual[chosen]
+        # Arrowheads above all dots: dots that follow each other become one image of a page, not one a direction.
+        axes.plot(
+            x[chosen], seen, marker, color=colour, ms=size + abs(side), mew=0, alpha=0.55, zorder=2 + 0.1 * abs(side)
+        )
+
+
+def _level_means(axes: Axes, x: FloatArray, held: FloatArray, shift: float, colour: str) -> None:
+    """A short bar at the mean of each level."""
+    for level in np.unique(x):
+        mean, at = float(held[x == level].mean()), float(level) + shift
+        axes.plot([at - 0.09, at + 0.09], [mean, mean], color=colour, lw=2.4, zorder=4)
+
+
+def _trend(axes: Axes, x: FloatArray, held: FloatArray, colour: str) -> None:
+    """The straight line of least squares, where two places and more than two readings make one."""
+    if float(np.ptp(x)) > 0.0 and len(x) > 2:
+        slope, level = np.polyfit(x - x.mean(), held, 1)
+        ends = np.array([x.min(), x.max()])
+        axes.plot(ends, level + slope * (ends - x.mean()), color=colour, lw=1.3, zorder=4)
+
+
+def _name_levels(axes: Axes, names: list[str]) -> None:
+    """Ticks: the levels' names, the first and the last of many, or numbers."""
+    if not names:
+        axes.locator_params(axis="x", nbins=4)
+    elif len(names) <= MOST_NAMES:
+        room = max(int(46 / len(names)) - 2, 4)
+        axes.set_xticks(range(len(names)), [shortened(plain(_brief(name)) or "(none)", room) for name in names])
+        axes.set_xlim(-0.5, len(names) - 0.5)
+    else:
+        axes.set_xticks([0, len(names) - 1], ["first", f"last of {len(names)}"])
+        axes.get_xticklabels()[1].set(ha="right")
+
+
+def _rank(name: str) -> tuple[float, str]:
+    """Order of levels: by number if they are numbers, else by letter."""
+    try:
+        return float(_brief(name)), name
+    except ValueError:
+        return float("inf"), name
+
+
+def _brief(name: str) -> str:
+    """A level's name without what the panel's title says."""
+    for word in ("plane at z = ", " plane", " the axis", " third", "from", " mm"):
+        name = name.replace(word, "")
+    return name
+
+
+@drawn
+def load_path_png(found: Comparison) -> Figure:
+    """PNG: compliance of the tip along X, Y, Z, link by link, and what the measurements add or take."""
+    shares = found.shares
+    compliance = shares.compliance * NM_PER_N
+    along = directions(found.data)
+    ratio = np.array([_measured_over_modelled(found, along == axis) for axis in "XYZ"])
+    with house_style():
+        longest = max(len(name) for name in shares.links)
+        below = 0.95 if longest <= LONG_NAME else 1.45
+        width, height = 13.0, 4.25 + below
+        figure = new_figure(width, height)
+        top = 1.18 * float(np.nanmax(compliance.sum(axis=1) * np.fmax(ratio, 1.0)))
+        for i, axis in enumerate("XYZ"):
+            axes = figure.add_axes(((0.75 + 4.1 * i) / width, below / height, 3.8 / width, 3.05 / height))
+            _waterfall(axes, compliance[i], shares.links, float(ratio[i]))
+            axes.set_ylim(0.0, top)
+            axes.set_title(f"{axis}: {compliance[i].sum():.1f} nm/N modelled", color=DIRECTION_COLOURS[axis])
+            if i:
+                axes.set_yticklabels([])
+            else:
+                axes.set_ylabel("compliance of the tip, nm/N")
+        poses = count_of(shares.poses, "measured pose")
+        heading(
+            figure,
+            "Which link takes what share of the compliance?",
+            f"mean over {poses}; last bars: the model's sum and what was measured along that direction, with "
+            f"{DEVIATION} of its stiffness, {MINUS_IS_SOFTER}",
+        )
+        return figure
+
+
+def _measured_over_modelled(found: Comparison, rows: NDArray[np.bool_]) -> float:
+    """Mean measured compliance over the modelled one; nan without readings along it."""
+    if not rows.any():
+        return float("nan")
+    return float(np.mean(1.0 / found.data.stiffness[rows]) / np.mean(np.exp(-found.log_model[rows])))
+
+
+def stiffness_deviation_percent(compliance_ratio: float) -> float:
+    """Of a ratio of compliances, measured over modelled: (measured - modelled) / modelled of the stiffness, %."""
+    return 100.0 * (1.0 / compliance_ratio - 1.0)
+
+
+def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: float) -> None:
+    total = float(parts.sum())
+    below = np.concatenate([[0.0], np.cumsum(parts)])
+    colours = [LINKS[i % 2] if name.startswith("strut ") else EFFECT for i, name in enumerate(links)]
+    names = [name.removeprefix("strut ").replace("_", " ") for name in links]
+    for i, (size, colour) in enumerate(zip(parts, colours, strict=True)):
+        axes.bar(i, size, 0.8, bottom=below[i], color=colour)
+        axes.plot([i + 0.4, i + 1.4], [below[i + 1]] * 2, color=MUTED, lw=0.7)
+        axes.text(i, below[i + 1] + 0.012 * total, f"{100 * size / total:.0f} %", ha="center", va="bottom", fontsize=8)
+    at = len(parts)
+    axes.bar(at, total, 0.8, color=INK)
+    names.append("model")
+    if np.isfinite(ratio):
+        axes.bar(at + 1, total * ratio, 0.8, color="white", edgecolor=INK, hatch="////", linewidth=1.0)
+        off = f"stiffness\n{stiffness_deviation_percent(ratio):+.0f} %"
+        axes.text(
+            at + 1, total * (ratio + 0.012), off, ha="center", va="bottom", fontsize=8.5,
+            weight="bold", zorder=4, bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
+        )  # fmt: skip
+        names.append("measured")
+    axes.set_xticks(range(len(names)), [shortened(plain(name), 22) for name in names], fontsize=8.5)
+    for label, name in zip(axes.get_xticklabels(), names, strict=True):
+        if len(name) > 2:
+            label.set(rotation=35, ha="right", rotation_mode="anchor")
+    axes.grid(visible=False, axis="x")
+    axes.annotate(
+        "strut", (2.5, 0.0), xycoords=("data", "axes fraction"), xytext=(0, -19), textcoords="offset points",
+        ha="center", va="top", fontsize=8.5, color=MUTED,
+    )  # fmt: skip

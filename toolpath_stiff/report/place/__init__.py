@@ -1,0 +1,1 @@
+"""The page, pictures and set-up sheet of a placement."""

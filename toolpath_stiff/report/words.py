@@ -1,0 +1,135 @@
+"""How figures are written for people: the same on the terminal, in the pictures and on the page."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+from toolpath_stiff.analysis.loads import PLUNGES_ONLY
+from toolpath_stiff.stiffness.model import machine_words
+
+# Who read a program, for headings (`Program.interpreter`).
+READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
+
+
+# Of an analysis, in the order of every table.
+FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
+
+
+# The sign of every residual that is shown, for axes and legends.
+DEVIATION = "(measured - modelled) / modelled"
+
+
+MINUS_IS_SOFTER = "minus: softer than modelled"
+
+
+ONLY_PLUNGES = "only plunges"  # beside a program, a tool or an operation
+
+
+def number(value: float | None, digits: int = 0) -> str:
+    """A figure with thin groups of thousands ("45 123"), "-" where there is none."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    text = f"{value:,.{digits}f}".replace(",", " ")
+    return text.replace("-", "", 1) if float(text.replace(" ", "")) == 0.0 else text
+
+
+def counted(count: float, thing: str) -> str:
+    """So many of a thing: "1 line", "1 405 lines"."""
+    return f"{number(count)} {thing}{'' if count == 1 else 's'}"
+
+
+def span_of(figures: Mapping[str, Any]) -> str:
+    """Lowest and highest stiffness of a block of figures: "122 988 to 123 770"."""
+    return f"{number(figures['min_N_per_mm'])} to {number(figures['max_N_per_mm'])}"
+
+
+def headline_text(figures: Mapping[str, Any], between: str) -> str:
+    """Mean and range for a heading, and what they are about where that is not every cut; `between` the parts."""
+    text = f"mean {number(figures['mean_N_per_mm'])} N/mm ({span_of(figures)})"
+    if only_plunges(figures):
+        return f"{text}, {ONLY_PLUNGES}"
+    plunges = plunges_beside(figures)
+    if plunges is None:
+        return text
+    return f"{text} across the tool axis{between}plunges {number(plunges['mean_N_per_mm'])} N/mm ({span_of(plunges)})"
+
+
+def plunges_beside(figures: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The plunges that the headline figures leave out; None where there are none, or where there is nothing else."""
+    found: Mapping[str, Any] | None = figures["plunges"]
+    return None if figures["headline"] == PLUNGES_ONLY else found
+
+
+def length_in_moves(plunges: Mapping[str, Any]) -> str:
+    """How much is plunged: "20.0 mm in 3 moves"."""
+    return f"{number(plunges['length_mm'], 1)} mm in {number(plunges['moves'])} move{'s' * (plunges['moves'] != 1)}"
+
+
+def only_plunges(figures: Mapping[str, Any]) -> bool:
+    """Whether the figures of a program, a tool or an operation are those of plunges, for it does nothing else."""
+    return bool(figures.get("headline") == PLUNGES_ONLY)
+
+
+def duration(seconds: float) -> str:
+    """Time as h:mm:ss, in seconds below a minute."""
+    if seconds < 60.0:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+
+
+def plain(text: str) -> str:
+    """Text from a program or a file name without control characters: it cannot steer a terminal."""
+    return "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text)
+
+
+def shortened(text: str, width: int) -> str:
+    """At most `width` characters, the cut marked by three dots."""
+    return text if len(text) <= width else text[: max(width - 3, 0)] + "..."
+
+
+def machine_text(document: Mapping[str, Any]) -> str:
+    """The machine of a result for headings, with the effects that act on it and the set-up."""
+    return plain(machine_words(document))
+
+
+WIDTH = 100
+
+
+LABEL = 14  # columns of the left-hand words
+
+
+LEAST_NAME = 24  # columns for the number and name of an operation, however wide the figures are
+
+
+def labelled(label: str, text: str, column: int = LABEL) -> list[str]:
+    """An entry of a list on the terminal, wrapped and indented; the label is `column` wide."""
+    return textwrap.wrap(
+        plain(text),
+        WIDTH,
+        initial_indent=f"{label:<{column}}  ",
+        subsequent_indent=" " * (column + 2),
+        break_on_hyphens=False,
+    )
+
+
+def first_column_fitted(rows: list[list[str]], indent: int = 0) -> list[list[str]]:
+    """The same with the first column cut to what the others and `indent` leave, but not below `LEAST_NAME`."""
+    room = WIDTH - indent - sum(2 + max(len(row[i]) for row in rows) for i in range(1, len(rows[0])))
+    return [[shortened(row[0], max(room, LEAST_NAME)), *row[1:]] for row in rows]
+
+
+def aligned(rows: list[list[str]], left_last: bool = False) -> list[str]:
+    """Align: the first column (and the last, if asked) to the left, the others to the right."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    widths[0] = max(widths[0], LABEL)
+    left = {0, len(widths) - 1} if left_last else {0}
+    return [
+        "  ".join(
+            f"{c:<{w}}" if i in left else f"{c:>{w}}" for i, (c, w) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()[:WIDTH]
+        for row in rows
+    ]

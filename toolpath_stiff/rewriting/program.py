@@ -1,0 +1,356 @@
+"""A program written for another placement, or its placement as offsets to key in at the control.
+
+`rewrite_program` returns the text that, analyzed at the original origin, takes the tool along the placed path. Every
+motion word has new numbers; everything else stays byte for byte: comments, line numbers, order, blank lines, tape
+marks, line ends, upper and lower case. The rapid with which the tool comes from where the control was switched on is
+the one move that cannot match.
+
+`offset_blocks` returns LinuxCNC's `G10 L2` and, for Fanuc-style controls, G54 with G68. Both turn X and Y alone, about
+the vertical. So they express a placement of vertical tools in an untilted set-up, and nothing else; for the rest the
+program itself has to be rewritten.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
+from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
+from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, Offsets, ToolEntry
+from toolpath_stiff.nc.words import CORNERS, Block, read_block, read_text, split_lines
+from toolpath_stiff.rewriting.blocks import rewrite_block
+from toolpath_stiff.rewriting.controls import Controls
+from toolpath_stiff.rewriting.turn import Turn
+from toolpath_stiff.units import Pose, ShopPose, deg_from_rad, mm_from_m, pose_in_mm
+
+LINE_END = re.compile("\r\n|\n|\r")
+
+
+FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # coarser than 0.01 mm is not machining; beyond nine a double has no more digits
+
+
+PLAIN_DIALECTS = ("generic", "linuxcnc")
+
+
+SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
+
+
+@dataclass(frozen=True)
+class Rewritten:
+    """A rewritten program.
+
+    Attributes
+    ----------
+    text, encoding
+        The program with its line ends, and how the original was encoded.
+    notes
+        What the user should know, one sentence each.
+    """
+
+    text: str
+    encoding: str
+    notes: tuple[str, ...]
+
+    @property
+    def content(self) -> bytes:
+        """The file's bytes."""
+        return self.text.encode(self.encoding)
+
+
+def rewrite_program(
+    program: Program,
+    placement_origin: Pose,
+    original_origin: Pose,
+    *,
+    decimals: int | None = None,
+    linearise: float | None = None,
+    offsets: Offsets | None = None,
+    tools: dict[int, ToolEntry] | None = None,
+    block_delete: Switches = False,
+) -> Rewritten:
+    r"""Write a program so that at the original origin it does what it does, untouched, at a placement.
+
+    Parameters
+    ----------
+    program
+        As read; its file is read again for the line ends.
+    placement_origin, original_origin
+        Where program zero shall sit and sits, x, y, z in m, A, B, C in rad.
+    decimals
+        Of the numbers written; unless given, 4 in mm and degrees, 5 in inch.
+    linearise
+        m: arcs that lie in no plane any more, cycles that the set-up tilts and large turns of the tool are written as
+        straight moves that stay within this of them. Unless given they are refused.
+    offsets, tools, block_delete
+        What the program was read with, as in `parse_program`.
+
+    Raises
+    ------
+    InputError
+        A block cannot be expressed at the placement, with its line and the reason.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("G21 G90 F600 (slot)\nG0 X0 Y0 Z5\nG1 Z-1\nX40\nM30\n", "slot.nc")
+    >>> rewritten = rewrite_program(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
+    >>> print(rewritten.text, end="")
+    G21 G90 F600 (slot)
+    G0 X100 Y0 Z5
+    G1 Z-1
+    X100 Y40
+    M30
+    """
+    check_decimals(decimals)
+    check_rewritable(program)
+    _check_plain(program)
+    text, encoding = _text_of(program)
+    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    source, out = (_state(program.name, origin, offsets, tools) for origin in (placement, original))
+    tolerance = None if linearise is None else mm_from_m(linearise)
+    controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
+    pieces = list(_rewritten_lines(controls, text, program.name, switches_on(block_delete, UNKNOWN_CONTROL)))
+    return Rewritten("".join(pieces), encoding, tuple(controls.notes))
+
+
+def _state(name: str, origin: ShopPose, offsets: Offsets | None, tools: dict[int, ToolEntry] | None) -> State:
+    """A control at its start, with the work at an origin, and offsets and tools of its own."""
+    return State(name, Frames(copy.deepcopy(offsets or Offsets()), origin, origin), copy.deepcopy(tools))
+
+
+def _check_plain(program: Program) -> None:
+    if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
+        raise ProgramError(
+            "a program is rewritten by the words of the built-in interpreter in the dialects "
+            f"{' and '.join(PLAIN_DIALECTS)}; this one was read by {program.interpreter!r} as {program.dialect!r}",
+            hint="place it without --write",
+            file=program.name,
+        )
+
+
+def check_rewritable(program: Program) -> None:
+    """Raise `InputError` for a file that is not a program of a control, or is one of another machine's."""
+    if program.kinematics:
+        raise ProgramError(
+            f"a program posted for another kinematics ({program.kinematics}) is not rewritten: its words are those of "
+            "that machine's axes",
+            hint="place it without --write, set the work so in the CAM system, and post it for this machine",
+            file=program.name,
+        )
+    if program.parametric:
+        raise ProgramError(
+            "a program with variables cannot be rewritten: its numbers are worked out as it runs",
+            hint="place it without --write, and set the work offset that is printed (G10)",
+            file=program.name,
+        )
+    if program.dialect == CUTTER_LOCATION:
+        raise ProgramError(
+            "a cutter-location file is not rewritten: it is not a program that a control runs",
+            hint="place it without --write, set the work so in the CAM system, or place the posted program",
+            file=program.name,
+        )
+
+
+def check_decimals(decimals: int | None) -> None:
+    """Raise `InputError` for a number of decimals that makes no program.
+
+    Examples
+    --------
+    >>> check_decimals(4)
+    >>> check_decimals(12)
+    Traceback (most recent call last):
+        ...
+    toolpath_stiff.errors.ProgramError: 12 decimals; expected 2 to 9
+    """
+    if decimals is not None and not FEWEST_DECIMALS <= decimals <= MOST_DECIMALS:
+        raise ProgramError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
+
+
+def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
+    """Lines with their ends; what follows the program's end stays as it is."""
+    lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), LINE_END.findall(text)
+    ends += [""] * (len(lines) - len(ends))
+    between = ends[0] or "\n"
+    running, started = True, False
+    for number, (line, raw, end) in enumerate(zip(lines, raw_lines, ends, strict=False), 1):
+        if not running:
+            yield raw + end
+            continue
+        block = read_block(line, number, name)
+        _refuse_parts(block, number, name)
+        written = [line]
+        if block.percent:
+            running, started = not started, True
+        elif block.optional and block.switch in switches:
+            _refuse_left_out(bool(block.words), number, name)
+        else:
+            started = started or bool(block.words)
+            written, running = rewrite_block(controls, block, line)
+            if block.optional and written != [line] and SLASHED not in controls.notes:
+                controls.notes.append(SLASHED)
+        yield raw + end if written == [line] else (end or between).join(written) + end
+
+
+def _refuse_parts(block: Block, number: int, name: str) -> None:
+    """A slash in the middle of a block, and corners that a block makes of the next one."""
+    corner = next((word for word in block.words if word.letter in CORNERS), None)
+    if block.rest is not None or corner is not None:
+        raise ProgramError(
+            "a block with a slash in its middle cannot be rewritten"
+            if corner is None
+            else f"{corner.text} makes a corner with the next block, which cannot be rewritten",
+            hint="put what follows the slash into a block of its own" if corner is None else "post the corner's moves",
+            file=name,
+            line=number,
+        )
+
+
+def _refuse_left_out(words: bool, number: int, name: str) -> None:
+    """A block that --block-delete leaves out would stay as it was, and be wrong once the switch is off."""
+    if words:
+        raise ProgramError(
+            "a block that --block-delete leaves out cannot be rewritten",
+            hint="take it out of the program, or do without --block-delete",
+            file=name,
+            line=number,
+        )
+
+
+def _text_of(program: Program) -> tuple[str, str]:
+    """The program's text with its line ends, and its encoding."""
+    if not program.path:
+        return "\n".join([*program.source, ""]), "utf-8"
+    return read_text(program.path)
+
+
+OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
+
+
+# What can hold a work offset or G10 once comments and blanks are out: tells the lines that are worth reading again.
+MAY_BE_OFFSET, COMMENTS = re.compile(r"[Gg]\+?0*[15]\d"), re.compile(r"\([^)]*\)")
+
+
+VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
+
+
+NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
+
+
+USE_WRITE = "use --write, which transforms the program itself"
+
+
+@dataclass(frozen=True)
+class OffsetBlocks:
+    """What to key in, "" where the control cannot express the placement; the reason is then beside it."""
+
+    linuxcnc: str
+    fanuc: str
+    linuxcnc_reason: str = ""
+    fanuc_reason: str = ""
+
+
+def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> OffsetBlocks:
+    r"""Offset blocks that put a program at a placement.
+
+    Parameters
+    ----------
+    program
+        The program; its own G10 and its work offsets decide whether a G54 of the operator's suffices.
+    placement
+        x, y, z in m, A, B, C in rad: where program zero shall sit, as `--origin` takes it.
+    decimals
+        Of the numbers, in mm and degrees.
+
+    Notes
+    -----
+    `G10 L2 P1 R` turns X and Y about G54's zero (LinuxCNC manual, "G10 L2"); it goes before the first motion. `G68 X0
+    Y0 R` turns the G17 plane about program zero (Fanuc's manuals, "Coordinate system rotation"); it goes after G54 and
+    G17, and holds until G69. The numbers of G54 are millimetres.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("G21 G90 F600\nG1 X40\nM30\n", "slot.nc")
+    >>> blocks = offset_blocks(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2))
+    >>> blocks.linuxcnc
+    'G21 G10 L2 P1 X100 Y0 Z800 R90'
+    >>> print(blocks.fanuc)
+    G54: X100 Y0 Z800
+    G17 G54 G68 X0 Y0 R90
+    """
+    reason = _not_here(program) or _not_about_z(program, placement) or _not_g54_alone(program)
+    if reason:
+        return OffsetBlocks("", "", reason, reason)
+    x, y, z = (_number(mm_from_m(v), decimals) for v in placement[:3])
+    turn = _number(deg_from_rad(placement[5]), decimals)
+    linuxcnc = f"G21 G10 L2 P1 X{x} Y{y} Z{z} R{turn}"
+    if turn == "0":
+        return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}")
+    upright = np.abs(program.moves.arc_normal[:, :2]).max(initial=0.0) < VERTICAL
+    if not upright:
+        return OffsetBlocks(linuxcnc, "", "", f"G68 does not turn arcs of G18 and G19: {USE_WRITE}")
+    return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}\nG17 G54 G68 X0 Y0 R{turn}")
+
+
+def _not_here(program: Program) -> str:
+    """Why the program has no G54 of this machine's control, or ""."""
+    if program.dialect == CUTTER_LOCATION:
+        return NOT_POSTED
+    if not program.kinematics:
+        return ""
+    return (
+        f"the program is posted for another kinematics ({program.kinematics}), whose control its G54 belongs to: "
+        "post it for this machine"
+    )
+
+
+def _not_about_z(program: Program, placement: Pose) -> str:
+    """Why a turn of X and Y cannot express the placement, or ""."""
+    if max(abs(placement[3]), abs(placement[4])) > VERTICAL:
+        return f"the set-up is tilted, and work offsets turn X and Y alone: {USE_WRITE}"
+    moves = program.moves
+    tilted = np.flatnonzero(np.abs(np.concatenate([moves.start, moves.end], axis=1)[:, [3, 4, 5, 9, 10, 11]]).max(1))
+    if placement[5] and len(tilted):
+        line = moves.line[tilted[0]]
+        return f"the tool is tilted (line {line}), and work offsets turn X and Y, not its axis: {USE_WRITE}"
+    return ""
+
+
+def _not_g54_alone(program: Program) -> str:
+    """Why setting G54 would not move the whole program, or ""."""
+    for number, text in enumerate(program.source, 1):
+        if not MAY_BE_OFFSET.search("".join(COMMENTS.sub("", text).split())):
+            continue
+        for code in _codes(text, number, program):
+            if code in OTHER_OFFSETS:
+                return f"the program uses {code} beside G54 (line {number}), which would stay where it is: {USE_WRITE}"
+            if code == "G10":
+                return f"the program sets offsets itself (G10, line {number}): {USE_WRITE}"
+    return ""
+
+
+def _codes(text: str, number: int, program: Program) -> list[str]:
+    """G codes of a line, and its other words; what LinuxCNC's interpreter read holds words that ours does not know."""
+    try:
+        words = read_block(text, number, program.name).words
+    except InputError:
+        if program.interpreter == "builtin" and not program.parametric:
+            raise
+        return [code_name("G", float(digits)) for digits in re.findall(r"[Gg]\s*(\d+(?:\.\d)?)", text)]
+    return [code_name(word.letter, word.value) for word in words]
+
+
+def _number(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}"
+    return "0" if text in ("-0", "") else text

@@ -1,0 +1,258 @@
+"""The turn of the work: points, rotary words, directions of the placed path; moves cut into pieces. mm, degrees.
+
+The untouched program at the placement (o, Q) puts the set-up point p at o + Q p; the written one, at the original
+origin (oo, Qo), must put its own point there: p_new = Qo^T (Q p + o - oo). Orientations follow the rule of `path`,
+undone with the original: R_new = Qo^T Q R Rz(-C) Rz(Co). A block's moves are compared with those of the written block
+in the same way.
+
+Cut into pieces are arcs that no plane expresses any more, and turns of the tool that words express at ends only; they
+are in the set-up frame of the untouched program.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.nc.moves import RAPID, Arc, Recorder
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
+from toolpath_stiff.units import ShopPose
+
+NOISE = 1e-12  # of a direction cosine: what is left of 0 or 1 after cosines and products
+
+
+UPRIGHT = 1e-9  # degrees; smaller tilts are rounding
+
+
+LARGEST_CHORD = math.pi / 2.0  # of a circle, whatever the tolerance
+
+
+# A control interpolates A, B and C; between its ends a turned move leans a little otherwise. So little changes a
+# stiffness by parts in ten thousand at most, as a radian changes it by about itself.
+LEAN = 0.01
+
+
+LEVER = 100.0  # mm along the tool at which a tolerance in mm is one in degrees
+
+
+BETWEEN = np.array([0.25, 0.5, 0.75])
+
+
+class Turn:
+    """The rigid motion of the set-up frame that takes the original work to the placed one.
+
+    Parameters
+    ----------
+    placement, original
+        Origins as `--origin` takes them, but in mm and degrees.
+    """
+
+    def __init__(self, placement: ShopPose, original: ShopPose) -> None:
+        new, old = (rotation_matrices(np.radians(origin[3:])) for origin in (placement, original))
+        self.turn: FloatArray = _clean(old.T @ new)
+        shift = np.array(placement[:3]) - np.array(original[:3])
+        self.shift = shift if not any(original[3:]) else old.T @ shift
+        self._yaw = rotation_about_z(np.radians(original[5] - placement[5]))
+        self.turns = not np.array_equal(self.turn, np.eye(3))
+        still = _clean(self.turn @ self._yaw)
+        self._never_yaws = np.array_equal(still, np.eye(3))  # a turn about the vertical alone
+        self._rows = [[float(v) for v in row] for row in self.turn]
+        self._shift = [float(v) for v in self.shift]
+
+    def point(self, point: Sequence[float]) -> list[float]:
+        """The placed point of a point of the set-up frame, x, y, z in mm."""
+        x, y, z = point
+        if not self.turns:
+            return [x + self._shift[0], y + self._shift[1], z + self._shift[2]]
+        return [a * x + b * y + c * z + s for (a, b, c), s in zip(self._rows, self._shift, strict=True)]
+
+    def rotations(self, abc: FloatArray) -> FloatArray:
+        """(n, 3, 3) rotations R_new of programmed roll, pitch, yaw (n, 3) in degrees."""
+        return self.turn @ rotation_matrices(np.radians(abc)) @ self._yaw
+
+    def angles(self, abc: Sequence[float], near: Sequence[float]) -> list[float]:
+        """Rotary words a, b, c in degrees; of the many that are the same rotation, those next to `near`."""
+        if self.keeps(abc):
+            return list(abc)
+        a, b, c = np.degrees(roll_pitch_yaw(self.rotations(np.array([abc], dtype=float))[0]))
+        same = [np.array([a, b, c]), np.array([a + 180.0, 180.0 - b, c + 180.0])]
+        close = [angles - 360.0 * np.round((angles - np.array(near)) / 360.0) for angles in same]
+        best = min(close, key=lambda angles: float(np.abs(angles - near).max()))
+        return [float(v) for v in best]
+
+    def keeps(self, abc: Sequence[float]) -> bool:
+        """Whether rotary words stay as they are: a vertical platform never yaws with the work."""
+        return self._never_yaws and (not self.turns or max(abs(abc[0]), abs(abc[1])) < UPRIGHT)
+
+    def in_program(self, rotation: float) -> FloatArray:
+        """(3, 3) turn as it looks in program axes that a work offset's rotation (degrees) turned already."""
+        if not rotation or not self.turns:
+            return self.turn
+        inner = rotation_about_z(np.radians(rotation))
+        return _clean(inner.T @ self.turn @ inner)
+
+
+def _clean(matrix: FloatArray) -> FloatArray:
+    """Direction cosines with the noise about 0 and +-1 taken off, so that what is unturned stays so exactly."""
+    whole = np.round(matrix)
+    return np.where(np.abs(matrix - whole) < NOISE, whole, matrix) + 0.0
+
+
+def chords(arc: Arc, start: Sequence[float], end: Sequence[float], tolerance: float) -> int:
+    """Number of chords that stay within `tolerance` (mm) of an arc: r (1 - cos(step / 2)) <= tolerance."""
+    radius = max(math.dist(start[:3], arc.center), _radius_at_end(arc, end))
+    step = 2.0 * math.acos(max(1.0 - tolerance / radius, -1.0))
+    return math.ceil(abs(arc.sweep) / min(step, LARGEST_CHORD) - 1e-9)
+
+
+def _radius_at_end(arc: Arc, end: Sequence[float]) -> float:
+    out = np.array(end[:3]) - np.array(arc.center)
+    normal = np.array(arc.normal)
+    return float(np.linalg.norm(out - (out @ normal) * normal))
+
+
+def points_between(start: Sequence[float], end: Sequence[float], arc: Arc | None, count: int) -> list[list[float]]:
+    """Ends (6) of `count` equal pieces of a move; the last one is its end to the last digit."""
+    first, last = np.array(start), np.array(end)
+    points = [list(map(float, first + i / count * (last - first))) for i in range(1, count)]
+    if arc is not None:
+        for i, point in enumerate(points, 1):
+            point[:3] = _on_arc(arc, first[:3], last[:3], i / count)
+    return [*points, list(end)]
+
+
+def _on_arc(arc: Arc, start: FloatArray, end: FloatArray, u: float) -> list[float]:
+    """Point at the share u of an arc, helix or spiral: radius and height change evenly, as in `path`."""
+    center, normal = np.array(arc.center), np.array(arc.normal)
+    outward = start - center
+    climb = float((end - start) @ normal)
+    lift = float(outward @ normal)
+    outward = outward - lift * normal
+    radius = float(np.linalg.norm(outward))
+    growth = _radius_at_end(arc, list(end)) - radius
+    e1 = outward / radius
+    e2 = np.cross(normal, e1)
+    angle = u * arc.sweep
+    point = center + (radius + u * growth) * (math.cos(angle) * e1 + math.sin(angle) * e2) + (lift + u * climb) * normal
+    return [float(v) for v in point]
+
+
+def lean(turn: Turn, programmed: Sequence[Sequence[float]], written: Sequence[Sequence[float]]) -> float:
+    """Largest angle (degrees) between the tool as placed and as written, midway in a move; rotary words of both ends.
+
+    Both controls go evenly from the first angles to the last; only at the ends are these the same rotation.
+    """
+    (a0, a1), (w0, w1) = np.array(programmed, dtype=float), np.array(written, dtype=float)
+    wanted = turn.rotations(a0 + BETWEEN[:, None] * (a1 - a0))
+    found = rotation_matrices(np.radians(w0 + BETWEEN[:, None] * (w1 - w0)))
+    return max(angle_between(one, other) for one, other in zip(wanted, found, strict=True))
+
+
+def angle_between(first: FloatArray, second: FloatArray) -> float:
+    """Angle in degrees between two rotations; exact for small ones, where the cosine has no digits left."""
+    chord = float(np.linalg.norm(first - second)) / (2.0 * math.sqrt(2.0))
+    return 2.0 * math.degrees(math.asin(min(chord, 1.0)))
+
+
+# In units of the last decimal written. Ends: half a unit per axis, three axes, and the same of the start; a centre
+# given by I, J, K adds that of its own words, one given by R what `blocks.NEAR` allows.
+END_UNITS, CENTER_UNITS = 2.0, 6.0
+
+
+SHORTEST_UNITS = 4.0
+
+
+START, END, AXIS, SHAPE = "start", "end", "tool axis", "shape"
+
+
+class Row(NamedTuple):
+    """A recorded cutting move: ends (6), arc."""
+
+    start: list[float]
+    end: list[float]
+    arc: Arc | None
+
+
+def cutting_rows(recorder: Recorder, first: int) -> list[Row]:
+    """Cutting moves recorded from `first` on."""
+    return [
+        Row(recorder.start[i], recorder.end[i], recorder.arc[i])
+        for i in range(first, len(recorder.line))
+        if recorder.motion[i] != RAPID
+    ]
+
+
+class Difference(NamedTuple):
+    """How a written cutting move differs from the placed one: in what (`START`, `END`, `AXIS`, `SHAPE`), in words."""
+
+    kind: str
+    words: str
+
+
+def differences(turn: Turn, wanted: list[Row], found: list[Row], unit: float) -> Difference | None:
+    """How the written cutting moves of a block differ from the placed ones beyond the rounding to `unit` mm.
+
+    Straight moves of a few units may vanish by rounding, or come to be.
+    """
+    left, right = list(wanted), list(found)
+    while left and right:
+        what = difference(turn, left[0], right[0], unit)
+        if what is None:
+            del left[0], right[0]
+        elif _short(left[0], unit):
+            del left[0]
+        elif _short(right[0], unit):
+            del right[0]
+        else:
+            return what
+    if all(_short(row, unit) for row in (*left, *right)):
+        return None
+    return Difference(SHAPE, f"would be {len(found)} moves and not {len(wanted)}")
+
+
+def _short(row: Row, unit: float) -> bool:
+    return row.arc is None and max(abs(e - s) for s, e in zip(row.start, row.end, strict=True)) < SHORTEST_UNITS * unit
+
+
+def difference(turn: Turn, wanted: Row, found: Row, unit: float) -> Difference | None:
+    """How a written cutting move differs from the placed one beyond the rounding to `unit` mm.
+
+    For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them.
+    """
+    ends = ((wanted.start, found.start, START), (wanted.end, found.end, END))
+    for placed, written, kind in ends:
+        target, point = turn.point(placed[:3]), written[:3]
+        apart = math.dist(target, point)
+        if apart > END_UNITS * unit:
+            return Difference(kind, f"{kind}s {apart:.4g} mm off")
+    for placed, written, _ in ends:
+        if placed[3:] == written[3:] and turn.keeps(placed[3:]):
+            continue
+        goal = turn.rotations(np.array([placed[3:]]))[0]
+        angle = angle_between(goal, rotation_matrices(np.radians(written[3:])))
+        if angle > END_UNITS * unit:
+            return Difference(AXIS, f"has its tool axis {angle:.4g} degrees off")
+    if wanted.arc is None or found.arc is None:
+        return None if wanted.arc is found.arc else Difference(SHAPE, "is another kind of move")
+    return _arc_difference(turn, wanted.arc, found, unit)
+
+
+def _arc_difference(turn: Turn, arc: Arc, found: Row, unit: float) -> Difference | None:
+    assert found.arc is not None
+    normal = turn.turn @ np.array(arc.normal)
+    sense = float(normal @ np.array(found.arc.normal))
+    if abs(abs(sense) - 1.0) > 1e-9:
+        return Difference(SHAPE, "lies in another plane")
+    apart = np.array(turn.point(arc.center)) - np.array(found.arc.center)
+    off = float(np.linalg.norm(apart - (apart @ normal) * normal))
+    if off > CENTER_UNITS * unit:
+        return Difference(SHAPE, f"has its centre {off:.4g} mm off")
+    radius = math.dist(found.start[:3], found.arc.center)
+    swept = abs(arc.sweep - math.copysign(1.0, sense) * found.arc.sweep)
+    if swept * radius > 4.0 * CENTER_UNITS * unit:
+        return Difference(SHAPE, f"has its sweep {math.degrees(swept):.4g} degrees off")
+    return None

@@ -1,0 +1,124 @@
+"""Indicators beside the tip: what they read of the assembled elements' displacements.
+
+An indicator reads the displacement of one point against another. Every such pair is one unknown of `structure`, or the
+elongation of a strut, so that nothing is derived: the give of a joint, a vertex of the frame, the spindle, the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.random import Generator
+
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.rig.hidden import assembled
+from toolpath_stiff.rig.nominal import Nominal
+from toolpath_stiff.rig.rows import Rows
+from toolpath_stiff.rig.structure import Geometry, Links, Solved, solved
+from toolpath_stiff.units import m_from_mm, um_from_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
+
+
+TIP = ("", "tip")
+
+
+# An indicator on its stand, one sd of a reading in m, and the load with the indicator's slant, relative; assumed.
+INDICATOR, SLANT = 0.2e-6, 0.01
+
+
+PRINTED = 0.1  # um, resolution of the indicator; assumed
+
+
+def true_displacements(
+    nominal: Nominal, hidden: HiddenMachine, rows: Rows, loops: list[str], lengths: FloatArray
+) -> FloatArray:
+    """(n,) m per N at the tip, of a strut alone per N in it.
+
+    `lengths` (n,) m of struts measured alone; nan: as the pose has it.
+    """
+    given = np.repeat(np.nan_to_num(lengths)[:, None], 6, axis=1)
+    place, links = assembled(nominal, hidden, rows, given)
+    found = solved(place, links, rows.direction, rows.force)
+    return np.array([_read(k, loop, place, links, rows, found) for k, loop in enumerate(loops)])
+
+
+def _read(k: int, loop: str, place: Geometry, links: Links, rows: Rows, found: Solved) -> float:
+    kind, *rest = loop.split()
+    unknowns, at = found.moved[k], found.platform_dofs
+    vertices = at + 6
+    spindle = vertices + links.vertices.size
+    table, direction = spindle + 3, rows.direction[k]
+    nose = float(direction @ place.rotation[k] @ unknowns[spindle:table])
+    if kind in TIP:
+        return float(found.compliance[k])
+    if kind == "spindle":
+        return nose
+    if kind == "platform":
+        return float(found.compliance[k]) - nose
+    if kind == "table":
+        rocked = np.cross(place.work_point[k], direction)[:2] @ unknowns[table + 3 : table + 5]
+        return float(direction @ (unknowns[table : table + 3] + unknowns[table + 5 : table + 8]) + rocked)
+    number = int(rest[0]) - 1
+    if kind == "strut" and rest[1:]:
+        return float(np.linalg.inv(links.struts[k])[number, number])
+    if kind == "strut":
+        return float(found.stretch[k, number] @ unknowns)
+    if kind == "joint":  # the rig's joint is one element: each end of the strut gives half
+        return float(unknowns[at + number]) * (0.5 if rest[1:] else 1.0)
+    return _vertex(k, number, "".join(rest[1:]), place, direction, unknowns[vertices:spindle])
+
+
+def _vertex(k: int, number: int, way: str, place: Geometry, direction: FloatArray, unknowns: FloatArray) -> float:
+    """Displacement of a vertex outwards, upwards or along the load."""
+    outward, upward = (float(value) for value in unknowns[2 * number : 2 * number + 2])
+    if way:
+        return outward if way == "radial" else upward
+    joints = place.frame_joints[k][place.vertices == number].mean(axis=0)[:2]
+    radial = joints / np.linalg.norm(joints)
+    return float(direction[:2] @ radial) * outward + float(direction[2]) * upward
+
+
+def with_loops(
+    nominal: Nominal,
+    hidden: HiddenMachine,
+    measured: Mapping[str, Any],
+    rows: Rows,
+    nuisances: Nuisances,
+    rng: Generator,
+) -> dict[str, Any]:
+    """A measured table whose rows of loops beside the tip hold what their indicators read, in um, for a stiffness."""
+    loops = list(measured.get("loop", ()))
+    beside = np.array([loop not in TIP for loop in loops], dtype=bool)
+    if not beside.any():
+        return {name: values for name, values in measured.items() if name != "loop"}
+    lengths = m_from_mm(np.asarray(measured.get("length_mm", np.full(len(loops), np.nan)), dtype=float))
+    where = np.flatnonzero(beside)
+    per_load = true_displacements(nominal, hidden, rows.take(where), [loops[k] for k in where], lengths[where])
+    moved = per_load * rows.force[where]
+    if nuisances.repeat > 0.0:
+        moved = moved * np.exp(SLANT * rng.standard_normal(len(where))) + INDICATOR * rng.standard_normal(len(where))
+    read = um_from_m(moved)
+    if nuisances.rounded:
+        read = PRINTED * np.round(read / PRINTED)
+    shown = [""] * len(loops)
+    for k, value in zip(where, read.tolist(), strict=True):
+        shown[k] = f"{value + 0.0:.10g}"
+    table: dict[str, Any] = {}
+    for name, values in measured.items():
+        empty = name in ("stiffness_N_per_mm", "sd_N_per_mm")
+        table[name] = _emptied(values, beside) if empty else values
+        if name == "stiffness_N_per_mm":
+            table["displacement_um"] = shown
+    table.setdefault("force_N", np.full(len(loops), defaults.FORCE))
+    if "length_mm" in table:
+        table["length_mm"] = _emptied(table["length_mm"], np.isnan(lengths))
+    return table
+
+
+def _emptied(values: Any, rows: Any) -> list[str]:
+    return ["" if gone else f"{float(value) + 0.0:.10g}" for value, gone in zip(values, rows, strict=True)]

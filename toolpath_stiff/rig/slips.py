@@ -1,0 +1,217 @@
+"""Slips of whoever writes measurements down: a mistyped row, two readings exchanged, a noise stated wrongly.
+
+The machine is measured as it is; only what stands in the table changes. Every function returns a new table and the
+truth of what it did, so that a search for such slips can be judged.
+
+A slip of a pose or of a sign is made where a form has it once: in one row, or in all rows of a clamping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.rig.case import POSE, Case, Table, clamp_of, rows_of
+from toolpath_stiff.rig.effects import scale_of
+from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
+from toolpath_stiff.rig.nominal import Nominal, reachable
+from toolpath_stiff.units import MM_PER_INCH
+
+# Kind -> what was done.
+SLIPS = {
+    "directions_exchanged": "two readings of one clamping and load stand under each other's direction",
+    "sign_of_angle": "an angle with the wrong sign",
+    "sign_of_coordinate": "x or y with the wrong sign",
+    "lbf_per_in": "a stiffness in lbf/in",
+    "N_per_um": "a stiffness in N/um",
+    "pose_10_mm": "a coordinate off by 10 mm",
+    "pose_1_deg": "an angle off by 1 degree",
+    "pose_5_deg": "an angle off by 5 degrees",
+}
+
+
+N_PER_LBF = 4.4482216152605  # exact: 0.45359237 kg (international pound, 1959) times 9.80665 m/s2 (CGPM 1901)
+
+
+WRITTEN_PER_N_PER_MM = {"lbf_per_in": MM_PER_INCH / N_PER_LBF, "N_per_um": 1e-3}
+
+
+WRONG_BY = {"pose_10_mm": 10.0, "pose_1_deg": 1.0, "pose_5_deg": 5.0}  # mm or degrees
+
+
+SMALLEST_ANGLE, SMALLEST_COORDINATE = 3.0, 30.0  # degrees, mm: a wrong sign of less is hardly a mistake (assumed)
+
+
+TRIES = 200  # draws until the written pose is one that the machine can reach
+
+
+# Whitened length of a slip that is found with 80 % power at 5 % among all slips of all rows of a tilted campaign, some
+# 6000: z(1 - 0.05/6000/2) + z(0.8) = 4.46 + 0.84 (normal quantiles, Bonferroni).
+VISIBLE = 5.3
+
+
+def with_slip(
+    table: Mapping[str, Any],
+    nominal: Nominal,
+    rng: Generator,
+    kind: str | None = None,
+    nuisances: Nuisances | None = None,
+) -> tuple[Table, dict[str, Any]]:
+    """A measured table with one slip in it.
+
+    Parameters
+    ----------
+    table
+        A table with `stiffness_N_per_mm`.
+    nominal
+        To keep poses reachable, and for the size of the slip.
+    kind
+        One of `SLIPS`; None: drawn.
+    nuisances
+        For the size; the standard ones if not given.
+
+    Returns
+    -------
+    table
+        With the slip; a copy.
+    truth
+        `kind`; `rows` (numbered from 1) that are wrong; `columns`; `written` and `meant`, column -> what stands in and
+        what belongs into each of these rows; `detectability`: whitened length of what the slip does to the residuals of
+        the nominal machine, as of the effects. `VISIBLE` and more can be found.
+
+    Raises
+    ------
+    InputError
+        An unknown kind, or a table in which it cannot be made.
+    """
+    kind = str(rng.choice(list(SLIPS))) if kind is None else kind
+    if kind not in SLIPS:
+        raise InputError(f"no slip called {kind!r}", expected=", ".join(SLIPS))
+    wrong = {name: np.array(values, dtype=object) for name, values in table.items()}
+    if kind == "directions_exchanged":
+        rows = _exchange(wrong, rng)
+    elif kind in WRITTEN_PER_N_PER_MM:
+        rows = np.array([int(rng.integers(len(wrong["x_mm"])))])
+        written = wrong["stiffness_N_per_mm"][rows].astype(float) * WRITTEN_PER_N_PER_MM[kind]
+        wrong["stiffness_N_per_mm"][rows] = np.round(written, 3)
+    else:
+        rows = _mistype(wrong, nominal, kind, rng)
+    changed = [name for name in wrong if (wrong[name] != np.array(table[name], dtype=object)).any()]
+    slipped: Table = {
+        name: values.tolist() if isinstance(table[name], list) else values.astype(np.asarray(table[name]).dtype)
+        for name, values in wrong.items()
+    }
+    truth = {
+        "kind": kind,
+        "rows": [int(row) + 1 for row in rows],
+        "columns": changed,
+        "written": {name: [slipped[name][row] for row in rows] for name in changed},
+        "meant": {name: [table[name][row] for row in rows] for name in changed},
+        "detectability": _length(table, slipped, nominal, Nuisances() if nuisances is None else nuisances),
+    }
+    return slipped, _plain(truth)
+
+
+def slipped_case(case: Case, seed: int, kind: str | None = None, count: int = 1) -> tuple[Table, list[dict[str, Any]]]:
+    """The rows of a case with `count` slips in different rows, and their truths."""
+    rng = np.random.default_rng([seed, 5])  # beyond the streams of `draw_case`
+    table = case.rows
+    truths: list[dict[str, Any]] = []
+    taken: set[int] = set()
+    for _ in range(TRIES):
+        if len(truths) == count:
+            return table, truths
+        trial, truth = with_slip(table, case.nominal, rng, kind, case.nuisances)
+        if taken.isdisjoint(truth["rows"]):
+            table = trial
+            taken.update(truth["rows"])
+            truths.append(truth)
+    raise InputError(f"{count} slips of kind {kind or 'any'}", expected="fewer: the table has no room for them")
+
+
+def with_stated_noise(
+    table: Mapping[str, Any], nuisances: Nuisances, factor: float = 1.0
+) -> tuple[Table, dict[str, float]]:
+    """A table that states `sd_N_per_mm`, `factor` times as large as one reading's scatter is.
+
+    The truth: `true_percent` and `stated_percent`, repeat noise and clamping together.
+    """
+    true = float(np.hypot(nuisances.repeat, nuisances.clamping))
+    stated: Table = {}
+    for name, values in table.items():
+        if name != "sd_N_per_mm":
+            stated[name] = values
+        if name == "stiffness_N_per_mm":
+            stated["sd_N_per_mm"] = np.round(np.asarray(values) * true * factor, 1)
+    return stated, {"true_percent": 100.0 * true, "stated_percent": 100.0 * true * factor}
+
+
+def _exchange(wrong: dict[str, Any], rng: Generator) -> IntArray:
+    """Two rows of one clamping and one load get each other's stiffness."""
+    clamps = clamp_of(wrong)
+    loads = wrong.get("force_N", np.full(len(clamps), defaults.FORCE))
+    for _ in range(TRIES):
+        first = int(rng.integers(len(clamps)))
+        others = np.flatnonzero(
+            (clamps == clamps[first]) & (loads == loads[first]) & (wrong["direction"] != wrong["direction"][first])
+        )
+        if len(others):
+            rows = np.array([first, int(rng.choice(others))])
+            wrong["stiffness_N_per_mm"][rows] = wrong["stiffness_N_per_mm"][rows[::-1]]
+            return np.sort(rows)
+    raise InputError("no two directions of one clamping and load", expected="a campaign with several")
+
+
+def _mistype(wrong: dict[str, Any], nominal: Nominal, kind: str, rng: Generator) -> IntArray:
+    """A coordinate or an angle of one row, or of all rows of a clamping, is written wrongly."""
+    names = [name for name in POSE if name in wrong]
+    clamps = clamp_of(wrong)
+    for _ in range(TRIES):
+        row = int(rng.integers(len(clamps)))
+        rows = np.flatnonzero(clamps == clamps[row]) if rng.random() < 0.5 else np.array([row])
+        angle = kind in ("sign_of_angle", "pose_1_deg", "pose_5_deg")
+        group = names[3:5] if kind == "sign_of_angle" else names[3:] if angle else names[:2]
+        group = names[:3] if kind == "pose_10_mm" else group
+        name = str(rng.choice(group))
+        before = float(wrong[name][row])
+        if kind.startswith("sign"):
+            if abs(before) < (SMALLEST_ANGLE if angle else SMALLEST_COORDINATE):
+                continue
+            after = -before
+        else:
+            after = round(before + float(rng.choice([-1.0, 1.0])) * WRONG_BY[kind], 3)
+        trial = dict(wrong) | {name: wrong[name].copy()}
+        trial[name][rows] = after
+        if _reached(trial, nominal, rows):
+            wrong[name] = trial[name]
+            return rows
+    raise InputError(f"no row for the slip {kind}", expected="poses off the axis, or tilted, that stay reachable")
+
+
+def _reached(table: Mapping[str, Any], nominal: Nominal, rows: IntArray) -> bool:
+    one = rows_of({name: np.asarray(values)[rows] for name, values in table.items()})
+    return bool(reachable(nominal, one.position, one.angles, one.extension).all())
+
+
+def _length(table: Mapping[str, Any], slipped: Mapping[str, Any], nominal: Nominal, nuisances: Nuisances) -> float:
+    """Whitened length of the change of ln measured - ln modelled."""
+    modelled = [np.log(readings(nominal, HiddenMachine(), rows_of(one))) for one in (table, slipped)]
+    measured = [np.log(np.asarray(one["stiffness_N_per_mm"], dtype=float)) for one in (table, slipped)]
+    change: FloatArray = (measured[1] - measured[0]) - (modelled[1] - modelled[0])
+    return scale_of(nominal, rows_of(table), clamp_of(table), nuisances).covariance.length(change)
+
+
+def _plain(truth: dict[str, Any]) -> dict[str, Any]:
+    """Python's own numbers, for JSON."""
+    for key in ("written", "meant"):
+        truth[key] = {
+            name: [value.item() if isinstance(value, np.generic) else value for value in values]
+            for name, values in truth[key].items()
+        }
+    return truth

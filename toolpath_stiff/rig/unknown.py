@@ -1,0 +1,159 @@
+"""What an unknown is: physics of a link that no effect of the catalogue describes.
+
+Each kind acts on the rig's own elements. What a description of it may name is settled from its physics, before any
+diagnosis sees it: `links`, the links of the load path whose give has this signature at the tool tip, and `variables`,
+what it varies with first of all. Several are right where they cannot differ in principle: a spring between tool and
+work in base axes may sit in the frame as well as under the table; the temperature of a campaign that follows its clock
+is a function of the order of the readings.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.rig.nominal import Nominal
+from toolpath_stiff.rig.rows import Rows
+from toolpath_stiff.rig.structure import Geometry, Links
+
+# Words of a description.
+LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
+
+
+VARIABLES = (
+    *("constant", "x", "y", "z", "radius", "tilt", "strut length", "strut force", "force sign"),
+    *("load", "time", "order", "setup", "temperature", "direction"),
+)
+
+
+SOFT = 60e-9  # m/N, largest compliance that is tried: far beyond 30 % of a tip that gives 8 to 31 nm/N
+
+
+REACH = 0.3  # m, half the width of the workspace that the paper measured
+
+
+SIGN_WIDTH = 30.0  # N over which a seat opens: no contact lets go at a stroke (assumed)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One unknown in one machine.
+
+    Attributes
+    ----------
+    kind
+        Its name in `UNKNOWNS`.
+    size
+        In the kind's own SI unit, or a ratio.
+    shape
+        What else was drawn: which strut, which axis, where.
+    """
+
+    kind: str
+    size: float
+    shape: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class State:
+    """n rows as the machine meets them: commanded strut lengths (n, 6) m and true places."""
+
+    nominal: Nominal
+    rows: Rows
+    lengths: FloatArray
+    place: Geometry
+
+    @property
+    def units(self) -> FloatArray:
+        """(n, 6, 3) along the struts, from frame to platform, base axes."""
+        strut = self.place.platform_joints - self.place.frame_joints
+        return np.asarray(strut / np.linalg.norm(strut, axis=2, keepdims=True))
+
+    @property
+    def stretched(self) -> FloatArray:
+        """(n, 6) how far out the struts are: 0 shortest, 1 longest."""
+        low, high = self.nominal.strut_range
+        return np.asarray((self.lengths - low) / (high - low))
+
+
+def no_shape(rng: Generator) -> dict[str, Any]:
+    """Nothing is drawn beside the size."""
+    return {}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of unknown.
+
+    Attributes
+    ----------
+    words
+        What it is.
+    links, variables
+        What a description may name.
+    limit
+        Largest size that is tried.
+    act
+        What it does to the links; None: nothing.
+    read
+        (n,) factor on the stiffness that is read; None: 1.
+    move
+        (6, 3) m by which the frame joints stand elsewhere; None: not at all.
+    shape
+        Draws what is not size; `sign` in it goes to the size.
+    varies
+        Columns of `Rows` on which the mechanics depends beside pose, direction, tool and set-up.
+    columns
+        Columns that a measurement file needs to show it.
+    """
+
+    words: str
+    links: frozenset[str]
+    variables: frozenset[str]
+    limit: float
+    act: Callable[[Links, State, Unknown], Links] | None = None
+    read: Callable[[Rows, Unknown], FloatArray] | None = None
+    move: Callable[[Unknown], FloatArray] | None = None
+    shape: Callable[[Generator], dict[str, Any]] = no_shape
+    varies: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+
+
+def kind(words: str, links: str, variables: str, limit: float, **more: Any) -> Kind:
+    """A kind whose links and variables are given as words between commas."""
+    return Kind(words, frozenset(links.split(",")), frozenset(variables.split(",")), limit, **more)
+
+
+def opened(pull: FloatArray) -> FloatArray:
+    """0 where a seat is pressed, 1 where it is pulled by `pull` N, and in between over some newtons."""
+    return np.asarray(0.5 * (1.0 + np.tanh(pull / SIGN_WIDTH)))
+
+
+def beyond(force: FloatArray, threshold: float) -> FloatArray:
+    """Secant compliance, over that of the open state, of a link that is rigid up to a force: (|f| - f0) / |f|."""
+    return np.asarray(np.maximum(0.0, 1.0 - threshold / np.maximum(np.abs(force), 1e-9)))
+
+
+def one_strut(rng: Generator) -> dict[str, Any]:
+    """Which strut, from 0."""
+    return {"strut": int(rng.integers(6))}
+
+
+def signed(rng: Generator) -> dict[str, Any]:
+    """Which sign."""
+    return {"sign": float(rng.choice([-1.0, 1.0]))}
+
+
+def _with_ends(links: Links, *ends: tuple[FloatArray, FloatArray]) -> Links:
+    return dataclasses.replace(links, ends=(*links.ends, *ends))
+
+
+def _with_joints(links: Links, extra: Callable[[FloatArray], FloatArray]) -> Links:
+    """Further secant compliance (n, 6) along the struts from their forces (n, 6)."""
+    return dataclasses.replace(links, joints=lambda forces: links.joints(forces) + extra(forces))

@@ -1,0 +1,273 @@
+"""Unknowns of struts, joints, platform and frame: they act on what carries the platform."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.random import Generator
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.rig.nominal import rotations, strut_directions
+from toolpath_stiff.rig.structure import BARS, Links
+from toolpath_stiff.rig.unknown import SOFT, _with_joints, beyond, kind, one_strut, opened, signed
+
+if TYPE_CHECKING:
+    from toolpath_stiff.rig.unknown import Kind, State, Unknown
+
+
+SWING = np.sin(np.radians(20.0)) ** 2  # squared sine of the swing at which compliances are quoted
+
+
+LEAST_FORCE = 0.1  # N, below which a secant compliance is held
+
+
+SOUND_BAR = 3e9  # N/m, the bars of a platform one of which is cracked: 1.4 % at the tip (assumed)
+
+
+SLIP_LOAD = 300.0  # N, load at which a sticking joint carries half of what it does at rest (assumed)
+
+
+PRELOAD_GROWS = 0.3  # of the campaign, time constant of a machine that warms up (assumed)
+
+
+def _coupled(links: Links, shares: FloatArray, compliance: float) -> Links:
+    """A spring that carries shares (n, 6) of the strut forces and lengthens each strut by its share: c a a^T."""
+    flexibility = np.linalg.inv(links.struts) + compliance * shares[:, :, None] * shares[:, None, :]
+    return dataclasses.replace(links, struts=np.asarray(np.linalg.inv(flexibility), dtype=np.float64))
+
+
+def _only(strut: int) -> FloatArray:
+    return np.where(np.arange(6) == strut, 1.0, 0.0)
+
+
+def _swing(at: State) -> FloatArray:
+    """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
+    pose = at.nominal.neutral_pose
+    rest = strut_directions(at.nominal, pose[None, :3], rotations(pose[None, 3:]), np.zeros(1))[1]
+    now = at.units @ at.place.rotation
+    return np.asarray(1.0 - np.minimum(np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now) ** 2, 1.0))
+
+
+def joint_swing(links: Links, at: State, u: Unknown) -> Links:
+    """The forks of the platform joints bend the more, the further they swing out: c = c0 sin^2."""
+    compliance = u.size * _swing(at) / SWING
+    return _with_joints(links, lambda forces: compliance)
+
+
+def cardan_fork(links: Links, at: State, u: Unknown) -> Links:
+    """A cross whose inner pin, radial on the platform, is worn: c = c0 (share of the strut's force along the pin)^2."""
+    joints = at.place.platform_joints - at.place.work_point[:, None, :]
+    axis = at.place.rotation[:, :, 2]
+    radial = joints - np.einsum("nki,ni->nk", joints, axis)[:, :, None] * axis[:, None, :]
+    pin = radial / np.linalg.norm(radial, axis=2, keepdims=True)
+    compliance = u.size * np.einsum("nki,nki->nk", at.units, pin) ** 2
+    return _with_joints(links, lambda forces: compliance)
+
+
+def joint_binding(links: Links, at: State, u: Unknown) -> Links:
+    """Joints that bind near the end of their swing: rotational stiffness m0 sin^2."""
+    return dataclasses.replace(links, moment=links.moment + u.size * _swing(at) / SWING)
+
+
+def joint_slip(links: Links, at: State, u: Unknown) -> Links:
+    """Sticking joints that slip: rotational secant stiffness m0 F0 / (F0 + F), Masing's element smeared out."""
+    held = SLIP_LOAD / (SLIP_LOAD + at.rows.force)
+    return dataclasses.replace(links, moment=links.moment + u.size * held[:, None] * np.ones(6))
+
+
+def strut_backlash(links: Links, at: State, u: Unknown) -> Links:
+    """Lost motion in one strut alone: c = g / |f|."""
+    return _with_joints(links, lambda f: u.size / np.maximum(np.abs(f), LEAST_FORCE) * _only(u.shape["strut"]))
+
+
+def nut_preload(links: Links, at: State, u: Unknown) -> Links:
+    """Double nuts with too little preload: beyond it one of the two lets go and the struts are softer by c0."""
+    return _with_joints(links, lambda f: u.size * beyond(f, u.shape["preload"]))
+
+
+def thrust_bearing(links: Links, at: State, u: Unknown) -> Links:
+    """The thrust bearing of one screw is worn on one side: softer in tension, or in compression."""
+    return _with_joints(links, lambda f: u.size * opened(f * u.shape["side"]) * _only(u.shape["strut"]))
+
+
+def strut_bowing(links: Links, at: State, u: Unknown) -> Links:
+    """Struts not quite straight bow under compression: c grows as length^4 (Timoshenko, an initially bent column)."""
+    compliance = u.size * (at.lengths / at.nominal.strut_range[1]) ** 4
+    return _with_joints(links, lambda f: compliance * opened(-f))
+
+
+def drive_spring(links: Links, at: State, u: Unknown) -> Links:
+    """One drive loses stiffness in proportion to how far its strut is out, as a column of oil does."""
+    compliance = u.size * np.maximum(at.stretched, 0.0) * _only(u.shape["strut"])
+    return _with_joints(links, lambda forces: compliance)
+
+
+def other_screw(links: Links, at: State, u: Unknown) -> Links:
+    """One strut was replaced: its stiffness has another slope over the length, k exp(a (s - 1/2))."""
+    factor = np.where(np.arange(6) == u.shape["strut"], np.exp(u.size * (at.stretched - 0.5)), 1.0)
+    root = np.sqrt(factor)
+    return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])
+
+
+def screw_lead(links: Links, at: State, u: Unknown) -> Links:
+    """One screw was ground with a wavy lead: its nut's stiffness varies periodically with the length."""
+    wave = 1.0 + u.size * np.sin(2.0 * np.pi * at.lengths / u.shape["wavelength"] + u.shape["phase"])
+    root = np.sqrt(np.where(np.arange(6) == u.shape["strut"], wave, 1.0))
+    return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])
+
+
+def motor_mount(links: Links, at: State, u: Unknown) -> Links:
+    """Two neighbouring struts of different vertices hang on one soft bracket, which both load: c (f1 + f2)^2."""
+    return _coupled(links, np.broadcast_to(_pair(at, u), at.lengths.shape), u.size)
+
+
+def _pair(at: State, u: Unknown) -> FloatArray:
+    first = u.shape["strut"]
+    vertices = at.nominal.vertices
+    other = next(s % 6 for s in range(first + 1, first + 6) if vertices[s % 6] != vertices[first])
+    return _only(first) + _only(other)
+
+
+def strut_heating(links: Links, at: State, u: Unknown) -> Links:
+    """The motor of one strut holds it and heats its nut while the readings of a clamping are taken."""
+    compliance = u.size * (at.rows.time / 300.0)[:, None] * _only(u.shape["strut"])
+    return _with_joints(links, lambda forces: compliance)
+
+
+def warm_up_preload(links: Links, at: State, u: Unknown) -> Links:
+    """Joints gain their preload as the machine warms up: c = c0 exp(-t / tau) over the campaign."""
+    compliance = u.size * np.exp(-at.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6)
+    return _with_joints(links, lambda forces: compliance)
+
+
+def cracked_bar(links: Links, at: State, u: Unknown) -> Links:
+    """The bar from one joint of the platform to the spindle nose is cracked; the others are stiff, but not rigid."""
+    stiffness = np.minimum(np.full(BARS, SOUND_BAR), links.bars)
+    stiffness[12 + u.shape["strut"]] *= 1.0 - u.size  # after the rim and the spokes, six each
+    return dataclasses.replace(links, bars=stiffness)
+
+
+def frame_oval(links: Links, at: State, u: Unknown) -> Links:
+    """The frame's ring goes oval: the radial loads of two posts act against each other, c (R1 - R2)^2."""
+    vertices = at.nominal.vertices
+    side = np.where(vertices == u.shape["vertex"], 1.0, np.where(vertices == (u.shape["vertex"] + 1) % 3, -1.0, 0.0))
+    outward = at.place.frame_joints * np.array([1.0, 1.0, 0.0])
+    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+    return _coupled(links, np.einsum("nki,nki->nk", at.units, outward) * side, u.size)
+
+
+def loose_vertex_bolt(links: Links, at: State, u: Unknown) -> Links:
+    """A bolt of one post is loose: pulled down the post gives, a third as much outwards; pressed it sits."""
+    vertex = u.shape["vertex"]
+    mine = at.nominal.vertices == vertex
+    down = at.units[:, :, 2] * mine
+
+    def loose(forces: FloatArray) -> FloatArray:
+        # A strut in tension pulls its vertex towards the platform, along the strut.
+        pulled = opened(-np.einsum("nk,nk->n", forces, down))
+        give = np.zeros((len(forces), *links.vertices.shape))
+        give[:, vertex, 0], give[:, vertex, 1] = u.size * pulled / 3.0, u.size * pulled
+        return give
+
+    return dataclasses.replace(links, loose=loose)
+
+
+def joint_seat(u: Unknown) -> FloatArray:
+    """One frame joint stands elsewhere than the control believes."""
+    moved = np.zeros((6, 3))
+    moved[u.shape["strut"], u.shape["axis"]] = u.size
+    return moved
+
+
+def _vertex(rng: Generator) -> dict[str, Any]:
+    return {"vertex": int(rng.integers(3))}
+
+
+def _loose(rng: Generator) -> dict[str, Any]:
+    """The second or third post: loads along +X, +Y and +Z never pull the first one of the paper's machine down."""
+    return {"vertex": int(rng.integers(1, 3))}
+
+
+def _wave(rng: Generator) -> dict[str, Any]:
+    return one_strut(rng) | {"wavelength": float(rng.uniform(0.12, 0.3)), "phase": float(rng.uniform(0.0, 6.28))}
+
+
+# What can be told at the tip: joints and struts are in series, so an effect of all joints may be called either; so is
+# that of one strut, its joints and its drive. A strut's length follows height, radius and tilt of the pose, so what
+# varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant
+# there, and shows as the strut swings about it.
+ONE, ALL = "one strut,joints", "joints,struts"
+
+
+STRUT_KINDS: dict[str, Kind] = {
+    "joint_swing": kind(
+        "joints softer the further they swing", ALL, "tilt,radius,strut length,z", SOFT, act=joint_swing
+    ),
+    "cardan_fork": kind(
+        "joints softer along one pin of their cross", ALL, "constant,tilt,radius,strut length", SOFT, act=cardan_fork
+    ),
+    "joint_binding": kind(
+        "joints that resist turning near the end of their swing", "joints,struts,platform",
+        "tilt,radius,strut length,z", 3e6, act=joint_binding,
+    ),
+    "joint_slip": kind(
+        "joints that resist turning under small loads and slip under large ones", "joints,struts,platform", "load",
+        6e6, act=joint_slip, varies=("force",), columns=("force_N",),
+    ),
+    "strut_backlash": kind(
+        "lost motion in one strut", ONE, "strut force,load", 50e-6, act=strut_backlash, shape=one_strut,
+        varies=("force",), columns=("force_N",),
+    ),
+    "nut_preload": kind(
+        "struts softer beyond the preload of their nuts", ALL, "strut force,load", SOFT, act=nut_preload,
+        shape=lambda rng: {"preload": float(rng.uniform(150.0, 500.0))}, varies=("force",), columns=("force_N",),
+    ),
+    "thrust_bearing": kind(
+        "one strut softer in tension or in compression", ONE, "force sign", SOFT, act=thrust_bearing,
+        shape=lambda rng: one_strut(rng) | {"side": float(rng.choice([-1.0, 1.0]))}, varies=("force",),
+    ),
+    "strut_bowing": kind(
+        "struts softer in compression, the longer the more", ALL, "force sign,strut length", SOFT, act=strut_bowing,
+        varies=("force",),
+    ),
+    "drive_spring": kind(
+        "one drive softer the further its strut is out", ONE, "strut length", SOFT, act=drive_spring, shape=one_strut
+    ),
+    "other_screw": kind(
+        "one strut whose stiffness has another slope over its length", ONE, "strut length", 3.0, act=other_screw,
+        shape=lambda rng: one_strut(rng) | signed(rng),
+    ),
+    "screw_lead": kind(
+        "one strut's stiffness varies periodically with its length", ONE, "strut length", 0.85, act=screw_lead,
+        shape=_wave,
+    ),
+    "motor_mount": kind(
+        "two neighbouring struts on one soft bracket", "struts,joints,platform", "constant", SOFT,
+        act=motor_mount, shape=one_strut,
+    ),
+    "strut_heating": kind(
+        "one strut softens in the minutes of a clamping", ONE, "time", SOFT, act=strut_heating, shape=one_strut,
+        varies=("time",), columns=("time_min",),
+    ),
+    "warm_up_preload": kind(
+        "joints stiffen in the course of the campaign", ALL, "order,time,temperature", SOFT, act=warm_up_preload,
+        varies=("elapsed",),
+    ),
+    "cracked_bar": kind(
+        "one bar of the platform is cracked", "platform,joints,one strut", "constant", 0.9995, act=cracked_bar,
+        shape=one_strut,
+    ),
+    "frame_oval": kind(
+        "the frame's ring goes oval between two posts", "frame", "constant", SOFT, act=frame_oval, shape=_vertex
+    ),
+    "loose_vertex_bolt": kind(
+        "one post of the frame gives when it is pulled down", "frame", "force sign,direction", SOFT,
+        act=loose_vertex_bolt, shape=_loose, varies=("force",),
+    ),
+    "joint_seat": kind(
+        "one frame joint stands elsewhere", "frame,joints,one strut", "constant", 0.3, move=joint_seat,
+        shape=lambda rng: one_strut(rng) | {"axis": int(rng.integers(3))} | signed(rng),
+    ),
+}  # fmt: skip

@@ -1,0 +1,180 @@
+"""Physical effects along the load path, one flat file each; `contract` says what an effect is.
+
+Which effects there are: the packaged ones, installed ones (entry points), and those of a user's file.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib.util
+import pkgutil
+import sys
+from collections.abc import Iterable
+from functools import cache, lru_cache
+from pathlib import Path
+from types import CodeType, ModuleType
+
+from toolpath_stiff.errors import EffectError, InputError
+from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.stiffness import effects
+from toolpath_stiff.stiffness.contract import LINKS, Effect
+from toolpath_stiff.stiffness.guard import check_declarations, line_in, line_of
+
+ENTRY_POINTS = "toolpath_stiff.effects"
+
+
+MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
+
+
+@cache
+def packaged_effects() -> dict[str, Effect]:
+    """Name -> effect of the packaged files, one an effect."""
+    names = sorted(module.name for module in pkgutil.iter_modules(effects.__path__))
+    found: dict[str, Effect] = {}
+    for name in names:
+        found |= _effects_in(importlib.import_module(f"toolpath_stiff.stiffness.effects.{name}"), name)
+    return found
+
+
+@cache
+def installed_effects() -> tuple[dict[str, Effect], dict[str, str]]:
+    """Effects that other packages offer as entry points, and name -> reason of those that fail to load."""
+    from importlib.metadata import entry_points
+
+    found: dict[str, Effect] = {}
+    broken: dict[str, str] = {}
+    for point in entry_points(group=ENTRY_POINTS):
+        try:
+            loaded = point.load()
+            effect = loaded() if isinstance(loaded, type) else loaded
+            check_declarations(effect, point.name)
+            if effect.name in packaged_effects() or effect.name in found:
+                raise EffectError(f"effect {effect.name} exists already")
+            found[effect.name] = effect
+        except Exception as error:  # a broken plug-in is listed with its reason; the rest still works
+            broken[point.name] = f"{type(error).__name__}: {error}"
+    return found, broken
+
+
+def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
+    """Name -> effect: packaged, installed, and those of the given files, sorted along the load path.
+
+    Raises
+    ------
+    InputError
+        A file cannot be loaded, holds no effect, or names one that exists already.
+    """
+    known = packaged_effects() | installed_effects()[0]
+    for file in files:
+        for name, effect in effects_from_file(file).items():
+            if name in known:
+                line = line_of(type(effect), "name")
+                raise EffectError(
+                    f"effect {name} exists already", hint="give it another name", file=str(file), line=line
+                )
+            known[name] = effect
+    return dict(sorted(known.items(), key=lambda item: (LINKS.index(item[1].link), item[0])))
+
+
+def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
+    """The effect of that name. Raises `InputError` with the nearest name if there is none."""
+    files = list(files)
+    known = known_effects(files)
+    if name in known:
+        return known[name]
+    broken = installed_effects()[1]
+    if name in broken:
+        raise EffectError(f"effect {name} does not load: {broken[name]}", hint="repair or uninstall its package")
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = (
+        f"did you mean {near[0]}?"
+        if near
+        else f"`{command_line('effects', 'list', *options(effects=list(files)))}` lists them"
+    )
+    raise EffectError(f"unknown effect {name!r}", expected=f"one of {', '.join(known)}", hint=hint)
+
+
+def effects_from_file(file: str | Path) -> dict[str, Effect]:
+    """Name -> effect of every `Effect` subclass that a Python file defines; run once as long as it does not change.
+
+    Raises
+    ------
+    InputError
+        There is no such file, it fails when it is run (with the line), or what it declares is wrong.
+    """
+    path = Path(file)
+    try:
+        state = path.stat()
+    except OSError:
+        state = None
+    if state is None or not path.is_file():
+        raise EffectError(
+            f"effects file {str(file)!r} does not exist", hint=f"`{command_line('effects', 'new', path)}` writes one"
+        )
+    return _loaded(str(file), path.resolve(), state.st_mtime_ns, state.st_size)
+
+
+class _Source(importlib.machinery.SourceFileLoader):
+    """Runs the text of a file and nothing else: a compiled file beside it may come from anybody and say anything."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
+@lru_cache(maxsize=MOST_FILES)
+def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]:
+    """`path`, `changed` and `size` tell files and their versions apart."""
+    name = f"toolpath_stiff_user_effects_{path.stem}"
+    if path.suffix != ".py":
+        raise EffectError("not a Python file", expected="a name that ends in .py", file=file)
+    spec = importlib.util.spec_from_file_location(name, path, loader=_Source(name, str(path)))
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+        found = _effects_in(module, file)
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever a user's file does
+        raise _failure(error, file) from None
+    if not found:
+        raise EffectError(
+            "defines no effect", expected="a class derived from toolpath_stiff.stiffness.effects.Effect", file=file
+        )
+    return found
+
+
+def _failure(error: BaseException, file: str) -> InputError:
+    """Where a file failed when it was run, and of what."""
+    if isinstance(error, SyntaxError) and error.filename and Path(error.filename).resolve() == Path(file).resolve():
+        return EffectError(f"{type(error).__name__}: {error.msg}", file=file, line=error.lineno, column=error.offset)
+    what = f"{type(error).__name__}: {error}".rstrip(": ")
+    return EffectError(
+        f"{what}, when the file is run", file=file, line=line_in(error, file) or _unreadable(error, file)
+    )
+
+
+def _unreadable(error: BaseException, file: str) -> int | None:
+    """The line of a byte that no Python file has: Python does not say it."""
+    content = Path(file).read_bytes()
+    at = error.start if isinstance(error, UnicodeDecodeError) else content.find(b"\0")
+    return content.count(b"\n", 0, at) + 1 if at >= 0 else None
+
+
+def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
+    """Effects that a module itself defines."""
+    found: dict[str, Effect] = {}
+    for value in vars(module).values():
+        if isinstance(value, type) and issubclass(value, Effect) and value.__module__ == module.__name__:
+            effect = value()
+            check_declarations(effect, where)
+            if effect.name in found and type(found[effect.name]) is not value:
+                raise EffectError(
+                    f"effect {effect.name} is defined twice",
+                    hint="give one another name",
+                    file=where,
+                    line=line_of(value, "name"),
+                )
+            found[effect.name] = effect
+    return found

@@ -1,0 +1,444 @@
+"""The contract of a physical effect: a deviation from six linear struts on a rigid platform and frame.
+
+An effect sits on one link of the load path, declares its parameters, and implements what it adds:
+
+- `strut_compliance`: compliance in series with each strut;
+- `load_compliance`: a quadratic form in the loads, the six strut forces and the tip wrench. Frame vertices couple
+  two struts, platform bars all six, a spindle only the wrench;
+- `parallel_stiffness`: a stiffness parallel to the struts. The core then solves instead of using equilibrium alone;
+- `geometry`: another machine geometry;
+- `reading`: a change of the measured figure, not of the machine (an instrument).
+
+Everything is SI and batched over n poses. A method that an effect does not implement adds nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
+from toolpath_stiff.machine.kinematics import Struts
+from toolpath_stiff.machine.model import EffectEntry, Machine
+
+if TYPE_CHECKING:
+    from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
+
+
+LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
+
+
+# Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
+CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
+
+
+SETUP = "setup"  # the condition, and the name of every parameter that names a set-up
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect.
+
+    Attributes
+    ----------
+    name
+        Physical name, without unit.
+    unit
+        Unit in files and reports.
+    si
+        SI value of one `unit`; effects compute in SI.
+    bounds
+        (low, high) in `unit`: what is physically possible. A value outside is an error.
+    typical
+        (low, high) in `unit`: what is usual. Ranks, never excludes.
+    source
+        Where `typical` comes from.
+    neutral
+        The value (in `unit`) at which the effect vanishes; may be inf.
+    meaning
+        One line for the user.
+    kind
+        "real" numbers are fitted. What the effect acts on is chosen, never fitted: an "integer" within `bounds`
+        (which strut), a "text" (which set-up).
+
+    Examples
+    --------
+    >>> compliance = Parameter("compliance", "nm/N", 1e-9, (0.0, 50.0), (1.0, 5.0), "an example")
+    >>> compliance.key, compliance.expected, compliance.discrete
+    ('compliance_nm_per_N', 'a number from 0 to 50 nm/N', False)
+    """
+
+    name: str
+    unit: str
+    si: float
+    bounds: tuple[float, float]
+    typical: tuple[float, float]
+    source: str
+    neutral: float = 0.0
+    meaning: str = ""
+    kind: Literal["real", "integer", "text"] = "real"
+
+    @property
+    def discrete(self) -> bool:
+        """Whether it names what the effect acts on; fits then compare the choices."""
+        return self.kind != "real"
+
+    @property
+    def expected(self) -> str:
+        """What a value must be, in words."""
+        if self.kind == "text":
+            return "a name in quotes"
+        low, high = self.bounds
+        if self.kind == "integer":
+            return f"a whole number from {low:g} to {high:g}"
+        return f"a number from {low:g} to {high:g} {self.unit}".rstrip()
+
+    @property
+    def key(self) -> str:
+        """The key in machine files: the name with its unit, such as `bar_stiffness_N_per_m`."""
+        unit = self.unit.replace("/", "_per_").replace(" ", "_").replace("%", "percent")
+        return f"{self.name}_{unit}" if unit else self.name
+
+
+def setup_parameter(meaning: str) -> Parameter:
+    """The parameter that names the set-up to which an effect belongs."""
+    source = "column setup of the measurements"
+    return Parameter(SETUP, "", 1.0, (0, 0), (0, 0), source=source, meaning=meaning, kind="text")
+
+
+def length_error(typical: tuple[float, float], source: str, meaning: str) -> Parameter:
+    """The parameter of an effect by which a length of the geometry is off, mm: the true one less the stated one."""
+    return Parameter("error", "mm", 1e-3, (-60.0, 60.0), typical, source=source, meaning=meaning)
+
+
+@dataclass(frozen=True)
+class LoadPath:
+    """What an effect sees of n poses under load. SI, base axes.
+
+    Attributes
+    ----------
+    machine
+        The machine, geometry effects included.
+    position, rotation
+        (n, 3) m, (n, 3, 3): the tool tip and the platform.
+    struts
+        Lengths, directions, arms of the struts.
+    tool_extension
+        (n,) m, how much longer the tool is than the machine's reference tool.
+    force
+        (n,) N, size of the load at the tip.
+    strut_forces
+        (n, 6) N, forces in the struts under that load, these effects included; None where no direction is given. Only
+        effects that depend on the load (`load_dependent`) may ask for it.
+    direction
+        (n, 3) unit vectors, along which the load acts and the displacement is read; None where no direction is given.
+    setup
+        (n,) names of the clamping arrangement, or None.
+    time, temperature
+        (n,) s since the indicator was zeroed, (n,) degrees C; or None.
+    """
+
+    machine: Machine
+    position: FloatArray
+    rotation: FloatArray
+    struts: Struts
+    tool_extension: FloatArray
+    force: FloatArray
+    strut_forces: FloatArray | None = None
+    direction: FloatArray | None = None
+    setup: TextArray | None = None
+    time: FloatArray | None = None
+    temperature: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def take(self, rows: IntArray) -> LoadPath:
+        """Some of the poses, by index; repeated as the index says."""
+        struts = Struts(*(getattr(self.struts, one.name)[rows] for one in fields(self.struts)))
+        arrays: dict[str, Any] = {
+            name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)
+        }
+        return replace(self, struts=struts, **arrays)
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under what a program runs: what measurements say row by row, and a program does not say.
+
+    Attributes
+    ----------
+    setup
+        Name of the clamping arrangement; "": none of those that have a name; None: nobody says.
+    temperature
+        Degrees C; None: nobody says.
+    """
+
+    setup: str | None = None
+    temperature: float | None = None
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Which of `CONDITIONS` somebody has given."""
+        return tuple(name for name, attribute in CONDITIONS.items() if getattr(self, attribute, None) is not None)
+
+    def columns(self, n: int) -> dict[str, Any]:
+        """The same for n poses, as `LoadPath` holds it."""
+        return {
+            "setup": None if self.setup is None else np.full(n, self.setup),
+            "temperature": None if self.temperature is None else np.full(n, self.temperature),
+        }
+
+
+class Effect:
+    """Base of all effects; subclass, fill in the attributes, implement what the effect adds.
+
+    Attributes
+    ----------
+    name
+        As in machine files and on the command line.
+    title, equation, source
+        For people: what it is, its formula, where the formula comes from.
+    link
+        Its place in the load path, one of `LINKS`.
+    parameters
+        What it is made of.
+    needs
+        Columns of the measurements without which it cannot be tested. Where one of `CONDITIONS` is among them and
+        nobody gives it (a program without `--setup`), the effect does not act, and results say so.
+    load_dependent
+        Whether the compliance depends on the size of the load; it is then the secant one.
+    unknown_to_control
+        Of a geometry effect: whether the control computes with the geometry before it. The struts then get the
+        lengths of the programmed pose on that geometry, and the platform goes where they put it.
+    described_from
+        Of an effect whose form was read off measurements: the marks of those readings (`measurements.reading_marks`).
+        A diagnosis of the same readings calls it `described`, not `identified`, until others confirm it.
+
+    Examples
+    --------
+    A screw that adds the same compliance to every strut:
+
+    >>> class Screws(Effect):
+    ...     name, title, link = "screws", "the screws give way", "struts"
+    ...     equation, source = "c_i += c", "an example"
+    ...     parameters = (Parameter("compliance", "nm/N", 1e-9, (0.0, 50.0), (1.0, 5.0), "an example"),)
+    ...
+    ...     def strut_compliance(self, path, p):
+    ...         return np.full((len(path), 6), p["compliance"])
+    >>> Screws().parameters[0].key
+    'compliance_nm_per_N'
+    >>> Screws().finding({"compliance": 2.5})
+    'the screws give way, compliance 2.5 nm/N'
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    link: ClassVar[str]
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+    needs: ClassVar[tuple[str, ...]] = ()
+    load_dependent: ClassVar[bool] = False
+    unknown_to_control: ClassVar[bool] = False
+    described_from: ClassVar[tuple[str, ...]] = ()
+
+    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """(n, 6) m/N in series with each strut. `p`: parameter name -> SI value.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> found = tps.effects()["weak_strut"].strut_compliance(path, {"strut": 4, "factor": 0.8})
+        >>> (1e9 * found).round(2).tolist()
+        [[0.0, 0.0, 0.0, 6.27, 0.0, 0.0]]
+        """
+        return None
+
+    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """(n, 12, 12) symmetric Q; twice the stored energy is [f; w]^T Q [f; w].
+
+        f (6) are the strut forces with J^T f = w, w (6) the force and the moment about the tip, base axes. The
+        force of strut i on the platform is -f_i u_i, on the frame +f_i u_i.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> tps.effects()["spindle_compliance"].load_compliance(path, {"radial": 5e-9, "axial": 1e-9}).shape
+        (1, 12, 12)
+        """
+        return None
+
+    def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """(n, 6, 6) between platform and base about the tip, parallel to the struts, base axes.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> tps.effects()["joint_moment_stiffness"].parallel_stiffness(path, {"stiffness": 1000.0}).shape
+        (1, 6, 6)
+        """
+        return None
+
+    def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
+        """The machine with this effect's geometry.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist").model.machine
+        >>> longer = tps.effects()["tool_length_error"].geometry(machine, {"error": 0.001})
+        >>> longer is machine
+        False
+        """
+        return machine
+
+    def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
+        """What the instrument reads, (n,) N/m, for a true stiffness (n,) N/m.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> gauge = tps.effects()["gauge_scale"]
+        >>> gauge.reading(np.array([50e6]), path, {"direction": 0, "setup": "", "scale": 0.02}).round().tolist()
+        [51000000.0]
+        """
+        return stiffness
+
+    def seen_by(self, loop: MeasuringLoop) -> float:
+        """Share of what it gives way that an indicator across part of the load path sees: all where its link is inside.
+
+        Of a joint's two ends each is taken to give half.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> [tps.effects()["weak_strut"].seen_by(MeasuringLoop(kind)) for kind in ("tip", "strut", "spindle")]
+        [1.0, 1.0, 0.0]
+        """
+        if self.link not in loop.links:
+            return 0.0
+        return 0.5 if loop.kind == "joint" and loop.where else 1.0
+
+    def vertex_displacement(
+        self, path: LoadPath, p: Mapping[str, float], forces: FloatArray, vertex: int
+    ) -> FloatArray | None:
+        """(n, 3) m, base axes: how far a vertex of the frame (1 to 3) moves under strut forces (n, 6) N.
+
+        Of effects with `link = "frame"`: energy alone does not say which way a vertex moves. Without it an indicator
+        between a vertex and the floor is taken to see nothing of the effect.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> frame = tps.effects()["frame_compliance"]
+        >>> values = {"vertex": 1, "radial": 1e-9, "tangential": 1e-9, "vertical": 1e-9}
+        >>> frame.vertex_displacement(path, values, np.ones((1, 6)), 1).shape
+        (1, 3)
+        """
+        return None
+
+    def conditions(self, p: Mapping[str, Any]) -> tuple[str, ...]:
+        """Which of `CONDITIONS` it waits for with these values: those of `needs`, and those that a value names.
+
+        None for a geometry: a machine has one, whatever the conditions.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> setup = tps.effects()["setup_compliance"]
+        >>> values = {"setup": "riser", "x": 1e-9, "y": 1e-9, "z": 0.0}
+        >>> setup.conditions(values), setup.acts_on(path, values), setup.is_instrument  # the path names no set-up
+        (('setup',), False, False)
+        """
+        if type(self).geometry is not Effect.geometry:
+            return ()
+        named = (q.name for q in self.parameters if q.kind == "text" and p.get(q.name))
+        return tuple(dict.fromkeys(name for name in (*self.needs, *named) if name in CONDITIONS))
+
+    def acts_on(self, path: LoadPath, p: Mapping[str, Any]) -> bool:
+        """Whether these poses come with every condition that it waits for."""
+        return all(getattr(path, CONDITIONS[name]) is not None for name in self.conditions(p))
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What a fit has found, as an engineer says it: a clause with its size and unit, the cause first.
+
+        `p`: parameter name -> value in the units of files, choices as they are.
+        """
+        sizes = []
+        for one in self.parameters:
+            value = p[one.name] if one.discrete else f"{float(f'{p[one.name]:.3g}'):g} {one.unit}".rstrip()
+            sizes.append(f"{one.name.replace('_', ' ')} {value}")
+        return f"{self.title}, {', '.join(sizes)}"
+
+    @property
+    def is_instrument(self) -> bool:
+        """Whether it changes readings only."""
+        return self.link == "instrument"
+
+
+def joined(parts: Sequence[str]) -> str:
+    """Parts as a sentence lists them, "a, b and c"; "nothing" without parts."""
+    if len(parts) < 2:
+        return parts[0] if parts else "nothing"
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def sizes_in_words(sizes: Sequence[tuple[float, str]]) -> str:
+    """Sizes that are not zero, each before its unit and place: "0.35 nm/N along X and 0.19 nm/N along Y"."""
+    return joined([f"{about(size)} {words}" for size, words in sizes if size])
+
+
+def about(size: float) -> str:
+    """How large it is, to two digits and without sign: "19", "0.054"."""
+    return f"{float(f'{abs(size):.2g}'):g}"
+
+
+def read_parameters(effect: Effect, entry: EffectEntry, where: str) -> dict[str, Any]:
+    """SI values of an effect's parameters from a machine file's keys; choices as they are.
+
+    Raises
+    ------
+    InputError
+        A key is unknown or missing, a value is not a number or out of bounds; at its line of the machine file, or with
+        `where` for an entry that stands in none.
+    """
+    by_key = {parameter.key: parameter for parameter in effect.parameters}
+    for key in entry.parameters:
+        if key not in by_key:
+            known = f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance"
+            raise entry.error(f"effect {effect.name}: unknown key {key}", key, expected=known, where=where)
+    values: dict[str, Any] = {}
+    for key, parameter in by_key.items():
+        if key not in entry.parameters:
+            found = f"effect {effect.name}: {key} is missing"
+            raise entry.error(found, expected=parameter.expected, where=where)
+        value = entry.parameters[key]
+        if not _is_valid(parameter, value):
+            found = f"effect {effect.name}: {key} = {value!r}"
+            raise entry.error(found, key, expected=parameter.expected, where=where)
+        values[parameter.name] = float(value) * parameter.si if parameter.kind == "real" else value
+    return values
+
+
+def _is_valid(parameter: Parameter, value: object) -> bool:
+    if parameter.kind == "text":
+        return isinstance(value, str)
+    numbers = int if parameter.kind == "integer" else int | float
+    low, high = parameter.bounds
+    return isinstance(value, numbers) and not isinstance(value, bool) and low <= value <= high

@@ -1,0 +1,133 @@
+"""What an indicator across part of the load path reads under a load at the tip: by virtual work.
+
+A pair of equal and opposite unit forces at the indicator's two points is carried by what lies between them alone (the
+six struts are statically determinate, so that the pair loads nothing else). With the real loads u = [f; w] of strut
+forces and tip wrench, and those of the pair, v, the reading is the sum over the links inside the loop of v^T C u
+(principle of virtual forces; Przemieniecki 1968, Theory of Matrix Structural Analysis, chapter 3). The tip's own loop
+is the case v = u over all links.
+
+| loop | v |
+| --- | --- |
+| spindle, table | the unit load at the tip; no strut forces |
+| strut N, joint N | 1 in strut N |
+| frame N | a unit force on the vertex along the indicator: `Effect.vertex_displacement` |
+| strut N alone | 1 in strut N, and so is u: the strut's own compliance |
+| platform | what the tip reads less what the spindle does |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
+from toolpath_stiff.stiffness.exact import compliance_along, refuse_law_beyond_zero, under_load
+from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
+from toolpath_stiff.stiffness.model import StiffnessModel
+
+
+def loop_compliance(
+    model: StiffnessModel, path: LoadPath, direction: FloatArray, loops: Sequence[MeasuringLoop], which: IntArray
+) -> FloatArray:
+    """Displacement that indicators read, per load at the tip (of a strut alone: per force in it).
+
+    Parameters
+    ----------
+    model
+        Machine and effects; instruments are not asked.
+    path
+        n poses under their loads.
+    direction
+        (n, 3) unit vectors of the load.
+    loops, which
+        The loops, and which of them each reading (n,) is of.
+
+    Returns
+    -------
+    (n,) m/N: positive along the load, as a strut or joint gets longer, as a vertex moves outwards or up.
+
+    Raises
+    ------
+    InputError
+        As `exact.compliance_along`.
+    """
+    found = np.empty(len(path))
+    for number in np.unique(which).tolist():
+        rows = np.flatnonzero(which == number)
+        found[rows] = _one_loop(model, path.take(rows), direction[rows], loops[number])
+    return found
+
+
+def _one_loop(model: StiffnessModel, path: LoadPath, direction: FloatArray, loop: MeasuringLoop) -> FloatArray:
+    if loop.kind == "tip":
+        return compliance_along(model, path, direction)
+    if loop.kind == "platform":
+        whole = compliance_along(model, path, direction)
+        return whole - _one_loop(model, path, direction, MeasuringLoop("spindle"))
+    real = np.zeros((len(path), 12))
+    if loop.kind == "alone":
+        real[:, loop.number - 1] = 1.0
+        path = replace(path, strut_forces=real[:, :6] * path.force[:, None])
+    else:
+        loaded = under_load(model, path, direction)
+        path = loaded.path
+        real[:, :6], real[:, 6:9] = loaded.forces, direction
+    found = np.zeros(len(path))
+    if loop.kind == "frame":
+        return found + _vertex_reading(model, path, real[:, :6], direction, loop)
+    pair = np.zeros((len(path), 12))
+    if loop.kind in ("spindle", "table"):
+        pair[:, 6:9] = direction
+    else:
+        pair[:, loop.number - 1] = 1.0
+    if "struts" in loop.links:
+        law = path.machine.strut_law.stiffness(path.struts.lengths)
+        refuse_law_beyond_zero(path, law)
+        found += (pair[:, :6] * real[:, :6] / law).sum(axis=1)
+    for active in model.effects:
+        share = active.effect.seen_by(loop)
+        if not share or (active.effect.load_dependent and path.strut_forces is None):
+            continue
+        series = active.adds("strut_compliance", path)
+        if series is not None:
+            found += share * (pair[:, :6] * series * real[:, :6]).sum(axis=1)
+        form = active.adds("load_compliance", path)
+        if form is not None:
+            found += share * np.einsum("ni,nij,nj->n", pair, form, real)
+    return found
+
+
+def _vertex_reading(
+    model: StiffnessModel, path: LoadPath, forces: FloatArray, direction: FloatArray, loop: MeasuringLoop
+) -> FloatArray:
+    """(n,) m/N of a vertex against the floor."""
+    _, radial = frame_vertices(path.machine.frame_joints)[loop.number - 1]
+    along = {"": direction, "radial": radial, "vertical": np.array([0.0, 0.0, 1.0])}[loop.where]
+    found = np.zeros(len(path))
+    for active in model.effects:
+        if active.effect.seen_by(loop) and active.effect.acts_on(path, active.values):
+            moved = active.effect.vertex_displacement(path, active.values, forces, loop.number)
+            if moved is not None:
+                found += (moved * along).sum(axis=1)
+    return found
+
+
+def law_products(forces: FloatArray, loops: Sequence[MeasuringLoop], which: IntArray) -> FloatArray:
+    """(n, 6) what each strut's own compliance counts in a reading: products of real and virtual strut forces.
+
+    `forces` (n, 6) are those under the unit load.
+    """
+    found = np.zeros_like(forces)
+    for number in np.unique(which).tolist():
+        rows, loop = which == number, loops[number]
+        if loop.kind in ("tip", "platform"):
+            found[rows] = forces[rows] ** 2
+        elif loop.kind == "strut":
+            found[rows, loop.number - 1] = forces[rows, loop.number - 1]
+        elif loop.kind == "alone":
+            found[rows, loop.number - 1] = 1.0
+    return found

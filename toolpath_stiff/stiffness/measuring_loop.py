@@ -1,0 +1,106 @@
+"""What an indicator is set between: the words of the column `loop`, and which links of the load path lie inside.
+
+An indicator sees what gives way between the two points that it touches, nothing else. The tip loop, tool against work,
+holds the whole load path; an indicator across one joint holds that joint alone.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+LINKS_ON_THE_PATH = ("tool", "platform", "joints", "struts", "frame", "table")
+
+
+# Kind -> links of the load path between the indicator's two points.
+INSIDE = {
+    "tip": LINKS_ON_THE_PATH,
+    "spindle": ("tool",),
+    "platform": tuple(link for link in LINKS_ON_THE_PATH if link != "tool"),
+    "table": ("table",),
+    "frame": ("frame",),
+    "joint": ("joints",),
+    "strut": ("struts",),
+    "alone": ("struts",),
+}
+
+
+# Kinds that read along the load, so that a reading is a stiffness; the others read along a strut or across a vertex.
+ALONG_THE_LOAD = ("tip", "spindle", "platform", "table")
+
+
+WORDS = (
+    "tip, spindle, platform, table, strut 1 (to 6), strut 1 alone, joint 1, joint 1 platform, joint 1 frame, frame 1 "
+    "(to 3), frame 1 radial, frame 1 vertical"
+)
+
+
+_WORD = re.compile(
+    r"(?:(tip|spindle|platform|table)|(strut) ([1-6])( alone)?|(joint) ([1-6])( platform| frame)?"
+    r"|(frame) ([1-3])( radial| vertical)?)"
+)
+
+
+@dataclass(frozen=True)
+class MeasuringLoop:
+    """Between which two points an indicator reads.
+
+    Attributes
+    ----------
+    kind
+        One of `INSIDE`.
+    number
+        Strut from 1 to 6, or vertex of the frame from 1 to 3 by its lowest strut; 0 where there is none.
+    where
+        Of a joint: "platform" or "frame", its end of the strut; "" both ends added. Of a vertex: "radial" or
+        "vertical"; "" along the load.
+
+    Examples
+    --------
+    >>> MeasuringLoop("strut", 3).links
+    ('struts',)
+    >>> str(measuring_loop("Joint 2  platform"))
+    'joint 2 platform'
+    """
+
+    kind: str = "tip"
+    number: int = 0
+    where: str = ""
+
+    def __str__(self) -> str:
+        if self.kind == "alone":
+            return f"strut {self.number} alone"
+        return " ".join(filter(None, [self.kind, str(self.number or ""), self.where]))
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Links of the load path that it sees."""
+        return INSIDE[self.kind]
+
+    @property
+    def along_load(self) -> bool:
+        """Whether it reads along the load."""
+        return self.kind in ALONG_THE_LOAD or (self.kind == "frame" and not self.where)
+
+
+TIP = MeasuringLoop()
+
+
+@lru_cache(maxsize=1024)  # asked of every record
+def measuring_loop(text: str) -> MeasuringLoop | None:
+    """The loop that a cell of the column `loop` names, an empty one the tip's; None where it names none."""
+    words = " ".join(text.lower().split())
+    if not words:
+        return TIP
+    found = _WORD.fullmatch(words)
+    if found is None:
+        return None
+    plain, strut, strut_number, alone, joint, joint_number, end, frame, vertex, axis = found.groups()
+    if plain:
+        return MeasuringLoop(plain)
+    if strut:
+        return MeasuringLoop("alone" if alone else "strut", int(strut_number))
+    if joint:
+        return MeasuringLoop(joint, int(joint_number), (end or "").strip())
+    return MeasuringLoop(frame, int(vertex), (axis or "").strip())

@@ -1,1 +1,0 @@
-"""Measurements against the model: what the data say of machine and effects."""
