@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+DATA = Path("machines")  # a link beside `programs`
 MACHINES = ("nist", "genhexkins", "nategh_agheli")
 LARGE = ("surface_50000.nc",)  # with Parquet left out and no pictures: 50,000 lines
 BOUNDS = ["--x", "-300:300", "--y", "-300:300", "--z", "400:1250"]
@@ -31,6 +32,7 @@ def commands() -> Iterator[tuple[str, list[str]]]:
             continue
         name, words = program.stem, [f"programs/{program.name}"]
         words += ["--controller", f"programs/{name}.toml"] if program.with_suffix(".toml").exists() else []
+        words += ["--tools", "programs/tools.tbl"] if name == "three_tools" else []
         plain = ["--no-plots"] if program.name in LARGE else []
         yield f"check_{name}", ["check", *words]
         yield f"check_json_{name}", ["check", *words, "--json"]
@@ -39,13 +41,16 @@ def commands() -> Iterator[tuple[str, list[str]]]:
     for machine in MACHINES:
         yield f"machine_{machine}", ["machine", "show", machine]
         yield f"machine_json_{machine}", ["machine", "show", machine, "--json"]
-        yield f"machine_check_{machine}", ["machine", "check", machine]
+        yield (
+            f"machine_check_{machine}",
+            ["machine", "check", str(DATA / f"{machine}.toml"), "--out", "{out}/check.png"],
+        )
         yield (
             f"analyze_on_{machine}",
             ["analyze", "programs/pocket.nc", "--machine", machine, *out, "--partial", "--json"],
         )
         yield f"pose_{machine}", ["pose", "100", "-200", "800", "10", "-15", "20", "--machine", machine, "--json"]
-    yield "analyze_options", ["analyze", "programs/pocket.nc", "--load", "softest", "--origin", "-100,50,1100,0,0,30",
+    yield "analyze_options", ["analyze", "programs/pocket.nc", "--load", "softest", "--origin", "-100,50,700,0,0,30",
                               "--require", "40000", "--compare", "genhexkins", "--step", "3", *out]  # fmt: skip
     yield "analyze_folder", ["analyze", "programs", "--no-plots", "--jobs", "1", *out]
     yield "map", ["map", "--z", "600", *out]
@@ -56,9 +61,9 @@ def commands() -> Iterator[tuple[str, list[str]]]:
     yield "effects_list_json", ["effects", "list", "--json"]
     yield "effects_new", ["effects", "new", "{out}/mine.py"]
     yield "effects_check", ["effects", "check", "{out}/../effects_new/mine.py"]
-    for data in ("compare", "diagnose", "update", "plan"):
-        yield f"{data}_paper", [data, "nist-table1", *out]
-        yield f"{data}_paper_json", [data, "nist-table1", "--out", "{out}/files", "--json"]
+    for command, more in (("compare", []), ("diagnose", []), ("update", ["--add", "joint_compliance"]), ("plan", [])):
+        yield f"{command}_paper", [command, "nist-table1", *more, *out]
+        yield f"{command}_paper_json", [command, "nist-table1", *more, *out, "--json"]
     for hidden, seed in EXERCISES.items():
         folder = f"{{out}}/../rig_{hidden}/exercise"
         yield f"rig_{hidden}", ["rig", "new", "--seed", seed, "--hidden", hidden, "--out", "{out}/exercise"]
@@ -77,6 +82,7 @@ def make(folder: Path, chosen: str) -> None:
     folder.mkdir(parents=True)
     os.chdir(folder)  # the same words for whoever compares
     (folder / "programs").symlink_to(ROOT / "programs")
+    (folder / DATA).symlink_to(ROOT / "toolpath_stiff" / "data" / "machines")
     os.environ.update(OPENBLAS_NUM_THREADS="1", COLUMNS="100")
     sys.path.insert(0, str(ROOT))
     from toolpath_stiff.cli.main import main as tps
@@ -93,11 +99,16 @@ def make(folder: Path, chosen: str) -> None:
         (out / "said.txt").write_text(f"{text}exit code {code}\n", "utf-8")
         print(name, code, flush=True)
     (folder / "programs").unlink()
+    (folder / DATA).unlink()
 
 
 def differences(before: Path, after: Path) -> Iterator[str]:
     """Files that only one side has, or that differ, with the first line that does."""
-    sides = [{path.relative_to(side) for path in side.rglob("*") if path.is_file()} for side in (before, after)]
+    made = {folder.name for folder in after.iterdir()}  # of what was made anew
+    sides = [
+        {path.relative_to(side) for name in made for path in (side / name).rglob("*") if path.is_file()}
+        for side in (before, after)
+    ]
     yield from (f"only {'after' if path in sides[1] else 'before'}: {path}" for path in sorted(sides[0] ^ sides[1]))
     for path in sorted(sides[0] & sides[1]):
         old, new = before / path, after / path

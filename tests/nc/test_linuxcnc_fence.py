@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.linuxcnc import inputs, reader, runner
+from toolpath_stiff.nc.linuxcnc import reader, runner
 from toolpath_stiff.nc.linuxcnc.runner import Limits
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.tables import Offsets

@@ -10,8 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import geometry, interpreter, plain_lines, plain_words
-from toolpath_stiff.nc import frames
+from toolpath_stiff.nc import frames, geometry, interpreter, plain_lines, plain_words
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.codes import modes, points
 from toolpath_stiff.nc.controller import DIALECTS, Controller

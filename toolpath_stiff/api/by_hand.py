@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.api.diagnosis import Data, Noise, Question
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.api.results import machine_by_name
+from toolpath_stiff.results import machine_by_name
 
 if TYPE_CHECKING:
     from toolpath_stiff.inference.evidence import Fit

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.inputs import LONGEST_STEP_MM, Program, pose_si, positive, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.results import FolderResult
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
+from toolpath_stiff.results import FolderResult
 from toolpath_stiff.units import m_from_mm
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
 from toolpath_stiff.api.inputs import FARTHEST_MM, positive
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.api.results import FolderResult, Progress, Result, machine_by_name, one_of, teller
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import options
+from toolpath_stiff.results import FolderResult, Progress, Result, machine_by_name, one_of, teller
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.inputs import Program, origin_word, pose_si, program_from, whole
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.results import FolderResult, Progress, machine_by_name, teller
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import Asked, options
+from toolpath_stiff.results import FolderResult, Progress, machine_by_name, teller
 
 if TYPE_CHECKING:
     import pandas as pd

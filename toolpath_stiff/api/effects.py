@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.results import Progress, Result, machine_by_name, teller
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.results import Progress, Result, machine_by_name, teller
 from toolpath_stiff.stiffness.contract import Effect
 
 if TYPE_CHECKING:

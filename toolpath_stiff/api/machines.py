@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.inputs import Program, pose_si, whole
-from toolpath_stiff.api.results import Result, TextResult, notebook_text, one_of
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.results import Result, TextResult, notebook_text, one_of
 from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:

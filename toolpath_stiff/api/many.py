@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import TABLES, analyze, path_options
-from toolpath_stiff.api.results import Progress, Result, one_of
 from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.processes import ProcessDied, ProcessPool
@@ -33,6 +32,7 @@ from toolpath_stiff.report.batch.programs import (
     report_folders,
 )
 from toolpath_stiff.report.words import counted
+from toolpath_stiff.results import Progress, Result, one_of
 from toolpath_stiff.results_folder import Rules, check_folder, clear_up, write_folder
 
 if TYPE_CHECKING:

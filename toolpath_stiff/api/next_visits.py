@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.results import Result
+from toolpath_stiff.results import Result
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,11 +19,11 @@ from toolpath_stiff.api.inputs import (
     whole,
 )
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
+from toolpath_stiff.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.inputs import FARTHEST_MM, STRONGEST_N, positive, whole
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.results import FolderResult, Progress, Result, counter
 from toolpath_stiff.defaults import FORCE
 from toolpath_stiff.errors import InputError, InputErrors, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.results import FolderResult, Progress, Result, counter
 from toolpath_stiff.toml_reader import shortened
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.inputs import LONGEST_STEP_MM, STRONGEST_N, Program, pose_si, positive, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
+from toolpath_stiff.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.units import (
     Pose,
     m_from_mm,

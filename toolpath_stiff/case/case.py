@@ -42,7 +42,7 @@ from toolpath_stiff.hints import command_line, options
 
 if TYPE_CHECKING:
     from toolpath_stiff.api.effects import EffectDraft
-    from toolpath_stiff.api.results import Progress
+    from toolpath_stiff.results import Progress
 
 
 class Case(Findings):
@@ -524,7 +524,7 @@ class Case(Findings):
 
     def claim(self, effects: str) -> dict[str, Any]:
         """Open the seal of the exercise and score a claim: names of effects with commas, "none" or "outside"."""
-        from toolpath_stiff.api.results import json_text
+        from toolpath_stiff.results import json_text
         from toolpath_stiff.rig.exercise import reveal
 
         found = reveal(self.folder / self._exercise(), effects)

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from toolpath_stiff.api.effects import effects
-from toolpath_stiff.api.results import FolderResult, Progress
 from toolpath_stiff.case.contents import Contents, reading_words
 from toolpath_stiff.case.files import write_files
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.results import FolderResult, Progress
 
 if TYPE_CHECKING:
     from toolpath_stiff.api.correction import Plan, Update

@@ -29,7 +29,7 @@ from toolpath_stiff.units import ShopPose
 if TYPE_CHECKING:
     from toolpath_stiff.api.inputs import Program, Reading
     from toolpath_stiff.api.machines import Machine
-    from toolpath_stiff.api.results import FolderResult, Progress
+    from toolpath_stiff.results import FolderResult, Progress
 
 SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
 ALL_BLOCKS = "all"

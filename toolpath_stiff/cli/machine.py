@@ -238,7 +238,7 @@ def machine(args: argparse.Namespace) -> int:
 
 def _machine_list(args: argparse.Namespace) -> int:
     from toolpath_stiff.api.machines import Machine
-    from toolpath_stiff.api.results import json_text
+    from toolpath_stiff.results import json_text
 
     machines = [Machine.load(name) for name in Machine.names()]
     if args.json:
@@ -250,8 +250,8 @@ def _machine_list(args: argparse.Namespace) -> int:
 
 def _machine_show(args: argparse.Namespace) -> int:
     from toolpath_stiff.api.machines import Machine
-    from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
+    from toolpath_stiff.results import json_text
 
     machine = Machine.load(args.machine)
     if args.json:
@@ -405,8 +405,8 @@ def _effects_list(args: argparse.Namespace) -> int:
 
 
 def _effects_show(args: argparse.Namespace) -> int:
-    from toolpath_stiff.api.results import json_text
     from toolpath_stiff.report.machine import describe_effect, effect_details
+    from toolpath_stiff.results import json_text
     from toolpath_stiff.stiffness.catalogue import find_effect
 
     effect = find_effect(args.name, args.effects)

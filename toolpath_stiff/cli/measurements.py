@@ -182,7 +182,7 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
 def reduce(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
     from toolpath_stiff.api.correction import reduce
-    from toolpath_stiff.api.results import json_text
+    from toolpath_stiff.results import json_text
     from toolpath_stiff.tables import split_name
 
     found = reduce(

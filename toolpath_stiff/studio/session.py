@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import toolpath_stiff as tps
-from toolpath_stiff.api.results import one_of
 from toolpath_stiff.case.case import Case
 from toolpath_stiff.case.contents import reading_words
 from toolpath_stiff.case.steps import Step
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.results import one_of
 from toolpath_stiff.studio.editing import Editing
 from toolpath_stiff.studio.work import Job
 
