@@ -6,17 +6,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
+from toolpath_stiff.api.diagnosis import Data, Diagnosis, NoisePercent, Question, Seed, StrutSpread
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.options import checked
 from toolpath_stiff.results import Progress, Result, machine_by_name, teller
-from toolpath_stiff.stiffness.contract import Effect
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from toolpath_stiff.drafting.draft import Draft
+    from toolpath_stiff.stiffness.contract import Effect
     from toolpath_stiff.stiffness.trial import Trial
 
 
@@ -285,14 +286,15 @@ def effect_template(name: str) -> EffectFile:
 
 
 @machine_by_name
+@checked
 def draft_effect(
     machine: Machine | str | Path,
     data: Data,
     file: str | Path = "missing.py",
     *,
-    noise_percent: Noise = None,
-    strut_spread_percent: float = 1.0,
-    seed: int = 0,
+    noise_percent: NoisePercent = None,
+    strut_spread_percent: StrutSpread = 1.0,
+    seed: Seed = 0,
     progress: Progress | None = None,
 ) -> EffectDraft:
     """Describe what a diagnosis leaves unexplained as an effect file to read, edit and put to the test.

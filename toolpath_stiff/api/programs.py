@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from toolpath_stiff.api.inputs import LONGEST_STEP_MM, STRONGEST_N, Program, pose_si, positive, program_from
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Program, Step, origin_si, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.results import FolderResult, Progress, Result, counter, one_of
+from toolpath_stiff.options import Option, checked
+from toolpath_stiff.results import FolderResult, Progress, Result, counter
 from toolpath_stiff.units import (
-    Pose,
     m_from_mm,
     m_per_s_from_mm_per_min,
     n_per_m_from_n_per_mm,
@@ -28,9 +28,36 @@ if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis as PathAnalysis
     from toolpath_stiff.path import Samples
 
-FASTEST_STRUT_MM_PER_MIN = 1e6
-STIFFEST_N_PER_MM = 1e7
-TABLES = ("csv", "parquet")
+RequiredStiffness = Annotated[
+    float | None,
+    Option(
+        "--require",
+        "N/mm",
+        above=0,
+        at_most=1e7,
+        help="Stiffness that every cutting move must have; those below are listed (exit code 3).",
+    ),
+]
+Partial = Annotated[
+    bool, Option("--partial", help="Keep the reachable samples of a program that leaves the workspace (exit code 1).")
+]
+Compared = Annotated[
+    Machine | str | Path | None, Option("--compare", "MACHINE", help="Another machine to analyze the program on.")
+]
+JOBS = Option(
+    "--jobs",
+    at_least=1,
+    help="Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each "
+    "available CPU.",
+)
+Table = Annotated[str, Option("--format", choices=("csv", "parquet"), help="Format of the samples.")]
+ShowPlunges = Annotated[
+    bool,
+    Option(
+        "--show-plunges",
+        help="Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).",
+    ),
+]
 
 
 class Analysis(FolderResult):
@@ -172,8 +199,9 @@ class Analysis(FolderResult):
             self.path, other=self.on_other, required=self._required, show_plunges=show_plunges
         )
 
+    @checked
     def files(
-        self, *, plots: bool = True, table: str = "csv", show_plunges: bool = False
+        self, *, plots: bool = True, table: Table = "csv", show_plunges: ShowPlunges = False
     ) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps analyze`; samples as "csv" or "parquet"."""
         from toolpath_stiff.report.analysis.summary import files
@@ -181,7 +209,7 @@ class Analysis(FolderResult):
         return files(
             self.path,
             plots=plots,
-            table=one_of("table", table, TABLES),  # type: ignore[arg-type]
+            table=table,  # type: ignore[arg-type]
             required=self._required,
             other=self.on_other,
             show_plunges=show_plunges,
@@ -189,17 +217,18 @@ class Analysis(FolderResult):
         )
 
 
+@checked
 def analyze(
     machine: Machine | str | Path,
     program: Program | str | Path,
     *,
-    origin_mm_deg: Sequence[float] | None = None,
-    load: str = LOAD,
-    step_mm: float = 1.0,
-    force_N: float = FORCE,
-    partial: bool = False,
-    require_N_per_mm: float | None = None,
-    compare_with: Machine | str | Path | None = None,
+    origin_mm_deg: Origin = None,
+    load: LoadDirection = LOAD,
+    step_mm: Step = 1.0,
+    force_N: Force = FORCE,
+    partial: Partial = False,
+    require_N_per_mm: RequiredStiffness = None,
+    compare_with: Compared = None,
     progress: Progress | None = None,
 ) -> Analysis:
     r"""Stiffness along the path of a program.
@@ -278,15 +307,15 @@ def path_options(
 
     parse_load(load)
     options: dict[str, Any] = {
-        "origin": None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
+        "origin": origin_si(origin_mm_deg),
         "load": load,
-        "step": m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
-        "force": positive("force", force_N, "N", STRONGEST_N),
+        "step": m_from_mm(step_mm),
+        "force": force_N,
         "partial": partial,
     }
     required = None
     if require_N_per_mm is not None:
-        required = n_per_m_from_n_per_mm(positive("required", require_N_per_mm, "N/mm", STIFFEST_N_PER_MM))
+        required = n_per_m_from_n_per_mm(require_N_per_mm)
     return options, required
 
 
@@ -361,9 +390,8 @@ class SampledPath(Result):
         return write_atomically(file, self.csv())
 
 
-def sample_path(
-    program: Program | str | Path, *, origin_mm_deg: Sequence[float] | None = None, step_mm: float = 1.0
-) -> SampledPath:
+@checked
+def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, step_mm: Step = 1.0) -> SampledPath:
     r"""The tool's path, sampled along its true shape.
 
     Parameters
@@ -390,8 +418,8 @@ def sample_path(
     from toolpath_stiff.path import place, sample_moves
 
     part = program_from(program)
-    asked: Pose | None = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
-    step = m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM))
+    asked = origin_si(origin_mm_deg)
+    step = m_from_mm(step_mm)
     read = part.moves(asked)
     origin = asked or read.origin
     samples = sample_moves(place(read.moves, origin), step=step, origin=origin)
@@ -467,13 +495,14 @@ class ProgramCheck(Result):
         return f"{self._document['program']}, {counted(len(self.errors), 'error') if self.errors else 'no errors'}"
 
 
+@checked
 def check(
     program: Program | str | Path,
     machine: Machine | str | Path | None = "nist",
     *,
-    origin_mm_deg: Sequence[float] | None = None,
-    step_mm: float = 1.0,
-    strut_speed_mm_per_min: float | None = None,
+    origin_mm_deg: Origin = None,
+    step_mm: Step = 1.0,
+    strut_speed_mm_per_min: Annotated[float | None, Option("--strut-speed", "mm/min", above=0, at_most=1e6)] = None,
 ) -> ProgramCheck:
     r"""What a program uses, what is not understood, extents and times; with a machine its reach and strut speeds.
 
@@ -510,16 +539,14 @@ def check(
         raise InputError(f"{both_names('--strut-speed')} without a machine", hint="name one with --machine")
     speed = None
     if strut_speed_mm_per_min is not None:
-        speed = m_per_s_from_mm_per_min(
-            positive("strut speed", strut_speed_mm_per_min, "mm/min", FASTEST_STRUT_MM_PER_MIN)
-        )
+        speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
     return ProgramCheck(
         check_program(
             part.lines,
             part.name,
             machine=None if on is None else on.model.machine,
-            origin=None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
-            step=m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
+            origin=origin_si(origin_mm_deg),
+            step=m_from_mm(step_mm),
             strut_speed=speed,
             controller=part.controller,
             **part.options,

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si, positive
+from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.case.contents import reading_arguments
@@ -42,7 +42,8 @@ from toolpath_stiff.hints import command_line, options
 
 if TYPE_CHECKING:
     from toolpath_stiff.api.effects import EffectDraft
-    from toolpath_stiff.results import Progress
+    from toolpath_stiff.options import arguments_of
+from toolpath_stiff.results import Progress
 
 
 class Case(Findings):
@@ -445,11 +446,11 @@ class Case(Findings):
 
     def require(self, stiffness_N_per_mm: float) -> None:
         """Ask a stiffness of every cut; 0: none."""
-        from toolpath_stiff.api.programs import STIFFEST_N_PER_MM
+        from toolpath_stiff.api.programs import analyze
 
         asked = finite("required", stiffness_N_per_mm)
         if asked:
-            positive("required", asked, "N/mm", STIFFEST_N_PER_MM)
+            arguments_of(analyze)["require_N_per_mm"].check(asked)
         self.record(
             "require",
             f"{asked:g} N/mm required",
