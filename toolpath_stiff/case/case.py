@@ -39,10 +39,10 @@ from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.options import arguments_of
 
 if TYPE_CHECKING:
     from toolpath_stiff.api.effects import EffectDraft
-    from toolpath_stiff.options import arguments_of
 from toolpath_stiff.results import Progress
 
 
