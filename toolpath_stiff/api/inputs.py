@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import both_names, options
-from toolpath_stiff.options import Option, checked, numbers
+from toolpath_stiff.options import Option, arguments_of, checked, numbers
 from toolpath_stiff.units import Pose, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
@@ -248,6 +248,9 @@ class Program:
         >>> tps.Program.from_text("G1 X40 F300\nM2", name="slot.nc", dialect="linuxcnc")
         <Program slot.nc: 2 lines>
         """
+        feed = reading.get("feed_mm_per_min")
+        if feed is not None:
+            arguments_of(cls.read)["feed_mm_per_min"].check(feed)
         said = _said(**reading)
         return cls(name, None, *_control(said, reading.get("block_delete", False)), text, said)
 
