@@ -15,7 +15,7 @@ A tree, so that a caller can catch as much as it can handle::
       InputErrors           several input errors together
       EffectFault           a user's own effect breaks the contract
 
->>> from toolpath_stiff.machine import load_machine
+>>> from toolpath_stiff.machine.file import load_machine
 >>> try:
 ...     load_machine("nits")
 ... except MachineFileError as error:
@@ -259,7 +259,7 @@ class PoseError(InputError):
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> from toolpath_stiff.machine import forward_kinematics
+    >>> from toolpath_stiff.machine.kinematics import forward_kinematics
     >>> try:
     ...     forward_kinematics(tps.Machine.load("nist").model.machine, [[1.0] * 6], [[0.0, 0.0, 0.8, 0.0, 0.0, 0.0]])
     ... except tps.PoseError as error:

@@ -61,7 +61,7 @@ class Samples:
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> samples = sample_moves(parse_program("G21 G90 F600\nG0 Z5\nG1 Z0\nX40\nM30\n").moves, step=0.01)
     >>> samples
     <Samples: 9 samples, 50 mm of path>
@@ -117,7 +117,7 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> moves = parse_program("G21 G90 F600\nG1 X40\nM30\n").moves
     >>> placed = place(moves, (0.1, 0.0, 0.8, 0.0, 0.0, np.pi / 2))
     >>> placed.end[:, :3].round(9).tolist()  # m
@@ -168,7 +168,7 @@ def move_durations(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Flo
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> moves = parse_program("G21 G90 F600\nG0 Z5\nG1 Z0\nX40\nM30\n").moves
     >>> move_durations(moves).round(3).tolist()  # s; the rapid at 10 m/min
     [0.03, 0.5, 4.0]
@@ -202,7 +202,7 @@ def sample_moves(
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> moves = parse_program("G21 G90 F600\nG2 X20 Y0 I10 J0\nM30\n").moves
     >>> samples = sample_moves(place(moves, (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)), step=0.016)
     >>> (samples.position * 1e3).round(3).tolist()  # mm
@@ -354,7 +354,7 @@ def path_columns(samples: Samples, rows: slice = slice(None)) -> dict[str, NDArr
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> samples = sample_moves(parse_program("G21 G90 F600\nG1 X40\nM30\n").moves, step=0.02)
     >>> columns = path_columns(samples)
     >>> columns["x_mm"].tolist(), columns["motion"].tolist()

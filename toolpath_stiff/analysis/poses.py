@@ -109,7 +109,7 @@ def evaluate(
     Examples
     --------
     >>> from toolpath_stiff.analysis.loads import parse_load
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.stiffness.model import build_model
     >>> position, zeros = np.array([[0.0, 0.0, 0.8], [0.2, 0.0, 0.8]]), np.zeros((2, 3))
     >>> found = evaluate(build_model(load_machine("nist")), position, zeros, zeros, load=parse_load("x"))
@@ -455,7 +455,7 @@ def map_stiffness(
     Examples
     --------
     >>> from toolpath_stiff.analysis.loads import parse_load
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.stiffness.model import build_model
     >>> found = map_stiffness(build_model(load_machine("nist")), (-0.1, 0), (-0.1, 0), [0.8], parse_load("x"), points=3)
     >>> found.stiffness.shape, round(float(found.stiffness[0, 2, 2]) / 1e3)  # N/mm in the middle

@@ -130,7 +130,7 @@ def compare(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.readings.measurements import read_measurements
     >>> nist = load_machine("nist")
     >>> found = compare(nist, read_measurements("nist-table1", nist), noise=0.05, draws=200)

@@ -230,7 +230,7 @@ def diagnose(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.readings.measurements import read_measurements
     >>> nist = load_machine("nist")
     >>> found = diagnose(nist, read_measurements("nist-table1", nist), noise=0.10, plan_next=False)

@@ -110,7 +110,7 @@ def run_case_study(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.stiffness.model import build_model
     >>> study = run_case_study(build_model(load_machine("nist")), step=0.02)
     >>> [found["holds"] for found in study.summary["conclusions"]]

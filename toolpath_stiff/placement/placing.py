@@ -124,8 +124,8 @@ def place_program(task: Task, progress: Callable[[int, int], None] | None = None
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.machine.file import load_machine
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> from toolpath_stiff.stiffness.model import build_model
     >>> present = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
     >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc", origin=present)

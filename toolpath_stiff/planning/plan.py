@@ -429,7 +429,7 @@ def plan(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> found = plan(load_machine("nist"), between=("spindle_compliance", "none"), n=2)
     >>> len(found.plan.chosen), found.plan.separable
     (2, True)

@@ -101,7 +101,7 @@ def rewrite_program(
     Examples
     --------
     >>> from math import pi
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> program = parse_program("G21 G90 F600 (slot)\nG0 X0 Y0 Z5\nG1 Z-1\nX40\nM30\n", "slot.nc")
     >>> rewritten = rewrite_program(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
     >>> print(rewritten.text, end="")
@@ -280,7 +280,7 @@ def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> Of
     Examples
     --------
     >>> from math import pi
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> program = parse_program("G21 G90 F600\nG1 X40\nM30\n", "slot.nc")
     >>> blocks = offset_blocks(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2))
     >>> blocks.linuxcnc
