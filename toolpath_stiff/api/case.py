@@ -39,7 +39,7 @@ from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line, options
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class Case(Findings):
         (<Machine genhexkins: 6 struts, no effects>, 1)
         """
         place = Path(folder)
-        if (place / CASE_FILE).is_file():
+        if is_file(place / CASE_FILE):
             found = cls(place, *read_case(place / CASE_FILE))
             found.check_files()
         else:
