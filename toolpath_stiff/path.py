@@ -58,8 +58,8 @@ class Samples:
     tangent
         (n, 3) unit vector of the tip's motion; 0 where only rotary axes move.
     weight
-        (n,) m, the length of cutting path that the sample stands for (trapezoidal rule within its move);
-        0 for rapids and for moves of the rotary axes alone.
+        (n,) m, the length of cutting path that the sample stands for (trapezoidal rule within its move, apart for
+        plunges and cuts where a sample stands between them); 0 for rapids and for moves of the rotary axes alone.
     feed
         (n,) m/s; nan for rapids.
 
@@ -384,7 +384,11 @@ def _sample_block(
     if len(border[0]):
         before = np.maximum(np.diff(u, prepend=0.0), 0.0)  # 0 at the first sample of a move
         uneven = np.isin(move, border[0])
-        into.weight[uneven] = (0.5 * (before + np.append(before[1:], 0.0)) * columns["length"][move])[uneven]
+        # What lies between the border and a sample of a plunge is plunged, all of it.
+        plunge = np.abs(along_tool_axis(into.tangent, angles)) >= BORDER
+        share = 0.5 + 0.5 * np.diff(plunge.astype(float), prepend=float(plunge[0]))
+        after = np.append((before * (1.0 - share))[1:], 0.0)
+        into.weight[uneven] = ((before * share + after) * columns["length"][move])[uneven]
 
 
 def _fastest_part(moves: Moves) -> FloatArray:

@@ -38,8 +38,8 @@ from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si, positiv
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.defaults import MACHINE
-from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.files import is_file, read_bytes
+from toolpath_stiff.errors import FileError, InputError, TpsError
+from toolpath_stiff.files import read_bytes, reason
 from toolpath_stiff.hints import command_line, options
 
 if TYPE_CHECKING:
@@ -109,7 +109,11 @@ class Case(Findings):
         (<Machine genhexkins: 6 struts, no effects>, 1)
         """
         place = Path(folder)
-        if is_file(place / CASE_FILE):
+        try:
+            there = (place / CASE_FILE).is_file()
+        except OSError as error:  # a name that is too long, a circle of links
+            raise FileError(f"cannot open the case {str(folder)!r}: {reason(error)}") from None
+        if there:
             found = cls(place, *read_case(place / CASE_FILE))
             found.check_files()
         else:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-import math
 import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -28,6 +27,7 @@ from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.hints import parted
 from toolpath_stiff.report.figure import Drawing
 from toolpath_stiff.stiffness.model import machine_words
+from toolpath_stiff.units import number as number
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -49,14 +49,6 @@ Row = tuple[str, Sequence[str]]  # class of the row, its cells: text, or `Markup
 INDENT = 2  # columns to the left of the tables
 MOST_ROWS = 40  # all are in --json
 CHECK_FIGURES = ("cutting mm", "time", "X", "Y", "Z")
-
-
-def number(value: float | None, digits: int = 0) -> str:
-    """A figure with thin groups of thousands ("45 123"), "-" where there is none."""
-    if value is None or not math.isfinite(value):
-        return "-"
-    text = f"{value:,.{digits}f}".replace(",", " ")
-    return text.replace("-", "", 1) if float(text.replace(" ", "")) == 0.0 else text
 
 
 def counted(count: float, thing: str) -> str:

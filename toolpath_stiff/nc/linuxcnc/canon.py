@@ -156,7 +156,7 @@ class Follower:
             missing, hint = "which the tool table does not give", "give it in a tool table (--tools FILE)"
             return self.fail(self.reading, f"G43 needs a tool's length, {missing}", hint=hint)
         named = LENGTH_WORD.search(words)
-        tool = int(named[1]) if named else self.tool
+        tool = int(named[1]) if named and int(named[1]) else self.tool  # H0: that of the spindle
         hint = "give one with --tools FILE" if "H" in words and not named else tool_table_hint(tool)
         return self.fail(self.reading, "G43 needs a tool's length, and there is no tool table", hint=hint)
 
