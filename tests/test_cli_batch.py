@@ -222,7 +222,7 @@ class Trap(Effect):
 def trap(shop, seconds):
     (shop / "trap.py").write_text(TRAP)
     (shop / "trap.toml").write_text(_nist() + f'\n[[effect]]\nname = "trap"\nseconds_s = {seconds}\n')
-    return ["--machine", "trap.toml", "--effects", "trap.py"]
+    return ["--machine", "trap.toml", "--effects", "trap.py", "--allow-unchecked-effects"]
 
 
 def test_a_killed_process_is_a_failing_program(shop, capsys):

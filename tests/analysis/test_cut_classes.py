@@ -17,6 +17,7 @@ from toolpath_stiff.analysis.statistics import FIGURES, stiffness_figures, weake
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.case_study import case_study_program, wavy_program
+from toolpath_stiff.stiffness.model import build_model
 
 TANGENTIAL = parse_load("tangential")
 
@@ -181,3 +182,14 @@ def test_the_table_of_samples_says_the_class_whatever_the_load():
         frame = analyzed(text, load=load).to_frame()
         found = frame.groupby("line")["cut"].agg(lambda cut: "".join(sorted(set(cut))))
         assert found.to_dict() == {1: "", 2: "plunge", 3: "across", 4: ""}, load
+
+
+@pytest.mark.parametrize("arc", ["G18 G3 X20 Z25 I20 K0", "G19 G2 Y20 Z25 J20 K0", "G1 Z30 B20"])
+def test_the_range_of_cuts_that_begin_within_a_plunge_does_not_depend_on_the_step(arc):
+    model, program = build_model(load_machine("nist")), parse_program(f"G21 G90 F600\nG0 Z5\n{arc}\nM30\n")
+    origin = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
+    coarse, fine = (
+        [stiffness_figures(found, found.headline)[key] for key in ("range_N_per_mm", "mean_N_per_mm")]
+        for found in (analyze(model, program, origin=origin, step=step) for step in (1e-3, 5e-5))
+    )
+    assert coarse == pytest.approx(fine, rel=1e-3)

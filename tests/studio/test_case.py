@@ -454,3 +454,10 @@ def test_a_table_that_cannot_be_read_leaves_nothing(case, tmp_path):
         with pytest.raises(tps.InputError):
             case.read_programs(**reading)
     assert [one for one in sorted(case.folder.rglob("*")) if one not in files and one.is_file()] == []
+
+
+def test_a_folder_that_no_system_can_have_is_refused_in_one_line(tmp_path, capsys):
+    assert main(["studio", "--no-browser", "--case", str(tmp_path / ("n" * 300))]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("tps: error: cannot open the case ") and told.endswith(": File name too long\n")
+    assert not list(tmp_path.iterdir())

@@ -36,8 +36,8 @@ from toolpath_stiff.case.files import (
 from toolpath_stiff.case.findings import Findings
 from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES, read_case
 from toolpath_stiff.defaults import MACHINE
-from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.errors import FileError, InputError, TpsError
+from toolpath_stiff.files import read_bytes, reason
 from toolpath_stiff.hints import command_line, options
 
 if TYPE_CHECKING:
@@ -107,7 +107,11 @@ class Case(Findings):
         (<Machine genhexkins: 6 struts, no effects>, 1)
         """
         place = Path(folder)
-        if (place / CASE_FILE).is_file():
+        try:
+            there = (place / CASE_FILE).is_file()
+        except OSError as error:  # a name that is too long, a circle of links
+            raise FileError(f"cannot open the case {str(folder)!r}: {reason(error)}") from None
+        if there:
             found = cls(place, *read_case(place / CASE_FILE))
             found.check_files()
         else:

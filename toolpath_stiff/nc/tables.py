@@ -23,6 +23,14 @@ HOMES = ("G28", "G30")
 ADDITIONAL = re.compile(r"(G54\.1|G154) ?P([1-9]\d{0,2})")
 
 
+def tool_table_hint(tool: int) -> str:
+    """How to give the length of a tool where there is no tool table, with one to copy."""
+    return (
+        "give one with --tools tools.csv, or drop it on the studio's page first; with the length in mm:\n"
+        f"tool,length_mm\n{tool},LENGTH"
+    )
+
+
 @dataclass
 class ToolEntry:
     """A tool: length, diameter and stick-out (out of its holder) in mm, nan where the table does not say."""

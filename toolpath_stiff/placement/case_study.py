@@ -27,7 +27,7 @@ from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated, machine_words
 from toolpath_stiff.tables import Columns, read_table
-from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, number, rad_from_deg
 
 PROGRAM = "case_study.nc"
 LOW_MM, HIGH_MM = 400.0, 1200.0
@@ -199,9 +199,9 @@ def read_regions(file: str) -> dict[str, Region]:
             f"column {missing[0]} is missing", expected=",".join(REGION_COLUMNS), file=file, line=table.heading_line
         )
     found: dict[str, Region] = {}
-    for number, (line, cells) in enumerate(table.rows, 1):
+    for row_number, (line, cells) in enumerate(table.rows, 1):
         row = dict(zip(table.heading, cells, strict=False))
-        name = row.get("region") or str(number)
+        name = row.get("region") or str(row_number)
         if name in found:
             raise TableError(f"region {name} stands twice", file=file, line=line)
         try:
@@ -235,7 +235,7 @@ def _conclusions(
     def rises(key: str) -> tuple[bool | None, str]:
         steps = [(figures[low][key], figures[high][key]) for low, high in in_height]
         words = "; ".join(
-            f"region {low} to {high}: {a:.0f} to {b:.0f} N/mm"
+            f"region {low} to {high}: {number(a)} to {number(b)} N/mm"
             for (low, high), (a, b) in zip(in_height, steps, strict=True)
         )
         return (all(b > a for a, b in steps) if steps else None), words or "no two regions differ in height alone"
@@ -247,8 +247,8 @@ def _conclusions(
         for a, b in in_plane
     ]
     same_words = "; ".join(
-        f"regions {pair}: means apart by {100 * gap:.2f} %, ranges {one['range_N_per_mm']:.0f} and "
-        f"{two['range_N_per_mm']:.0f} N/mm"
+        f"regions {pair}: means apart by {100 * gap:.2f} %, ranges {number(one['range_N_per_mm'])} and "
+        f"{number(two['range_N_per_mm'])} N/mm"
         for gap, one, two, pair in apart
     )
     return [
@@ -352,11 +352,11 @@ def study_text(study: CaseStudy) -> str:
         place = f"{row['x_mm']:g}, {row['y_mm']:g}, {row['z_mm']:g}"
         lines.append(
             f"| {row['region']} | {place} | {row['rotation_deg']:g} deg | "
-            f"{row['mean_N_per_mm']:.0f} ({row['range_N_per_mm']:.0f}) |"
+            f"{number(row['mean_N_per_mm'])} ({number(row['range_N_per_mm'])}) |"
         )
     lines += ["", "## The paper's conclusions", ""]
-    for number, found in enumerate(summary["conclusions"], 1):
-        lines.append(f"{number}. {found['statement']}: {HOLDS[found['holds']]}. {found['numbers']}.")
+    for row_number, found in enumerate(summary["conclusions"], 1):
+        lines.append(f"{row_number}. {found['statement']}: {HOLDS[found['holds']]}. {found['numbers']}.")
     lines += ["", "## Where they stop holding", "", *_limits_words(summary, study.is_own)]
     if study.is_own:
         return "\n".join([*lines, ""])
@@ -371,7 +371,7 @@ def study_text(study: CaseStudy) -> str:
     ]
     for wave in summary["non_planar"]:
         low, high = wave["means_apart_at_one_height_percent"]
-        ranges = ", ".join(f"{row['range_N_per_mm']:.0f}" for row in wave["regions"])
+        ranges = ", ".join(number(row["range_N_per_mm"]) for row in wave["regions"])
         lines.append(f"| {wave['amplitude_mm']:g} | {low:.2f} % | {high:.2f} % | {ranges} |")
     return "\n".join([*lines, ""])
 

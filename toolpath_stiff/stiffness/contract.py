@@ -324,6 +324,7 @@ class Effect:
         Examples
         --------
         >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
         >>> [tps.effects()["weak_strut"].seen_by(MeasuringLoop(kind)) for kind in ("tip", "strut", "spindle")]
         [1.0, 1.0, 0.0]
         """

@@ -11,7 +11,7 @@ from toolpath_stiff.nc.codes.code import LENGTH, M_TOOL, OFFSET, ONCE, TOOL, Ali
 from toolpath_stiff.nc.codes.motion import know_position
 from toolpath_stiff.nc.codes.points import axis_words, forget_polar, refuse_while_rotated, zero_moved
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, ToolEntry, WorkOffset
+from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, ToolEntry, WorkOffset, tool_table_hint
 from toolpath_stiff.nc.words import Word
 
 FIRST_NUMBERED = 110  # G110 to G129
@@ -409,8 +409,7 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
         raise block.fail(
             word,
             f"needs the length of tool {tool}, and there is no tool table",
-            hint="give one with --tools tools.csv, or drop it on the studio's page first; with the length in "
-            f"mm:\ntool,length_mm\n{tool},LENGTH",
+            hint=tool_table_hint(tool),
         )
     if tool not in state.tools or math.isnan(state.tools[tool].length):
         raise block.fail(word, f"needs the length of tool {tool}", hint="add it to the tool table (--tools FILE)")

@@ -18,7 +18,7 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, step_in_words
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
-from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.tables import ToolEntry, tool_table_hint
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -31,6 +31,7 @@ MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
 HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
+LENGTH_WORD = re.compile(r"H0*(\d+)(?![\d.])")
 DIAMETER_WORD = re.compile(r"D0*(\d+)(?![\d.])")
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
@@ -149,16 +150,23 @@ class Follower:
         self.rotation = rotation
         self.frame_changed = True
 
+    def _no_length(self, words: str) -> InputError:
+        """Of a G43 without a length: which tool's, unless H is computed."""
+        if self.tools is not None:
+            missing, hint = "which the tool table does not give", "give it in a tool table (--tools FILE)"
+            return self.fail(self.reading, f"G43 needs a tool's length, {missing}", hint=hint)
+        named = LENGTH_WORD.search(words)
+        tool = int(named[1]) if named and int(named[1]) else self.tool  # H0: that of the spindle
+        hint = "give one with --tools FILE" if "H" in words and not named else tool_table_hint(tool)
+        return self.fail(self.reading, "G43 needs a tool's length, and there is no tool table", hint=hint)
+
     def _use_tool_length_offset(self, inner: str) -> None:
+        words = self._words(self.reading)
         x, y, z, *rest = (v * self.scale for v in _numbers(inner))
         if x or y or any(rest):
             raise self.fail(self.reading, "a tool offset in other directions than Z", "a length along Z alone")
         if z < LENGTH_UNKNOWN_BELOW_MM:
-            missing = "and there is no tool table" if self.tools is None else "which the tool table does not give"
-            raise self.fail(
-                self.reading, f"G43 needs a tool's length, {missing}", hint="give it in a tool table (--tools FILE)"
-            )
-        words = self._words(self.reading)
+            raise self._no_length(words)
         if self.renamed and "G43" in words and "H" not in words and "G43.1" not in words:
             raise self.fail(self.reading, "G43 after M61: LinuxCNC's rs274 takes the length of the tool before", "H")
         self.position = [*self.position[:2], self.position[2] + self.tool_z - z, *self.position[3:]]
