@@ -16,7 +16,7 @@ from toolpath_stiff.report.analysis import page as page_module
 from toolpath_stiff.report.analysis.page import NONE, OUT_OF_REACH, PLUNGE, page, page_rows
 from toolpath_stiff.report.analysis.summary import summary_with_options
 from toolpath_stiff.report.pages import json_for_script
-from toolpath_stiff.report.words import number
+from toolpath_stiff.units import number
 
 EVIL = "</script><script>alert(1)</script>"
 VOID = {"meta", "input", "br", "hr", "img", "link"}

@@ -6,7 +6,8 @@ import pytest
 
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.report.analysis.summary import MOST_OPERATIONS, compare_summaries, comparison_table, terminal_table
-from toolpath_stiff.report.words import WIDTH, duration, number
+from toolpath_stiff.report.words import WIDTH, duration
+from toolpath_stiff.units import number
 
 
 @pytest.fixture(scope="module")

@@ -148,7 +148,7 @@ class Analysis(FolderResult):
         return text(self._document, self.path.program.source, other)
 
     def _short(self) -> str:
-        from toolpath_stiff.report.words import number
+        from toolpath_stiff.units import number
 
         found = self._document
         mean, low = (number(found[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))

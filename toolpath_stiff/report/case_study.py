@@ -19,8 +19,7 @@ from toolpath_stiff.report.figure import (
     new_figure,
     picture,
 )
-from toolpath_stiff.report.words import number
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

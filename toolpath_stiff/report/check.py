@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from toolpath_stiff.report.words import aligned, duration, first_column_fitted, number, plain
+from toolpath_stiff.report.words import aligned, duration, first_column_fitted, plain
+from toolpath_stiff.units import number
 
 INDENT = 2  # columns to the left of the tables
 

@@ -14,7 +14,8 @@ from toolpath_stiff.hints import parted
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.fits import scatter_text
 from toolpath_stiff.inference.noise import GUESSES
-from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, number, plain, shortened
+from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, plain, shortened
+from toolpath_stiff.units import number
 
 if TYPE_CHECKING:
     from toolpath_stiff.diagnosis.document import DiagnosisDocument

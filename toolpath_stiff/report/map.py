@@ -16,9 +16,9 @@ from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, page_colours, picture
 from toolpath_stiff.report.pages import render
-from toolpath_stiff.report.words import machine_text, number, plain
+from toolpath_stiff.report.words import machine_text, plain
 from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -34,8 +34,8 @@ from toolpath_stiff.report.painting import (
     word_font,
     write_word,
 )
-from toolpath_stiff.report.words import number, plain, shortened
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import plain, shortened
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

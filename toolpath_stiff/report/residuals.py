@@ -24,8 +24,8 @@ from toolpath_stiff.report.figure import (
     new_figure,
 )
 from toolpath_stiff.report.painting import add_scales, painted_axes
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain, shortened
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -30,14 +30,13 @@ from toolpath_stiff.report.words import (
     duration,
     headline_text,
     length_in_moves,
-    number,
     only_plunges,
     plain,
     plunges_beside,
     shortened,
     span_of,
 )
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis

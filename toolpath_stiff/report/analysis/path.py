@@ -22,8 +22,7 @@ from toolpath_stiff.report.figure import (
     picture,
 )
 from toolpath_stiff.report.painting import add_scales, add_strokes, label_places, new_pen, paint, painted_axes
-from toolpath_stiff.report.words import number
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -21,13 +21,12 @@ from toolpath_stiff.report.words import (
     labelled,
     length_in_moves,
     machine_text,
-    number,
     only_plunges,
     plain,
     plunges_beside,
     shortened,
 )
-from toolpath_stiff.units import n_per_mm_from_n_per_m
+from toolpath_stiff.units import n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis.results import Analysis

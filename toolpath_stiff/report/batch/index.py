@@ -18,7 +18,8 @@ from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.batch.programs import RESERVED, _figure, summary_csv, terminal_summary
 from toolpath_stiff.report.pages import markup, render
-from toolpath_stiff.report.words import ONLY_PLUNGES, counted, duration, number, only_plunges, plain, shortened
+from toolpath_stiff.report.words import ONLY_PLUNGES, counted, duration, only_plunges, plain, shortened
+from toolpath_stiff.units import number
 
 if TYPE_CHECKING:
     from toolpath_stiff.report.batch.programs import Outcome

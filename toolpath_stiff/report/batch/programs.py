@@ -16,7 +16,8 @@ from typing import Any
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.report.words import counted, duration, number, only_plunges, plain, shortened
+from toolpath_stiff.report.words import counted, duration, only_plunges, plain, shortened
+from toolpath_stiff.units import number
 
 # Endings of NC programs and of nothing else: `.txt` is as often a note or a tool list.
 NC_ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min")

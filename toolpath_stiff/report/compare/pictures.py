@@ -12,8 +12,8 @@ from toolpath_stiff.comparison.residuals import directions, planes
 from toolpath_stiff.inference.fits import deviation_percent
 from toolpath_stiff.report.figure import FAINT, INK, MUTED, UNREACHABLE_RED, WITHIN, drawn, house_style, new_figure
 from toolpath_stiff.report.residuals import BAND, DIRECTION_COLOURS, RESIDUAL_MAP
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
-from toolpath_stiff.units import n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain, shortened
+from toolpath_stiff.units import n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -39,8 +39,8 @@ from toolpath_stiff.report.explanations import (
 from toolpath_stiff.report.loops import loops_section
 from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
 from toolpath_stiff.report.residuals import before_after_png
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, machine_text, number
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, machine_text
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from toolpath_stiff.diagnosis.diagnose import Diagnosis

@@ -19,8 +19,8 @@ from toolpath_stiff.placement.paths import DrawnPath, drawn_path
 from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, setup_sheet, workspace_picture
-from toolpath_stiff.report.words import machine_text, number, plain
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import machine_text, plain
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from toolpath_stiff.placement.placing import Placed

@@ -16,8 +16,8 @@ from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.placement.document import FIGURES
 from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.report.profile import profile_curve
-from toolpath_stiff.report.words import machine_text, number, plain
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import machine_text, plain
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,7 +17,8 @@ from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.report.pages import bullets, hint_list, markup, picture, readings_page, section, table
 from toolpath_stiff.report.residuals import before_after_png
 from toolpath_stiff.report.update.pictures import error_ladder_png, figure3_png
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, machine_text, number, plain
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, machine_text, plain
+from toolpath_stiff.units import number
 
 if TYPE_CHECKING:
     from toolpath_stiff.correction.document import LawEntry, StepEntry, UpdateDocument
