@@ -1,4 +1,4 @@
-"""The house in figures that folding cannot please: `house.py ROOT [--runs] [--places]`; 1 where one is above its budget.
+"""The house in figures that folding cannot please: `house.py ROOT [--runs] [--places]`; 1 where one is too high.
 
 Counted by syntax tree and tokens: no line is longer, shorter or hidden for it.
 """
