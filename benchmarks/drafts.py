@@ -30,8 +30,8 @@ from benchmarks.diagnosis_bars import Figure, share
 from benchmarks.diagnosis_cases import machine
 from benchmarks.diagnosis_tables import bars_table, summary
 from benchmarks.pages import write_page
+from toolpath_stiff.correction.draft import draft
 from toolpath_stiff.diagnosis.diagnose import diagnose
-from toolpath_stiff.drafting.draft import draft
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.judgement import judge
@@ -88,18 +88,18 @@ def _drafted(job: Job, folder: Path) -> dict[str, Any]:
     file = folder / "old.csv"
     file.write_text(exercise.csv_text({name: np.asarray(values)[old] for name, values in case.rows.items()}))
     before = diagnose(machine(), read_measurements(file, machine()), noise=noise, plan_next=False)
-    made = draft(before, "missing.py")
+    made = draft(before, "missing.toml")
     links = [] if not made.text or before.portrait is None else [one.term.link for one in before.portrait.terms]
     truth = [link for effect in case.truth["effects"] for link in effect["links"]]
     record = {"verdict": before.verdict, "drafted": list(made.effects), "links": links, "truth": truth, "judged": {}}
     if not made.text:
         return record
-    (folder / "missing.py").write_text(made.text)
+    (folder / "missing.toml").write_text(made.text)
     for what, table in tables.items():
         mixed = {n: np.where(old, np.asarray(case.rows[n]), np.asarray(table[n])) for n in case.rows}
         file = folder / f"{what}.csv"
         file.write_text(exercise.csv_text(mixed))
-        record["judged"][what] = _judged(file, str(folder / "missing.py"), noise)
+        record["judged"][what] = _judged(file, str(folder / "missing.toml"), noise)
     return record
 
 

@@ -62,8 +62,8 @@ PAIRS = {
     "machine recover --starts 2": lambda: tps.recover_geometry(starts=2),
     "machine check nist.toml": lambda: tps.Machine.load("nist.toml").check(),
     "effects list": tps.effects,
-    "effects draft nist-table1 --noise 20 -o missing.py": lambda: tps.draft_effect(
-        "nist", "nist-table1", "missing.py", noise_percent=20
+    "effects draft nist-table1 --noise 20 -o missing.toml": lambda: tps.draft_effect(
+        "nist", "nist-table1", "missing.toml", noise_percent=20
     ),
 }
 NO_PICTURES = ("analyze", "map", "place", "case-study", "compare", "diagnose", "update", "plan")

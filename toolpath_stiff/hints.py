@@ -128,10 +128,10 @@ class Asked:
         name = NUMBERED.sub("", stem) + "-updated" + (f"-{number}" if number > 1 else "") + ".toml"
         return str(path.with_name(name))
 
-    def new_effect(self, stem: str = "my_effect") -> str:
+    def new_effect(self, stem: str = "my_effect", ending: str = ".py") -> str:
         """A name for a file with an effect of the user's own that is not among the given ones."""
         taken, number = {PurePath(file).name for file in self.effects}, 1
-        while (name := f"{stem}{f'_{number}' if number > 1 else ''}.py") in taken:
+        while (name := f"{stem}{f'_{number}' if number > 1 else ''}{ending}") in taken:
             number += 1
         return name
 

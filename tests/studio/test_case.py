@@ -222,12 +222,12 @@ def test_what_no_effect_explains_is_drafted_and_competes(tmp_path):
     case.start_exercise(5, hidden="saddle_overhang")  # gives way along X as y squared: not in the catalogue
     drafted = case.draft()
     assert drafted.name == "missing"
-    assert case.state.effects == ("effects/missing.py",)
+    assert case.state.effects == ("effects/missing.toml",)
     assert [step.kind for step in case.history[-2:]] == ["draft", "effects"]
-    line, text = case.history[-2].command, (case.folder / "effects/missing.py").read_text()
+    line, text = case.history[-2].command, (case.folder / "effects/missing.toml").read_text()
     assert shlex.split(line)[:3] == ["tps", "effects", "draft"]
     assert text == drafted.text
-    assert "missing" in [effect.name for effect in tps.effects([case.path("effects/missing.py")]).effects]
+    assert "missing" in [effect.name for effect in tps.effects([case.path("effects/missing.toml")]).effects]
     case.undo()
     assert case.state.effects == ()
 

@@ -16,7 +16,7 @@ from toolpath_stiff.stiffness.contract import Effect
 if TYPE_CHECKING:
     import pandas as pd
 
-    from toolpath_stiff.drafting.draft import Draft
+    from toolpath_stiff.correction.draft import Draft
     from toolpath_stiff.stiffness.trial import Trial
 
 
@@ -288,7 +288,7 @@ def effect_template(name: str) -> EffectFile:
 def draft_effect(
     machine: Machine | str | Path,
     data: Data,
-    file: str | Path = "missing.py",
+    file: str | Path = "missing.toml",
     *,
     noise_percent: Noise = None,
     strut_spread_percent: float = 1.0,
@@ -320,12 +320,12 @@ def draft_effect(
     >>> found.to_dict()["effect"] is None, found.text  # `found.save(FILE)` raises InputError then
     (True, '')
     """
+    from toolpath_stiff.correction.draft import draft
     from toolpath_stiff.diagnosis.diagnose import diagnose
-    from toolpath_stiff.drafting.draft import draft
     from toolpath_stiff.stiffness.catalogue import known_effects
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
-    name = effect_name(file)
+    name = effect_name(file, ".toml")
     if name in known_effects(asked.on.effect_files):
         raise InputError(f"effect {name} exists already", hint="give the draft another file name")
     found = diagnose(
@@ -342,11 +342,11 @@ def draft_effect(
     return EffectDraft(name, drafted, Diagnosis(found, asked.inputs), next_of_draft(asked.asked, str(file)))
 
 
-def effect_name(file: str | Path) -> str:
+def effect_name(file: str | Path, ending: str = ".py") -> str:
     """The name of the effect that a file is to hold: the file's own, without the ending."""
     path = Path(file)
-    if path.suffix != ".py" or not path.stem.isidentifier():
-        raise InputError(f"{str(file)!r} cannot hold an effect", expected="a name such as my_screw.py")
+    if path.suffix != ending or not path.stem.isidentifier():
+        raise InputError(f"{str(file)!r} cannot hold an effect", expected=f"a name such as my_screw{ending}")
     return path.stem
 
 

@@ -473,7 +473,7 @@ class Case(Findings):
         found, command = self.draft_in(result, progress)
         self.record("draft", found._short(), command=command, python="case.draft()", result=result)
         if found.text:
-            self.add_effects(self.folder / result / f"{found.name}.py")
+            self.add_effects(self.folder / result / f"{found.name}.toml")
         return found
 
     # -- a blind exercise ---------------------------------------------------------------------------------------------

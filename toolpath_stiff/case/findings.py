@@ -54,7 +54,7 @@ class Findings(Contents):
         """What `draft` finds, kept in a folder of the case without a step; and its command."""
         from toolpath_stiff.api.effects import draft_effect
 
-        file = f"{result}/{self._free_effect('missing')}.py"
+        file = f"{result}/{self._free_effect('missing')}.toml"
         found = draft_effect(self.machine, self.data, file, progress=progress)
         (self.folder / result).mkdir(parents=True, exist_ok=True)
         if found.text:

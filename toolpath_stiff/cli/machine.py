@@ -345,7 +345,7 @@ examples:
   tps effects list
   tps effects show platform_flexibility
   tps effects new my_screw.py            a working effect to change into yours
-  tps effects draft measurements.csv -o missing.py   what a diagnosis leaves unexplained, as an effect to edit
+  tps effects draft measurements.csv -o missing.toml  what a diagnosis leaves unexplained, as an effect to edit
   tps effects check my_screw.py          shapes, symmetry, units, neutral value, speed; exit code 1 if it fails
   tps effects list --effects my_screw.py
 
@@ -379,7 +379,7 @@ def effects_arguments(parser: argparse.ArgumentParser) -> None:
     add_data_arguments(drafting)
     add_noise_arguments(drafting)
     drafting.add_argument("--seed", type=int, default=0, metavar="N", help="seed of every random draw (default: 0)")
-    drafting.add_argument("-o", "--output", default="missing.py", metavar="FILE.py", help="default: missing.py")
+    drafting.add_argument("-o", "--output", default="missing.toml", metavar="FILE.toml", help="default: missing.toml")
     add_replace_option(drafting)
     add_json_option(drafting, "print the draft as JSON")
 

@@ -315,7 +315,7 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
     if diagnosis.verdict == "unexplained":
         found = [hint("look where the residuals lie", asked.command("compare"))]
         if diagnosis.portrait is not None and any(one.term.acts for one in diagnosis.portrait.terms):
-            file = asked.new_effect("missing")
+            file = asked.new_effect("missing", ".toml")
             found.append(
                 hint("write what it looks like as an effect to edit", asked.command("effects draft", "-o", file))
             )

@@ -23,7 +23,7 @@ from toolpath_stiff.portrait.choice import Chosen, choose
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.selection import Description, Selection, law_prior
 from toolpath_stiff.portrait.smooth import smooth_rms
-from toolpath_stiff.portrait.terms import Term
+from toolpath_stiff.stiffness.terms import Term
 
 HELD = 0.90  # probability that a set of links or variables adds up to
 

@@ -20,7 +20,7 @@ from toolpath_stiff.inference.gates import Simulator, set_wild_aside
 from toolpath_stiff.inference.noise import Noise, Scatter, scaled_inverse
 from toolpath_stiff.portrait.columns import Ground, shapes_near
 from toolpath_stiff.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of, products
-from toolpath_stiff.portrait.terms import Factor, Term
+from toolpath_stiff.stiffness.terms import Factor, Term
 
 DRAWS = 200  # simulated campaigns
 

@@ -1,6 +1,6 @@
-"""Terms of a portrait: one link of the load path that gives way, along some directions, as one variable says.
+"""Terms: one link of the load path that gives way, along some directions, as one variable says.
 
-A term is an ordinary effect with one size and constants that are read off the readings. Its compliance is
+A term has a size and constants that are read off readings; `term_effect` makes effects of terms. Its compliance is
 
     c(v) = size * s(v),        s >= 0,
 
@@ -11,18 +11,17 @@ where the link can only give; a strut's stiffness may change to both sides, with
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import joint_angles
-from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
-from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
 
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
 
@@ -77,7 +76,61 @@ UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = 
 }
 
 
-ASSUMED = "described from readings; usual sizes are engineering experience, no source"
+# (action, link) -> directions along which it may act there.
+HEAD, BASE, STRUTS = ("tool", "platform"), ("frame", "table"), ("along the struts",)
+ALONG: dict[tuple[str, str], tuple[str, ...]] = {
+    **{("give", link): ("X", "Y", "Z", "radial", "axial", "all") for link in HEAD},
+    **{("give", link): ("X", "Y", "Z", "horizontal", "radial", "tangential", "all") for link in BASE},
+    **{("rocking", link): ("X", "Y", "tangential", "all") for link in BASE},
+    **{("tilting", link): ("X", "Y", "radial") for link in HEAD},
+    **{("vertex", link): ("radial", "tangential", "Z", "axial", *STRUTS) for link in ("frame", "platform")},
+    **{("strut", link): STRUTS for link in ("joints", "struts", "one strut")},
+    **{("strut factor", link): STRUTS for link in ("struts", "one strut")},
+    **{("coupling", link): STRUTS for link in ("struts", "frame")},
+    **{(pin, "joints"): ("radial", "tangential") for pin in ("frame pin", "platform pin")},
+    ("turning", "joints"): ("all",),
+    ("joint offset", "joints"): ("X", "Y", "Z"),
+    ("reading factor", "instrument"): ("reading", "X", "Y", "Z", "all"),
+    ("reading shift", "instrument"): ("reading", "X", "Y", "Z", "all"),
+}
+
+
+# Action -> what it adds of a size, its share s of it, and h, the load of the link.
+EQUATIONS = {
+    "give": "c += {} s h^2, h = tip force",
+    "rocking": "c += {} s h^2, h = moment of the tip force about the origin",
+    "tilting": "c += {} s h^2, h = moment of the tip force about the platform's middle",
+    "vertex": "c += {} s h^2, h = force in the vertex",
+    "strut": "c_i += {} s",
+    "frame pin": "c_i += {} s (u_i . pin)^2",
+    "platform pin": "c_i += {} s (u_i . pin)^2",
+    "turning": "K += sum over i of {} s B_i^T B_i",
+    "strut factor": "c_i += {} s / k_i",
+    "coupling": "c_ij += {} s / sqrt(k_i k_j)",
+    "joint offset": "joint += {}",
+    "reading factor": "k_read = k / (1 + {} s)",
+    "reading shift": "F / k_read = F / k + {} s",
+}
+
+
+# Shape -> names of its constants -> s of the variable v.
+FORMULAS: dict[str, dict[tuple[str, ...], str]] = {
+    "offset": {(): "v"},
+    "slope": {
+        ("start", "end"): "(v - start) / (end - start)",
+        ("power", "reference"): "(v / reference)^power",
+    },
+    "square": {("centre", "reach"): "((v - centre) / reach)^2"},
+    "bump": {("centre", "width"): "exp(-((v - centre) / width)^2 / 2)"},
+    "threshold": {
+        ("edge", "side"): "(1 where side (v - edge) > 0, else 0)",
+        ("from", "end"): "max(0, (v - from) / (end - from))",
+        ("beyond",): "max(0, 1 - beyond / v)",
+        ("within",): "min(1, within / v)",
+    },
+    "periodic": {("period", "crest"): "(1 + cos(2 pi (v - crest) / period)) / 2"},
+    "sign": {("side",): "(1 where side v > 0, else 0)"},
+}
 
 
 PLACE = ("x", "y", "z", "radius")
@@ -88,6 +141,9 @@ IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the complian
 
 
 SWINGS = ("frame joint", "platform joint")
+
+
+PAIR = ("first", "second")  # constants of a coupling
 
 
 AXES = {"X": 0, "Y": 1, "Z": 2}
@@ -384,10 +440,10 @@ def coupled(term: Term) -> tuple[int, int]:
     return int(term.constants["first"]) - 1, int(term.constants["second"]) - 1
 
 
-def coupling_share(term: Term, path: LoadPath) -> FloatArray:
-    """(n,) m/N that a `coupling` puts between its struts per unit of its size."""
+def pair_stiffness(term: Term, path: LoadPath) -> FloatArray:
+    """(n,) N/m, the geometric mean of the struts of a `coupling`."""
     stiffness = path.machine.strut_law.stiffness(path.struts.lengths[:, coupled(term)])
-    return np.asarray(shaped(term, path) / np.sqrt(stiffness.prod(axis=1)))
+    return np.asarray(np.sqrt(stiffness.prod(axis=1)))
 
 
 def reading_share(term: Term, path: LoadPath) -> FloatArray:
@@ -399,135 +455,23 @@ def reading_share(term: Term, path: LoadPath) -> FloatArray:
     return np.asarray(shape)
 
 
-class TermEffect(Effect):
-    """A term as an effect; `effect_of` makes one."""
-
-    term: ClassVar[Term]
-
-
-class _Form(TermEffect):
-    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """Quadratic form of strut forces and tip wrench."""
-        term = self.term
-        if not _seen(term, path):
-            return None
-        rows = carriers(term.link, term.action, term.direction, term.where, path)
-        weight = p["size"] * shaped(term, path)
-        return np.asarray(weight[:, None, None] * np.einsum("nki,nkj->nij", rows, rows))
-
-
-class _Coupling(TermEffect):
-    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """What couples two struts."""
-        term = self.term
-        if not _seen(term, path):
-            return None
-        first, second = coupled(term)
-        own = p["size"] * coupling_share(term, path)
-        form = np.zeros((len(path), 12, 12))
-        form[:, first, second] = form[:, second, first] = own
-        return form
-
-
-class _Strut(TermEffect):
-    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """In series with each strut."""
-        if not _seen(self.term, path):
-            return None
-        return np.asarray(p["size"] * strut_share(self.term, path))
-
-
-class _Turning(TermEffect):
-    def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """Rotational springs at both ends of each strut."""
-        if p["size"] == 0.0 or not _seen(self.term, path):
-            return None
-        rotations = end_rotations(path)
-        weighted = (p["size"] * strut_share(self.term, path))[:, :, None, None] * rotations
-        flat = (len(path), 36, 6)
-        return np.asarray(np.swapaxes(rotations.reshape(flat), 1, 2) @ weighted.reshape(flat))
-
-
-class _Offset(TermEffect):
-    unknown_to_control = True
-
-    def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
-        """With one joint off its place."""
-        name = f"{self.term.column}_joints"
-        joints = np.array(getattr(machine, name))
-        assert self.term.where is not None
-        joints[self.term.where - 1, AXES[self.term.direction]] += p["size"]
-        return machine.with_changes(**{name: joints})
-
-
-class _Reading(TermEffect):
-    def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
-        """Force over the deflection as read; nan where nothing of the deflection is left."""
-        off = p["size"] * reading_share(self.term, path)
-        factor = 1.0 + (off if self.term.action == "reading factor" else off * stiffness / path.force)
-        return np.where(factor > 0.0, stiffness / np.where(factor > 0.0, factor, 1.0), np.nan)
-
-
-def _seen(term: Term, path: LoadPath) -> bool:
-    """Whether these poses say what the term varies with."""
-    needed = {"time": path.time, "temperature": path.temperature, "setup": path.setup}
-    needed |= dict.fromkeys(OF_FORCES, path.strut_forces)
-    return all(one not in needed or needed[one] is not None for one in term.variables)
-
-
-NEEDS = {
-    "load": "force_N",
-    "strut force": "force_N",
-    "time": "time_min",
-    "temperature": "temperature_C",
-    "setup": "setup",
-}
-
-
 OF_FORCES = ("strut force", "force sign")
 
 
-CATALOGUE_LINKS = {"one strut": "struts"}
+def formula(term: Term, size: str) -> str:
+    """What a term adds, its size and its constants by name."""
+    along = f" along {term.direction}" if term.link == "instrument" and term.direction in AXES else ""
+    return f"{EQUATIONS[term.action].format(size)}{along}, s = {_share_formula(term, len(term.signs) > 1)}"
 
 
-def effect_of(term: Term) -> Effect:
-    """A term as an effect of one parameter, `size`.
-
-    Raises
-    ------
-    ValueError
-        No effect can see the term's variable (`Term.acts`).
-
-    Examples
-    --------
-    >>> tip = Term("table", "Y", "y", "slope", "give", at=(("start", -0.4), ("end", 0.4)))
-    >>> effect_of(tip).parameters[0].key
-    'size_nm_per_N'
-    """
-    if not term.acts:
-        raise ValueError(f"no effect sees the variable {' times '.join(term.variables)!r}")
-    unit, si, bounds, typical = UNITS[term.action]
-    kinds: dict[str, type[TermEffect]] = {
-        "coupling": _Coupling, **dict.fromkeys(IN_SERIES, _Strut), "turning": _Turning, "joint offset": _Offset,
-        "reading factor": _Reading, "reading shift": _Reading,
-    }  # fmt: skip
-    needs = list(dict.fromkeys(NEEDS[one] for one in term.variables if one in NEEDS))
-    if term.action in ("reading factor", "reading shift"):
-        needs += ["direction"] if term.direction in AXES else []
-        needs += ["force_N"] if term.action == "reading shift" and "force_N" not in needs else []
-    link = "geometry" if term.action == "joint offset" else CATALOGUE_LINKS.get(term.link, term.link)
-    attributes: dict[str, Any] = {
-        "__doc__": "A term of a portrait.",
-        "term": term,
-        "name": f"term: {term.key}",
-        "title": term.key,
-        "link": link,
-        "equation": "c += size s(v) sum_k (h_k . [f; w])^2; of turning: K += size s(v) sum_k B_k^T B_k",
-        "source": ASSUMED,
-        "parameters": (Parameter("size", unit, si, bounds, typical, ASSUMED, meaning=f"size of {term.key}"),),
-        "needs": tuple(needs),
-        "load_dependent": not set(OF_FORCES).isdisjoint(term.variables),
-    }
-    made = type("TermOfPortrait", (kinds.get(term.action, _Form),), attributes)
-    found: Effect = made()
-    return found
+def _share_formula(term: Term, signed: bool) -> str:
+    """The share s as a formula of the variable's name."""
+    if term.variable in ("constant", "direction"):
+        share = "1"
+    elif term.variable == "setup":
+        share = f"(1 in set-up {term.column}, else 0)"
+    else:
+        names = tuple(name for name, _ in term.at if name not in PAIR)
+        share = re.sub(r"\bv\b", " ".join((term.variable, term.column)).strip(), FORMULAS[term.shape][names])
+        share = f"max(0, {share})" if names == ("start", "end") and not signed else share
+    return share if term.second is None else f"{share} {_share_formula(term.second, signed=False)}"
