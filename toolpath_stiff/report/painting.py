@@ -40,7 +40,9 @@ def label_places(axes: Axes, places: Sequence[tuple[float, float]], texts: Seque
         box = _free_box(axes, (float(place[0]), float(place[1])), CHARACTER * len(text) + 6.0, taken, below)
         taken.append(box)
         middle, half = np.add(box[:2], box[2:]) / 2.0, np.subtract(box[2:], box[:2]) / 2.0
-        axes.text(*middle, text, transform=IdentityTransform(), ha="center", va="center", zorder=10, bbox=ground)
+        axes.text(
+            middle[0], middle[1], text, transform=IdentityTransform(), ha="center", va="center", zorder=10, bbox=ground
+        )
         way = middle - place
         edge = np.min(half / np.maximum(np.abs(way), 1e-9))  # where the way meets the box
         start = RING_EDGE / np.hypot(*way)

@@ -329,7 +329,13 @@ def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
         places, np.full(len(places), height), linestyle="none", marker=TICKUP, markersize=3.5, color=MUTED,
         markeredgewidth=0.8, transform=across, clip_on=False, zorder=2,
     )  # fmt: skip
-    words = {"fontsize": 9.0, "color": MUTED, "ha": "center", "textcoords": "offset points", "annotation_clip": False}
+    words: dict[str, Any] = {
+        "fontsize": 9.0,
+        "color": MUTED,
+        "ha": "center",
+        "textcoords": "offset points",
+        "annotation_clip": False,
+    }
     for place, row in zip(places.tolist(), rows.tolist(), strict=True):
         axes.annotate(str(analysis.samples.line[row]), (place, height), (0.0, 7.0), xycoords=across, **words)
     axes.annotate("program line", (0.5, height), (0.0, 20.0), xycoords="axes fraction", **words)
