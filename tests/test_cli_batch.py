@@ -262,7 +262,7 @@ def test_ctrl_c_leaves_whole_reports_and_nothing_else(shop):
             os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert error == "tps: interrupted; no file is half-written\n"
-    assert set(files_of(shop / "reports")) == {"a/part/samples.csv", "a/part/summary.json", "INCOMPLETE.txt"}
+    assert set(files_of(shop / "reports")) == {"INCOMPLETE.txt", "a/part/samples.csv", "a/part/summary.json"}
     assert {path.name for path in (shop / "reports").rglob(".*")} <= {MANIFEST}
 
 

@@ -15,12 +15,14 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from pebble import ProcessExpired
+
 from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import TABLES, analyze, path_options
 from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.processes import ProcessDied, ProcessPool
+from toolpath_stiff.processes import ProcessPool, death
 from toolpath_stiff.report.batch.index import files, names, text
 from toolpath_stiff.report.batch.programs import (
     Found,
@@ -444,8 +446,8 @@ def _answer(task: Task, future: Future[Outcome]) -> Outcome:
     error = future.exception()
     if error is None:
         return future.result()
-    if isinstance(error, ProcessDied):
-        return _failed(task, str(error))
+    if isinstance(error, ProcessExpired):
+        return _failed(task, death(error))
     if _worker_died(future):
         tried, last = error.args[2] + 1, error.args[1].address
         return _failed(task, f"{tried} workers died of it, the last at {last} (out of memory? their logs may say)")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.report.captions import add_heading, add_legend
 from toolpath_stiff.report.figure import (
     DPI,
     INK,
@@ -23,17 +21,7 @@ from toolpath_stiff.report.figure import (
     new_figure,
     picture,
 )
-from toolpath_stiff.report.painting import (
-    add_scales,
-    label_places,
-    new_pen,
-    paint,
-    paint_scale,
-    painted_axes,
-    word_extent,
-    word_font,
-    write_word,
-)
+from toolpath_stiff.report.painting import add_heading, add_legend, label_places
 from toolpath_stiff.report.words import plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
@@ -78,7 +66,7 @@ def profile_picture(
     strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
     figure = new_figure(WIDTH, HEIGHT)
     frame = HEIGHT - TOP - BOTTOM - strip
-    axes = painted_axes(figure, (LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
+    axes = figure.add_axes((LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
     s, k = profile_curve(analysis, show_plunges)
     band = profile_band(analysis, show_plunges)
     _set_limits(axes, analysis, other, required, band, show_plunges)
@@ -228,7 +216,6 @@ def _set_limits(
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if end > 20 else 2)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if high - low > 5 else 2)))
     axes.grid(axis="x", visible=False)
-    add_scales(axes)
 
 
 def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) -> None:
@@ -293,22 +280,14 @@ def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
             zorder=2,
         )
     pixels = float(axes.get_window_extent().width) / float(edges[-1] or 1.0)
-    names = [
-        (start, _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 2.0 * INSET))
-        for row, (start, length) in zip(rows, spans, strict=True)
-    ]
-    paint(axes, partial(_paint_names, names=[one for one in names if one[1]], middle=1.0 + height / 2.0), zorder=6)
-
-
-def _paint_names(renderer: Any, axes: Axes, names: list[tuple[float, str]], middle: float) -> None:
-    """Words that begin beside places along the path, in mm; `middle` in heights of the axes."""
-    font = word_font(NAME_SIZE)
-    _, tall, below = word_extent(renderer, "lp", font)
-    base = axes.bbox.y0 + middle * axes.bbox.height - (tall - below) / 2.0
-    inset = INSET * renderer.points_to_pixels(POINTS / DPI)
-    with new_pen(renderer, None, INK, 0.0) as pen:
-        for place, text in names:
-            write_word(renderer, pen, axes.transData.transform((place, 0.0))[0] + inset, base, text, font)
+    inset = INSET / DPI * POINTS
+    for row, (start, length) in zip(rows, spans, strict=True):
+        text = _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 2.0 * INSET)
+        if text:
+            axes.annotate(
+                text, (start, 1.0 + height / 2.0), (inset, 0.0), xycoords=across, textcoords="offset points",
+                fontsize=NAME_SIZE, va="center", zorder=6, annotation_clip=False,
+            )  # fmt: skip
 
 
 def _fitting(text: str, least: str, room: float) -> str:
@@ -339,17 +318,32 @@ def _fitting(text: str, least: str, room: float) -> str:
 
 def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
     """Program lines above the frame, at `height` of its height, where the ticks below fall."""
+    from matplotlib.markers import TICKUP
+
     end = float(analysis.samples.s[-1])
     where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
     rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)
-    shown = partial(
-        paint_scale, side="top", values=mm_from_m(where), words=[str(line) for line in analysis.samples.line[rows]],
-        name="program line", size=9.0, colour=MUTED, edge=height,
+    across = axes.get_xaxis_transform()
+    places = mm_from_m(where)
+    axes.plot(
+        places, np.full(len(places), height), linestyle="none", marker=TICKUP, markersize=3.5, color=MUTED,
+        markeredgewidth=0.8, transform=across, clip_on=False, zorder=2,
     )  # fmt: skip
-    paint(axes, shown, zorder=2.0)
+    words: dict[str, Any] = {
+        "fontsize": 9.0,
+        "color": MUTED,
+        "ha": "center",
+        "textcoords": "offset points",
+        "annotation_clip": False,
+    }
+    for place, row in zip(places.tolist(), rows.tolist(), strict=True):
+        axes.annotate(str(analysis.samples.line[row]), (place, height), (0.0, 7.0), xycoords=across, **words)
+    axes.annotate("program line", (0.5, height), (0.0, 20.0), xycoords="axes fraction", **words)
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
     keys = list(zip(*axes.get_legend_handles_labels(), strict=True))
     corner = 1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT
-    add_legend(figure, keys, corner, right=True, size=9.5, between=1.4, wide=1.8)
+    add_legend(
+        figure, keys, corner, loc="upper right", ncols=len(keys) or 1, fontsize=9.5, columnspacing=1.4, handlelength=1.8
+    )

@@ -45,7 +45,6 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.painting import painted_axes
 from toolpath_stiff.report.words import plain, shortened
 
 if TYPE_CHECKING:
@@ -70,11 +69,11 @@ def ladder_png(document: DiagnosisDocument) -> Figure:
         figure = new_figure(14.0, height)
         _title(figure, "Which effect explains the data, and how surely?", _ladder_note(document))
         bottom, top = 0.62 / height, 1.0 - 1.1 / height
-        shade = painted_axes(figure, (0.01, bottom, 0.985, top - bottom))
-        labels = painted_axes(figure, (0.02, bottom, 0.34, top - bottom))
+        shade = figure.add_axes((0.01, bottom, 0.985, top - bottom))
+        labels = figure.add_axes((0.02, bottom, 0.34, top - bottom))
         errors = figure.add_axes((0.35, bottom, 0.31, top - bottom))
         chances = figure.add_axes((0.69, bottom, 0.13, top - bottom))
-        words = painted_axes(figure, (0.845, bottom, 0.15, top - bottom))
+        words = figure.add_axes((0.845, bottom, 0.15, top - bottom))
         for axes in (shade, labels, words):
             axes.set_axis_off()
             axes.set_xlim(0.0, 1.0)
