@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.programs import TABLES, analyze, path_options
+from toolpath_stiff.api.programs import analyze, path_options
 from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.processes import ProcessDied, ProcessPool
+from toolpath_stiff.report.analysis.summary import TABLES
 from toolpath_stiff.report.batch.index import files, names, text
 from toolpath_stiff.report.batch.programs import (
     Found,
@@ -209,7 +210,7 @@ def analyze_many(
         out=Path(folder),
         rules=Rules(inputs=inputs, replace=replace),
         options=options,
-        saving={"plots": plots, "table": one_of("table", table, TABLES), "show_plunges": show_plunges},
+        saving={"plots": plots, "table": one_of("table", table, tuple(TABLES)), "show_plunges": show_plunges},
         machines=(on, other),
     )
     check_folder(run.out, names(), run.rules)
