@@ -159,7 +159,7 @@ def writing(report: Report, lines: int, rounds: int) -> None:
     import pyarrow.parquet as pq
 
     from toolpath_stiff.analysis import analyze
-    from toolpath_stiff.analysis.statistics import sample_columns, samples_csv, samples_frame, samples_parquet
+    from toolpath_stiff.analysis.statistics import sample_columns, samples_csv, samples_parquet
     from toolpath_stiff.machine.file import load_machine
 
     analysis = analyze(load_machine("nist"), parse_program(program("5-axis", lines)), origin=(0, 0, 0.8, 0, 0, 0))
@@ -171,7 +171,7 @@ def writing(report: Report, lines: int, rounds: int) -> None:
     ways: dict[str, Callable[[], object]] = {
         "tps csv": lambda: sum(map(len, samples_csv(analysis))),
         "pyarrow csv": lambda: pc.write_csv(table(), io.BytesIO()),
-        "pandas csv": lambda: samples_frame(analysis).iloc[: rows // 10].to_csv(float_format="%.6f"),
+        "pandas csv": lambda: analysis.to_frame().iloc[: rows // 10].to_csv(float_format="%.6f"),
         "tps parquet": lambda: sum(map(len, samples_parquet(analysis))),
         "pyarrow parquet": lambda: pq.write_table(table(), io.BytesIO()),
     }

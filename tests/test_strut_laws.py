@@ -11,7 +11,7 @@ import pytest
 
 import toolpath_stiff as tps
 from toolpath_stiff.analysis.checks import check_machine
-from toolpath_stiff.analysis.results import analyze, assumptions
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.correction.strut_law import minimise_mean_error
 from toolpath_stiff.errors import InputError
@@ -209,7 +209,7 @@ def test_what_is_said_of_the_law():
     value, unit = {row[0]: row[1:3] for row in machine_figures(TABLE)}["strut stiffness"]
     assert value.startswith("46.5 N/um at 2561.6 mm, 45 N/um at 2700, ") and unit == "mm, linear between"
     run = parse_program(SLOT)
-    said = [assumptions(analyze(build_model(one), run)) for one in (CONSTANT_MACHINE, TABLE)]
+    said = [analyze(build_model(one), run).assumptions for one in (CONSTANT_MACHINE, TABLE)]
     assert any("the same at every length" in line for line in said[0])
     assert any("extrapolated outside 2561.6 to 3213.2 mm" in line for line in said[1])
     assert not check_machine(build_model(CONSTANT_MACHINE)).wrong

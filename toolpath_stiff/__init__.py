@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.defaults import VERSION as _VERSION
 
 if TYPE_CHECKING:
+    from toolpath_stiff.analysis.results import Analysis as Analysis
     from toolpath_stiff.api.by_hand import Preview as Preview
     from toolpath_stiff.api.by_hand import preview as preview
     from toolpath_stiff.api.case_studies import CaseStudy as CaseStudy
@@ -66,7 +67,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.poses import map_stiffness as map_stiffness
     from toolpath_stiff.api.poses import pose as pose
     from toolpath_stiff.api.poses import read_poses as read_poses
-    from toolpath_stiff.api.programs import Analysis as Analysis
     from toolpath_stiff.api.programs import ProgramCheck as ProgramCheck
     from toolpath_stiff.api.programs import SampledPath as SampledPath
     from toolpath_stiff.api.programs import analyze as analyze
@@ -92,6 +92,7 @@ __version__ = _VERSION
 
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
+    "analysis.results": ("Analysis",),
     "api.by_hand": ("Preview", "preview"),
     "api.case_studies": ("CaseStudy", "case_study"),
     "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
@@ -110,7 +111,7 @@ _PUBLIC = {
         "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
     ),
     "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
-    "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
+    "api.programs": ("ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
     "case.case": ("Case",),
     "errors": (
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",

@@ -25,7 +25,6 @@ from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.report import case_study, figure, machine, measuring
 from toolpath_stiff.report import map as map_report
 from toolpath_stiff.report.analysis.page import page
-from toolpath_stiff.report.analysis.summary import summary_with_options
 from toolpath_stiff.report.batch.index import batch_page
 from toolpath_stiff.report.compare import pictures as compare_pictures
 from toolpath_stiff.report.diagnose import pictures as diagnose_pictures
@@ -201,7 +200,7 @@ def test_many_heights_are_put_together_with_their_neighbours():
 def test_all_pages_have_one_style_sheet_with_a_dark_half(mapped):
     analysis = short()
     pages = {
-        "analysis": page(analysis, summary_with_options(analysis, None, None)),
+        "analysis": page(analysis),
         "batch": batch_page([]),
         "map": map_page(nist(), mapped),
         "diagnosis": diagnose_html(documents.identified(), {}),

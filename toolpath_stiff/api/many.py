@@ -19,10 +19,11 @@ from pebble import ProcessExpired
 
 from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.programs import TABLES, analyze, path_options
+from toolpath_stiff.api.programs import analyze, path_options
 from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.processes import ProcessPool, death
+from toolpath_stiff.report.analysis.summary import TABLES
 from toolpath_stiff.report.batch.index import files, names, text
 from toolpath_stiff.report.batch.programs import (
     Found,
@@ -211,7 +212,7 @@ def analyze_many(
         out=Path(folder),
         rules=Rules(inputs=inputs, replace=replace),
         options=options,
-        saving={"plots": plots, "table": one_of("table", table, TABLES), "show_plunges": show_plunges},
+        saving={"plots": plots, "table": one_of("table", table, tuple(TABLES)), "show_plunges": show_plunges},
         machines=(on, other),
     )
     check_folder(run.out, names(), run.rules)

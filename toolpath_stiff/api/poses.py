@@ -262,6 +262,7 @@ class StiffnessMap(FolderResult):
     """
 
     command: ClassVar[str] = "map"
+    shown_by: ClassVar[str] = "map"
 
     def __init__(self, machine: Machine, model: StiffnessModel, grid: StiffnessGrid) -> None:
         from toolpath_stiff.report.map import map_summary

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, partial
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -11,9 +12,8 @@ from toolpath_stiff.api.inputs import LONGEST_STEP_MM, STRONGEST_N, Program, pos
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.results import FolderResult, Progress, Result, counter, one_of
+from toolpath_stiff.results import Progress, Result, counter
 from toolpath_stiff.units import (
     Pose,
     m_from_mm,
@@ -23,170 +23,12 @@ from toolpath_stiff.units import (
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
-    from toolpath_stiff.analysis import Analysis as PathAnalysis
+    from toolpath_stiff.analysis import Analysis
     from toolpath_stiff.path import Samples
 
 FASTEST_STRUT_MM_PER_MIN = 1e6
 STIFFEST_N_PER_MM = 1e7
-TABLES = ("csv", "parquet")
-
-
-class Analysis(FolderResult):
-    r"""Stiffness along the path of a program, under a load at every sample of a cut.
-
-    Attributes
-    ----------
-    path
-        The samples and what was found at each, as arrays in SI.
-    on_other
-        The same on the machine compared with; None without one.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> found = tps.analyze("nist", slot, origin_mm_deg=(0, 0, 800), require_N_per_mm=54000)
-    >>> [round(one) for one in (found.mean_N_per_mm, found.min_N_per_mm, found.range_N_per_mm)]
-    [54353, 53875, 948]
-    >>> found.weakest["line"], found.weakest["text"]
-    (4, 'G1 X40')
-    >>> [(line, round(stiffness)) for line, stiffness in found.below_required]
-    [(4, 53875)]
-    >>> found.complete, found.warnings, len(found.assumptions) > 0
-    (True, [], True)
-    >>> found.deviation_N_per_mm is None  # the figures of this machine are stated without standard deviations
-    True
-    >>> len(found.to_frame()), len(found.to_dict()["weakest_places"])
-    (53, 1)
-    >>> [type(picture()).__name__ for picture in (found.plot, found.plot_profile)]
-    ['Figure', 'Figure']
-    """
-
-    command: ClassVar[str] = "analyze"
-
-    def __init__(
-        self,
-        path: PathAnalysis,
-        *,
-        on_other: PathAnalysis | None = None,
-        required: float | None = None,
-        inputs: tuple[str, ...] = (),
-    ) -> None:
-        self.path, self.on_other, self._required, self.inputs = path, on_other, required, inputs
-
-    @cached_property
-    def _document(self) -> dict[str, Any]:
-        from toolpath_stiff.report.analysis.summary import summary_with_options
-
-        return summary_with_options(self.path, self._required, self.on_other)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self._document
-
-    @property
-    def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
-        """Mean stiffness over the length of the cuts, plunges along the tool axis left out."""
-        return self._figure("mean_N_per_mm")
-
-    @property
-    def min_N_per_mm(self) -> float:  # noqa: N802
-        """The smallest stiffness of these cuts."""
-        return self._figure("min_N_per_mm")
-
-    @property
-    def range_N_per_mm(self) -> float:  # noqa: N802
-        """The largest less the smallest."""
-        return self._figure("range_N_per_mm")
-
-    def _figure(self, name: str) -> float:
-        """A figure of the document; nan where no sample counts (rotary axes alone)."""
-        found = self._document[name]
-        return float("nan") if found is None else float(found)
-
-    @property
-    def weakest(self) -> dict[str, Any]:
-        """Where the smallest stiffness is: line, position, direction."""
-        return dict(self._document["weakest"])
-
-    @property
-    def warnings(self) -> list[str]:
-        """What deserves a look."""
-        return list(self._document["warnings"])
-
-    @property
-    def assumptions(self) -> list[str]:
-        """What was assumed or recovered rather than published or given."""
-        return list(self._document["assumptions"])
-
-    @property
-    def complete(self) -> bool:
-        """Whether every sample of a cut is within reach."""
-        return not self._document["out_of_reach_samples"]
-
-    @property
-    def below_required(self) -> list[tuple[int, float]]:
-        """(line, smallest stiffness in N/mm) of cuts below what was required, weakest first."""
-        from toolpath_stiff.analysis.results import required_stiffness_missed
-
-        return [] if self._required is None else required_stiffness_missed(self.path, self._required)
-
-    @property
-    def deviation_N_per_mm(self) -> Any:  # noqa: N802
-        """(n,) standard deviation of each sample's stiffness from the fitted parameters; None where none is stated."""
-        from toolpath_stiff.units import n_per_mm_from_n_per_m
-
-        band = self.path.parameter_band
-        return None if band is None else n_per_mm_from_n_per_m(band.deviation)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.analysis.summary import text
-
-        other = None if self.on_other is None else self.on_other.summary()
-        return text(self._document, self.path.program.source, other)
-
-    def _short(self) -> str:
-        from toolpath_stiff.units import number
-
-        found = self._document
-        mean, low = (number(found[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))
-        return f"{found['program']} on {found['machine']}, mean {mean} N/mm, min {low} N/mm"
-
-    def to_frame(self) -> pd.DataFrame:
-        """The samples, columns as in `samples.csv`."""
-        return self.path.to_frame()
-
-    def plot(self, *, show_plunges: bool = False) -> Figure:
-        """The path in three views, coloured by stiffness; with `show_plunges` these set axes and colours too."""
-        from toolpath_stiff.report.analysis.path import path_picture
-
-        return path_picture.figure(self.path, show_plunges=show_plunges)
-
-    def plot_profile(self, *, show_plunges: bool = False) -> Figure:
-        """Stiffness along the path."""
-        from toolpath_stiff.report.profile import profile_picture
-
-        return profile_picture.figure(
-            self.path, other=self.on_other, required=self._required, show_plunges=show_plunges
-        )
-
-    def files(
-        self, *, plots: bool = True, table: str = "csv", show_plunges: bool = False
-    ) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps analyze`; samples as "csv" or "parquet"."""
-        from toolpath_stiff.report.analysis.summary import files
-
-        return files(
-            self.path,
-            plots=plots,
-            table=one_of("table", table, TABLES),  # type: ignore[arg-type]
-            required=self._required,
-            other=self.on_other,
-            show_plunges=show_plunges,
-            summary=self._document,
-        )
 
 
 def analyze(
@@ -251,14 +93,13 @@ def analyze(
         second = compare_with if isinstance(compare_with, Machine) else first.like(compare_with)
     options, required = path_options(origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm)
 
-    def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> PathAnalysis:
+    def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> Analysis:
         model = one.running(part, [other] if other else [])
         read = part.moves(options["origin"], model.machine.default_origin)
         return analyze(model, read, progress=told, **options)
 
-    path = on(first, second, counter(progress, f"{part.name}: samples"))
-    return Analysis(
-        path,
+    return replace(
+        on(first, second, counter(progress, f"{part.name}: samples")),
         on_other=None if second is None else on(second, first, None),
         required=required,
         inputs=(*part.inputs, *first.inputs, *(second.inputs if second else ())),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.analysis.loads import Load, plunging_rows
-from toolpath_stiff.analysis.results import Analysis, assumptions
+from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.hints import both_names
@@ -175,7 +175,7 @@ def placement_summary(
         "offset_blocks": _offsets(program, best.origin),
         "written": written,
         "search": search,
-        "assumptions": assumptions(best),
+        "assumptions": best.assumptions,
     }
 
 

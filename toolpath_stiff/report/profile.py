@@ -46,22 +46,11 @@ MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seve
 
 
 @picture
-def profile_picture(
-    analysis: Analysis, *, other: Analysis | None = None, required: float | None = None, show_plunges: bool = False
-) -> Figure:
-    """Stiffness against path length, as PNG.
+def profile_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
+    """Stiffness against path length, as PNG; on the other machine a second curve; the required level, red below it.
 
-    Parameters
-    ----------
-    analysis
-        What to draw.
-    other
-        The same program on another machine: a second curve.
-    required
-        N/m: a line, and red below it.
-    show_plunges
-        The axis holds the plunges beside the headline, and they belong to the curve; else they are grey, and arrows
-        say where they leave the axis.
+    With `show_plunges` the axis holds the plunges beside the headline, and they belong to the curve; else they are
+    grey, and arrows say where they leave the axis.
     """
     strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
     figure = new_figure(WIDTH, HEIGHT)
@@ -69,11 +58,11 @@ def profile_picture(
     axes = figure.add_axes((LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
     s, k = profile_curve(analysis, show_plunges)
     band = profile_band(analysis, show_plunges)
-    _set_limits(axes, analysis, other, required, band, show_plunges)
+    _set_limits(axes, analysis, band, show_plunges)
     _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
     _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
     columns = int(axes.get_window_extent().width)
-    if other is not None:
+    if (other := analysis.on_other) is not None:
         s2, k2 = profile_curve(other, show_plunges)
         keep = extremes_by_column(s2, k2, columns)
         name = shortened(plain(other.machine.name), 30)
@@ -85,12 +74,12 @@ def profile_picture(
     name = shortened(plain(analysis.machine.name), 30)
     axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
     _draw_plunges(axes, analysis, columns, PLUNGE_SLATE, show_plunges, "plunges")
-    _levels(axes, analysis, required)
+    _levels(axes, analysis)
     _tool_changes(axes, analysis)
     if strip:
         _operations(axes, analysis, strip / frame)
     _line_numbers(axes, analysis, 1.0 + strip / frame)
-    places = analysis.weakest
+    places = analysis.weakest_rows
     spots = [(float(s[row]), float(k[row])) for row in places]
     label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
     _legend(figure, axes)
@@ -190,20 +179,14 @@ def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
     return np.asarray(rows[~missing[rows] | fresh[rows]])
 
 
-def _set_limits(
-    axes: Axes,
-    analysis: Analysis,
-    other: Analysis | None,
-    required: float | None,
-    band: tuple[FloatArray, FloatArray] | None,
-    show_plunges: bool,
-) -> None:
+def _set_limits(axes: Axes, analysis: Analysis, band: tuple[FloatArray, FloatArray] | None, show_plunges: bool) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    curves = [*(profile_curve(a, show_plunges)[1] for a in (analysis, other) if a is not None), *(band or ())]
+    machines = [analysis, *([analysis.on_other] if analysis.on_other else [])]
+    curves = [*(profile_curve(machine, show_plunges)[1] for machine in machines), *(band or ())]
     low, high = float(min(np.nanmin(k) for k in curves)), float(max(np.nanmax(k) for k in curves))
-    if required is not None:
-        level = n_per_mm_from_n_per_m(required)
+    if analysis.required is not None:
+        level = n_per_mm_from_n_per_m(analysis.required)
         low, high = min(low, level), max(high, level)
     pad = max(0.12 * (high - low), 0.005 * high)
     axes.set_ylim(max(low - pad, 0.0), high + pad)
@@ -228,13 +211,13 @@ def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) 
     axes.broken_barh(spans, (low, high - low), facecolor=colour, edgecolor="none", label=label, zorder=1)
 
 
-def _levels(axes: Axes, analysis: Analysis, required: float | None) -> None:
+def _levels(axes: Axes, analysis: Analysis) -> None:
     mean = stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"]
     if mean is not None:
         axes.axhline(mean, color=INK, linewidth=1.0, linestyle=(0, (6, 3)), zorder=5, label=f"mean {number(mean)} N/mm")
-    if required is None:
+    if analysis.required is None:
         return
-    level = n_per_mm_from_n_per_m(required)
+    level = n_per_mm_from_n_per_m(analysis.required)
     axes.axhline(level, color=UNREACHABLE_RED, linewidth=1.3, zorder=5, label=f"required {number(level)} N/mm")
 
 

@@ -45,7 +45,7 @@ LARGEST = 1e9
 
 SHAPE_KEYS = ("varies_with", "of", "shape", "constants")
 KEYS = ("name", "size", "meaning", "link", "action", "where", "along", *SHAPE_KEYS, "times")
-SHAPES_OF = {**dict.fromkeys(("constant", "direction", "setup"), ["offset"]), "force sign": ["sign"]}
+SHAPES_OF = {"constant": ["offset"], "direction": ["offset"], "setup": ["offset"], "force sign": ["sign"]}
 COLUMNS = {"tilt": ("", *AXES, *SWINGS), "joint offset": ("frame", "platform")}
 
 

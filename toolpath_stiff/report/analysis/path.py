@@ -62,7 +62,7 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     )
     middle, span = _frame(*cutting_box(samples))
     figure, views, corner = _lay_out(span)
-    places = analysis.weakest
+    places = analysis.weakest_rows
     for axes, (across, up, title) in zip(
         views, ((0, 1, "XY  top"), (0, 2, "XZ  front"), (1, 2, "YZ  side, from +X")), strict=True
     ):
