@@ -89,8 +89,8 @@ class Table:
         What was read differently from how it is written, in words.
     texts
         Columns that hold one text in all rows; the last ones of the heading.
-    sources, doubts
-        As of `Columns`; headings that were left as they stand.
+    sources, doubts, units
+        As of `Columns`; headings that were left as they stand; heading -> unit in the row below it.
     """
 
     file: str
@@ -102,6 +102,7 @@ class Table:
     texts: tuple[str, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
     doubts: tuple[Doubt, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -220,6 +221,7 @@ def grid_table(grid: Grid, file: str, columns: Columns) -> Table:
         tuple(texts.values()),
         columns.sources,
         tuple(doubts),
+        {cell: UNITS.get(heading_key(unit), "") for cell, unit in zip(written, units, strict=False)},
     )
 
 

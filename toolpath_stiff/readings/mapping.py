@@ -30,6 +30,10 @@ ENTRY = re.compile(r"""\s*([\w ]+?)\s*=\s*((?:"[^"]*"|[^",])*?)\s*(?:,|$)""")
 THEIRS = re.compile(r"""(?:=\s*(?P<text>.+)|"(?P<quoted>[^"]+)"|(?P<heading>[^":]+?))(?:\s*:\s*(?P<unit>.+))?""")
 SINCE_1970 = {"s": 1.0, "ms": 1e-3}
 PARTS = {"YYYY": "%Y", "YY": "%y", "MM": "%m", "DD": "%d", "hh": "%H", "mm": "%M", "ss": "%S"}
+# Columns that are told by their cells.
+HELD = {"strut": re.compile("[1-6]"), "direction": re.compile("[+-]?[XYZxyz]"), DATE: re.compile(".+")}
+NUMBER = re.compile(r"[+-]?[\d.]+(e[+-]?\d+)?", re.IGNORECASE)
+YEAR, ALIKE = 4, 0.5  # letters of a year alone; likeness of two names that counts
 LIKE_MS = re.compile(r"\d{12,13}")  # from 1973 on
 FORMS = ("DD.MM.YYYY", "DD.MM.YYYY hh:mm", "YYYYMMDD", "YYYY/MM/DD", "DD/MM/YYYY", "MM/DD/YYYY", "DD.MM.YY", "ms")
 
@@ -146,27 +150,28 @@ def _refuse_other_form(table: Table, cells: Sequence[str]) -> None:
 def to_write(table: Table, needed: Sequence[str]) -> str:
     """The mapping to write, filled with the file's own headings, as a hint says it.
 
-    Columns that are still needed get the unused heading that fits best by what its cells hold, then by its name: a
+    Columns that are still needed get the unused heading that fits best by what its cells hold, its unit and its name: a
     proposal, to be looked at before it is used.
     """
     entries = {name: _entry(name, source) for name, source in table.sources.items()}
-    for doubt in table.doubts:
-        entries[doubt.name] = _entry(doubt.name, Source(doubt.heading, doubt.unit))
-    lacking = [name for name in needed if name not in entries and name not in table.heading]
-    used = {doubt.heading for doubt in table.doubts}
-    free = [i for i, heading in enumerate(table.heading) if heading and heading not in (*needed, *used)]
-    cells = {i: [row[i] for _, row in table.rows if i < len(row) and row[i]] for i in free}
-    pairs = sorted(((_fit(name, table.heading[i], cells[i]), -i, name) for name in lacking for i in free), reverse=True)
-    for _, minus, name in pairs:
-        if name in lacking and -minus in free:
-            lacking.remove(name)
-            free.remove(-minus)
-            heading = table.heading[-minus]
-            entries[name] = _entry(name, Source(heading, _unit(name, heading, cells[-minus])))
-    entries |= {name: f"{_short(name)}=?" for name in lacking}
+    entries |= {doubt.name: _entry(doubt.name, Source(doubt.heading, doubt.unit)) for doubt in table.doubts}
+    used = {*needed, *entries, *(doubt.heading for doubt in table.doubts)}
+    free = {
+        heading: [cells[i] for _, cells in table.rows if i < len(cells) and cells[i]]
+        for i, heading in enumerate(table.heading)
+        if heading and heading not in used
+    }
+    told = [name for name in HELD if name in (DATE, *needed)]
+    lacking = [name for name in (*told, *needed) if name not in (*entries, *table.heading)]
+    for name in dict.fromkeys(lacking):
+        fits = {heading: _fit(name, heading, cells) for heading, cells in free.items()}
+        heading = max(fits, key=lambda heading: fits[heading], default="")
+        if heading and (fits[heading][0] or name != DATE):
+            entries[name] = _entry(name, Source(heading, _unit(table, name, heading, free.pop(heading))))
+    entries |= {name: f"{_short(name)}=?" for name in needed if name not in (*entries, *table.heading)}
     ordered = [entries[name] for name in dict.fromkeys((*needed, *entries)) if name in entries]
-    said = ", ".join(ordered)
-    quoted = f"'{said}'" if '"' in said else f'"{said}"'
+    text = ", ".join(ordered)
+    quoted = f"'{text}'" if '"' in text else f'"{text}"'
     return f"say which columns they are: --columns {quoted} (columns=), or in {split_name(table.file)[0]}{BESIDE}"
 
 
@@ -180,40 +185,35 @@ def _entry(name: str, source: Source) -> str:
     return f"{_short(name)}={theirs}" + (f":{source.unit}" if source.unit else "")
 
 
-def _fit(name: str, heading: str, cells: Sequence[str]) -> tuple[bool, float]:
-    """How well a heading and its cells fit a column."""
+def _fit(name: str, heading: str, cells: Sequence[str]) -> tuple[bool, bool, float]:
+    """How well a heading fits a column: by its cells, its unit, its name."""
+    key, short = heading_key(heading), _short(name)
+    likeness = difflib.SequenceMatcher(None, parted(key)[0], short).ratio()
     if name == DATE:
-        held = bool(_forms(cells)) or all(is_date(cell) for cell in cells)
-    elif name == "strut":
-        held = all(re.fullmatch("[1-6]", cell) for cell in cells)
-    elif name == "direction":
-        held = all(re.fullmatch("[+-]?[XYZxyz]", cell) for cell in cells)
-    else:
-        held = all(_is_number(cell) for cell in cells)
-    key = heading_key(heading)
-    return held, difflib.SequenceMatcher(None, key, _short(name)).ratio() + key.startswith(_short(name)[:1])
+        dated = all(is_date(cell) for cell in cells) and (
+            len(min(cells, key=len, default="")) > YEAR or likeness > ALIKE
+        )
+        return bool(cells) and (dated or bool(_forms(cells))), False, likeness
+    form = HELD.get(name, NUMBER)
+    return (
+        all(map(form.fullmatch, cells)),
+        same_quantity(unit_of(heading), unit_of(name)),
+        likeness * (likeness > ALIKE),
+    )
 
 
-def _unit(name: str, heading: str, cells: Sequence[str]) -> str:
-    """The unit that a heading seems to state, else the column's own; of dates their form."""
+def _unit(table: Table, name: str, heading: str, cells: Sequence[str]) -> str:
+    """The unit that stands below or in a heading, else the column's own; of dates their form."""
     if name == DATE:
         return "" if all(is_date(cell) for cell in cells) else next(iter(_forms(cells)), "")
-    own, stated = unit_of(name), unit_of(heading)
-    return stated if same_quantity(stated, own) else own
+    own = unit_of(name)
+    return next((unit for unit in (table.units.get(heading, ""), unit_of(heading)) if same_quantity(unit, own)), own)
 
 
 def _forms(cells: Sequence[str]) -> list[str]:
     """How all dates of a column may be written; none where no form is known."""
     likely = [form for form in FORMS if form != "ms" or all(LIKE_MS.fullmatch(cell) for cell in cells)]
     return [form for form in likely if cells and all(is_date(as_iso(cell, form)) for cell in cells)]
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
 
 
 def refuse(table: Table, found: str, needed: Sequence[str], expected: str = "", hint: str = "") -> InputError:

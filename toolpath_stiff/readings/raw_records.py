@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.column_names import heading_key, same_quantity, unit_of
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import loop_of
@@ -341,6 +342,8 @@ def _check_heading(table: Table) -> list[str]:
 
 def _needed(heading: list[str]) -> tuple[str, ...]:
     """Columns that records need; a strut on a bench has neither pose nor jog."""
+    if any(heading_key(name).startswith("stiff") or same_quantity(unit_of(name), "N/mm") for name in heading):
+        return ("strut", STIFFNESS[0])
     if "loop" in heading:
         return READINGS[1:]
     if "strut" in heading or not any(name in heading for name in (*POSITION, "jog_um")):
