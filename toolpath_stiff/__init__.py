@@ -26,10 +26,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.case_studies import CaseStudy as CaseStudy
     from toolpath_stiff.api.case_studies import case_study as case_study
     from toolpath_stiff.api.correction import Plan as Plan
-    from toolpath_stiff.api.correction import Reduction as Reduction
     from toolpath_stiff.api.correction import Update as Update
     from toolpath_stiff.api.correction import plan as plan
-    from toolpath_stiff.api.correction import reduce as reduce
     from toolpath_stiff.api.correction import update as update
     from toolpath_stiff.api.diagnosis import Comparison as Comparison
     from toolpath_stiff.api.diagnosis import Diagnosis as Diagnosis
@@ -85,6 +83,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import TableError as TableError
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
+    from toolpath_stiff.readings.raw import Reduction as Reduction
+    from toolpath_stiff.readings.raw import reduce as reduce
     from toolpath_stiff.stiffness.contract import Effect as Effect
     from toolpath_stiff.stiffness.contract import Parameter as Parameter
 
@@ -95,7 +95,7 @@ _PUBLIC = {
     "analysis.results": ("Analysis",),
     "api.by_hand": ("Preview", "preview"),
     "api.case_studies": ("CaseStudy", "case_study"),
-    "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
+    "api.correction": ("Plan", "Update", "plan", "update"),
     "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
     "api.effects": (
         "EffectCatalogue", "EffectCheck", "EffectDraft", "EffectFile", "check_effects", "draft_effect",
@@ -117,6 +117,7 @@ _PUBLIC = {
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
+    "readings.raw": ("Reduction", "reduce"),
     "stiffness.contract": ("Effect", "Parameter"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}

@@ -42,6 +42,8 @@ class Measurements:
     ----------
     files
         Their names: CSV, "FILE.xlsx#SHEET", or "nist-table1", the paper's Table 1.
+    columns
+        Which columns they call otherwise, as --columns has it; None: as FILE.columns.toml beside a file says.
 
     Examples
     --------
@@ -51,13 +53,20 @@ class Measurements:
     42
     """
 
-    def __init__(self, files: Sequence[str]) -> None:
-        self.files = tuple(files)
+    def __init__(self, files: Sequence[str], columns: Mapped = None) -> None:
+        self.files, self.columns = tuple(files), columns_text(columns)
         self._last: tuple[MachineModel, Readings] | None = None
 
     @classmethod
-    def read(cls, *files: str | Path) -> Measurements:
+    def read(cls, *files: str | Path, columns: Mapped = None) -> Measurements:
         """Measurement files, several as one set of readings.
+
+        Parameters
+        ----------
+        files
+            CSV, "FILE.xlsx#SHEET", or "nist-table1".
+        columns
+            Which columns the files call otherwise: "stiffness=stiff_mean:N/um, date=day:DD.MM.YYYY", or such a dict.
 
         Raises
         ------
@@ -70,7 +79,7 @@ class Measurements:
         >>> tps.Measurements.read("nist-table1")
         <Measurements nist-table1>
         """
-        found = cls([str(file) for file in files])
+        found = cls([str(file) for file in files], columns)
         found.on(Machine.load())
         return found
 
@@ -90,7 +99,7 @@ class Measurements:
 
         model = machine.model.given or machine.model.machine
         if self._last is None or self._last[0] is not model:
-            self._last = (model, read_measurements(self.files, model))
+            self._last = (model, read_measurements(self.files, model, columns=self.columns))
         return self._last[1]
 
     def to_frame(self, machine: Machine | str | Path = MACHINE) -> pd.DataFrame:
@@ -138,13 +147,21 @@ def _is_nan(value: object) -> bool:
 
 
 Data = Measurements | str | Path | Sequence[str | Path]
+Mapped = str | Mapping[str, str] | None
 
 
-def measurements_from(data: Data) -> Measurements:
-    """Measurements; of a file's name or several, those in the files."""
+def columns_text(columns: Mapped) -> str | None:
+    """A mapping of columns as --columns has it."""
+    if columns is None or isinstance(columns, str):
+        return columns
+    return ", ".join(f"{ours}={theirs}" for ours, theirs in columns.items())
+
+
+def measurements_from(data: Data, columns: Mapped = None) -> Measurements:
+    """Measurements; of a file's name or several, those in the files, whose columns are called as `columns` says."""
     if isinstance(data, Measurements):
         return data
-    return Measurements([str(data)] if isinstance(data, str | Path) else [str(one) for one in data])
+    return Measurements([str(data)] if isinstance(data, str | Path) else [str(file) for file in data], columns)
 
 
 class Question:
@@ -157,17 +174,19 @@ class Question:
         noise_percent: Noise,
         strut_spread_percent: float,
         seed: int,
+        columns: Mapped = None,
     ) -> None:
         self.on = machine_from(machine)
         self.model = self.on.model.given or self.on.model.machine
-        self.data = None if data is None else measurements_from(data)
+        self.data = None if data is None else measurements_from(data, columns)
         self.noise = _noise(noise_percent)
         if not 0.0 <= strut_spread_percent <= LARGEST_SPREAD_PERCENT:
             raise InputError(f"strut spread {strut_spread_percent:g} %", expected=f"0 to {LARGEST_SPREAD_PERCENT:g} %")
         self.strut_spread = strut_spread_percent / 100.0
         self.seed = whole("seed", seed, 0)
         self.files = self.data.files if self.data else ()
-        self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread)
+        columns = self.data.columns if self.data else None
+        self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread, columns)
         self.inputs = (*self.files, *self.on.inputs)
 
     @property
@@ -260,6 +279,7 @@ def compare(
     machine: Machine | str | Path,
     data: Data,
     *,
+    columns: Mapped = None,
     noise_percent: Noise = None,
     strut_spread_percent: float = 1.0,
     seed: int = 0,
@@ -271,6 +291,8 @@ def compare(
     ----------
     machine, data
         The machine; measurements, or the files that hold them.
+    columns
+        Which columns the files call otherwise: "stiffness=stiff_mean:N/um", or such a dict.
     noise_percent
         Standard deviation of one reading, re-clamping included; or of the reading alone and of a clamping. Unless
         given, from repeats, else from the column sd_N_per_mm, else a low and a high guess.
@@ -294,7 +316,7 @@ def compare(
     """
     from toolpath_stiff.comparison.compare import compare as compare_readings
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     teller(progress)("comparing")
     return Comparison(compare_readings(asked.model, asked.readings, asked=asked.asked, **asked.common), asked.inputs)
 
@@ -368,6 +390,7 @@ def diagnose(
     machine: Machine | str | Path,
     data: Data,
     *,
+    columns: Mapped = None,
     noise_percent: Noise = None,
     strut_spread_percent: float = 1.0,
     seed: int = 0,
@@ -381,6 +404,8 @@ def diagnose(
     ----------
     machine, data
         The machine, whose effect files take part; measurements, or the files that hold them.
+    columns
+        As of `compare`.
     noise_percent, strut_spread_percent, seed
         As of `compare`.
     program, origin_mm_deg
@@ -407,7 +432,7 @@ def diagnose(
     """
     from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     part = None if program is None else program_from(program)
     origin = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
     conditions = asked.on.running(part).conditions

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -66,7 +66,9 @@ class NextVisit(Result):
         return f"{counted(self._document['readings'], 'reading')}, {'settled' if self.settled else 'open'}"
 
 
-def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ()) -> NextVisit:
+def next_visit(
+    folder: str | Path, data: Sequence[str | Path] | str | Path = (), *, columns: str | Mapping[str, str] | None = None
+) -> NextVisit:
     """Which pose of a plan to go to next, after the readings so far.
 
     Parameters
@@ -76,6 +78,8 @@ def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ())
     data
         Measurement files with the plan's readings taken so far, rows still empty among them; unless given, the
         folder's own plan.csv and next_1.csv, next_2.csv ... Readings from before the plan are in it already.
+    columns
+        Which columns the files call otherwise: "stiffness=stiff_mean:N/um", or such a dict.
 
     Raises
     ------
@@ -101,4 +105,4 @@ def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ())
     from toolpath_stiff.planning.next_visit import next_visit as choose_next
 
     files = (data,) if isinstance(data, str | Path) else tuple(data)
-    return NextVisit(choose_next(folder, tuple(map(str, files))), str(folder))
+    return NextVisit(choose_next(folder, tuple(map(str, files)), columns), str(folder))

@@ -320,7 +320,7 @@ def add_replace_option(parser: argparse.ArgumentParser, *, force: bool = True) -
 
 def inputs_of(args: argparse.Namespace) -> Iterator[str]:
     """Every argument that may name a file to read; of a workbook's sheet, the workbook."""
-    from toolpath_stiff.tables import split_name
+    from toolpath_stiff.workbooks import split_name
 
     for name, value in vars(args).items():
         if name not in DESTINATIONS:
@@ -467,7 +467,7 @@ def destination(args: argparse.Namespace, command: str, sources: Sequence[str], 
 
 def _default_folder(sources: Sequence[str], suffix: str) -> Path:
     """`reports/NAME`; where that holds results of another file of the name, the folder above stands before it."""
-    from toolpath_stiff.tables import split_name
+    from toolpath_stiff.workbooks import split_name
 
     name = joined_names(sources)
     default = folder = Path(f"reports/{name}{suffix}")
@@ -481,7 +481,7 @@ def _default_folder(sources: Sequence[str], suffix: str) -> Path:
 
 def joined_names(sources: Sequence[str]) -> str:
     """Files by their names without folder, ending and sheet: `first+second`."""
-    from toolpath_stiff.tables import split_name
+    from toolpath_stiff.workbooks import split_name
 
     names = [Path(split_name(source)[0]).stem for source in sources]
     joined = "+".join(names)

@@ -51,6 +51,16 @@ The rig shares no stiffness code with the model that it tests. The seal is a bli
 FILES = ("measurements.csv", "machine.toml", "sealed.bin")  # of an exercise
 
 
+def add_columns_option(parser: argparse.ArgumentParser) -> None:
+    """--columns, of every command that reads measurements or raw records."""
+    parser.add_argument(
+        "--columns",
+        metavar="MAPPING",
+        help='columns that DATA call otherwise: "stiffness=stiff_mean:N/um, date=day:DD.MM.YYYY, setup==bare" '
+        "(default: as FILE.columns.toml beside a file says)",
+    )
+
+
 def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherwise: str = "") -> None:
     """DATA, --machine and --effects."""
     parser.add_argument(
@@ -70,6 +80,7 @@ def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherw
         help="file with your own physical effects, used as well",
     )
     add_unchecked_option(parser)
+    add_columns_option(parser)
 
 
 def add_noise_arguments(parser: argparse.ArgumentParser, guess: str = "a low and a high guess") -> None:
@@ -104,7 +115,7 @@ def measured(args: argparse.Namespace) -> tuple[Machine, Measurements]:
     """The machine with its effect files, and the measurements."""
     from toolpath_stiff.api.diagnosis import Measurements
 
-    return loaded_machine(args), Measurements(args.data)
+    return loaded_machine(args), Measurements(args.data, args.columns)
 
 
 def noise_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -135,14 +146,13 @@ columns of RAW:
   x_mm,y_mm,z_mm,direction     where and along what (X, Y, Z; or dx,dy,dz), optionally a_deg,b_deg,c_deg
   jog_um                       how far the machine was told to move from zero
   force_N,displacement_um      gauge and indicator, positive the way the jog counts
-  date                         2024-03-31, 31.03.2024, 31 Mar 2024, 2024-03, 2024 ...; each date is a loop of its own
+  date                         2024-03-31, 2024-03-31T14:05, 2024-03, 2024; each date is a loop of its own
   point,setup,clamp,repeat,loop,tool_extension_mm,time_min,temperature_C   optional, carried along
-of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um, length_mm if known; no pose and no jog;
-                               or strut, date, stiffness_N_per_mm of struts that were reduced elsewhere
-Another unit in a heading (force_kN, Displacement [mm]) is converted; further columns are not used. In a file of one
-strut, strut and date may stand above the heading (strut: 3) or in the file's name (strut3_2021-09-16.csv). Struts or
-dates side by side (F1,d1,F2,d2,...), a row of struts above the quantities, one sheet a strut, blocks one below the
-other, JSON and LabVIEW's .lvm are read as well.
+of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um; length_mm, serial if known; no pose, no
+                               jog; or strut, date, stiffness_N_per_mm of struts that were reduced elsewhere
+Other names, units and forms of dates are said by a mapping, also kept as RAW.columns.toml (force = "Kraft:kN"):
+  tps reduce RAW --columns "strut=hp, date=day_ms:ms, stiffness=stiff_mean:N/um"
+  tps reduce RAW --columns "strut==3, date=Datum:DD.MM.YYYY, force=Kraft:kN, displacement=Weg:mm"
 
 Records in the order taken, jogging 0, +200, -200, 0 um as ASME B5.54 and the paper do; those of one point, direction,
 set-up, clamping and repeat are one loop. Its stiffness is the secant between the extremes (the paper's equation 12);
@@ -156,16 +166,7 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = REDUCE_EPILOG
     parser.add_argument("raw", nargs="+", metavar="RAW", help="raw records: files, FILE.xlsx[#SHEET], folders of files")
-    parser.add_argument(
-        "--date-order",
-        metavar="ORDER",
-        help="dmy or mdy: whether day or month stands first in dates as 04/03/2021, where no other date tells",
-    )
-    parser.add_argument(
-        "--units",
-        metavar="UNITS",
-        help="units of headings that state none: N,um of force and displacement, N/um",
-    )
+    add_columns_option(parser)
     parser.add_argument(
         "--compression-positive", action="store_true", help="forces of struts on a bench count compression positive"
     )
@@ -181,19 +182,19 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
 
 def reduce(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
-    from toolpath_stiff.api.correction import reduce
+    from toolpath_stiff.readings.raw import reduce
     from toolpath_stiff.results import json_text
-    from toolpath_stiff.tables import split_name
+    from toolpath_stiff.workbooks import split_name
 
-    found = reduce(
-        *args.raw, date_order=args.date_order, units=args.units, compression_positive=args.compression_positive
-    )
+    found = reduce(*args.raw, columns=args.columns, compression_positive=args.compression_positive)
     first = Path(split_name(args.raw[0])[0])
     name = first.stem if first.is_file() else first.resolve().name
     out = Path(args.out or f"{name or 'raw'}_measurements.csv")
     files = found.files(out, plots=not args.no_plots)
     keep(check_made(args, files), quiet=args.json)
     written = [str(write_atomically(name, content)) for name, content in files.items()]
+    for line in found.read_as:
+        print(f"tps: {line}", file=sys.stderr)
     for note in found.notes:
         print(f"tps: note: {note}", file=sys.stderr)
     if args.json:
@@ -480,7 +481,7 @@ def _next(args: argparse.Namespace) -> int:
     """The next visit of a plan: say where, write its rows."""
     from toolpath_stiff.api.next_visits import next_visit
 
-    found = next_visit(args.next, args.data)
+    found = next_visit(args.next, args.data, columns=args.columns)
     written = found.save()
     if args.json:
         sys.stdout.write(found.to_json())

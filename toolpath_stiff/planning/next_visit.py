@@ -26,8 +26,8 @@ from toolpath_stiff.planning.gaps import SETTLED, ReadingNoise, choose, pair_sha
 from toolpath_stiff.planning.plan import Plan, Proposal
 from toolpath_stiff.planning.rivals import Forecast, principal
 from toolpath_stiff.planning.visits import Costs, Menu, Visits, planned_readings
-from toolpath_stiff.readings.rows import COLUMNS, Row, read_rows, with_dates
-from toolpath_stiff.tables import read_table
+from toolpath_stiff.readings.mapping import Mapped, mapped_table
+from toolpath_stiff.readings.rows import COLUMNS, Row, read_rows
 
 TABLES = "plan_tables.npz"  # in the plan's folder
 
@@ -218,7 +218,7 @@ class NextVisit:
         return not self.unlike and max(self.probability.values()) >= SETTLED
 
 
-def next_visit(folder: str | Path, files: tuple[str, ...] = ()) -> NextVisit:
+def next_visit(folder: str | Path, files: tuple[str, ...] = (), columns: Mapped = None) -> NextVisit:
     """Where to go next after some readings of a plan.
 
     Parameters
@@ -235,7 +235,7 @@ def next_visit(folder: str | Path, files: tuple[str, ...] = ()) -> NextVisit:
         The folder holds no tables; a file cannot be read, bad rows.
     """
     tables = Tables.read(folder)
-    taken, notes = _taken(tables, files or own_files(folder))
+    taken, notes = _taken(tables, files or own_files(folder), columns)
     forecasts, far = tables.forecasts, list[tuple[int, float]]()
     if len(taken.rows):
         forecasts, far = conditioned(tables, taken)
@@ -329,7 +329,7 @@ def _been(tables: Tables, taken: Taken) -> NDArray[np.bool_]:
     return found
 
 
-def _taken(tables: Tables, files: tuple[str, ...]) -> tuple[Taken, list[str]]:
+def _taken(tables: Tables, files: tuple[str, ...], columns: Mapped) -> tuple[Taken, list[str]]:
     """The readings of measurement files that are the plan's, in their order; how many are not."""
     readings = tables.visits.readings
     known: dict[tuple[Any, ...], int] = {}
@@ -342,7 +342,7 @@ def _taken(tables: Tables, files: tuple[str, ...]) -> tuple[Taken, list[str]]:
             k,
         )  # fmt: skip
     rows, logs, clamps, where, others = [], [], [], [], 0
-    for table in with_dates([read_table(name, "measurements", COLUMNS) for name in files]):
+    for table in [mapped_table(name, "measurements", COLUMNS, columns) for name in files]:
         for row in read_rows(table, planned=True).rows:
             own = known.get(_of_row(row, tables.menu.setups[0]))
             value = np.nan if own is None else _log(row, float(tables.offset[own]), float(tables.toward[own]))

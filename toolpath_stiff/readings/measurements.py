@@ -21,13 +21,14 @@ from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.dates import day_of, days_since_first
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
-from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows, with_dates
+from toolpath_stiff.readings.mapping import Mapped, mapped_table
+from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
-from toolpath_stiff.tables import Table, parse_table, read_table
+from toolpath_stiff.tables import parse_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 
 NIST_TABLE_1 = "nist-table1"
@@ -165,7 +166,7 @@ class Measurements:
 
 
 def read_measurements(
-    paths: str | Path | Iterable[str | Path], machine: Machine, planned: bool = False
+    paths: str | Path | Iterable[str | Path], machine: Machine, planned: bool = False, columns: Mapped = None
 ) -> Measurements:
     """Read measurement files.
 
@@ -177,6 +178,8 @@ def read_measurements(
         The machine that was measured; its poses are checked against it.
     planned
         Whether the stiffness may be left empty.
+    columns
+        Which columns the files call otherwise, as `mapping` says.
 
     Raises
     ------
@@ -193,50 +196,31 @@ def read_measurements(
         if name in seen:
             raise MeasurementError(f"{name!r} is given twice", hint="name it once")
         seen.add(name)
-    files = _read_files([str(name) for name in names], planned)
+    files: list[RowFile] = []
     errors: list[InputError] = []
-    for parsed in files:
-        if isinstance(parsed, InputErrors):
-            errors += parsed.errors
-    good = [parsed for parsed in files if isinstance(parsed, RowFile)]
-    errors = errors or duplicates([row for parsed in good for row in parsed.rows], across_files=True)
+    for name in map(str, names):
+        try:
+            files.append(_rows(name, planned, columns))
+        except InputErrors as bad:  # those of all files are reported together
+            errors += bad.errors
+    errors = errors or duplicates([row for file in files for row in file.rows], across_files=True)
     if errors:
         raise InputErrors(errors)
-    return with_offsets(_checked(_columns(good, machine), machine), machine)
+    return with_offsets(_checked(_columns(files, machine), machine), machine)
 
 
-def _read_files(names: list[str], planned: bool) -> list[RowFile | InputErrors]:
-    """Every file; bad rows of one are handed back, so that those of all files are reported together."""
-    found: list[Table | InputErrors] = []
-    for name in names:
-        try:
-            found.append(_table(name))
-        except InputErrors as bad:
-            found.append(bad)
-    dated = iter(with_dates([one for one in found if isinstance(one, Table)]))
-    return [one if isinstance(one, InputErrors) else _rows(next(dated), planned) for one in found]
-
-
-def _table(name: str) -> Table:
+def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
+    """Rows of a file, or of the paper's Table 1."""
     if name != NIST_TABLE_1:
-        return read_table(name, "measurements", COLUMNS)
+        return read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
     text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
-    return parse_table(text, NIST_TABLE_1, COLUMNS)
-
-
-def _rows(table: Table, planned: bool) -> RowFile | InputErrors:
-    if table.file != NIST_TABLE_1:
-        try:
-            return read_rows(table, planned)
-        except InputErrors as bad:
-            return bad
-    own = read_rows(table)
+    table_1 = read_rows(parse_table(text, NIST_TABLE_1, COLUMNS))
     rows = tuple(
         replace(row, labels={**row.labels, "setup": "riser" if row.position[2] > RISER_ABOVE else "no riser"})
-        for row in own.rows
+        for row in table_1.rows
     )
     note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
-    return RowFile(rows, own.columns | {"setup"}, (*own.notes, note))
+    return RowFile(rows, table_1.columns | {"setup"}, (*table_1.notes, note))
 
 
 def _columns(files: list[RowFile], machine: Machine) -> Measurements:

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.planning.document import GapMap, gap_map, group_of, height_groups, plan_csv, rows_of
 from toolpath_stiff.planning.next_visit import TABLES, tables_of
 from toolpath_stiff.planning.plan import Plan, Proposal
 from toolpath_stiff.planning.visits import Visits
-from toolpath_stiff.readings.raw import measurement_csv
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
-from toolpath_stiff.report.history import dated, history_png
+from toolpath_stiff.report.history import dated, history_png, history_text
 from toolpath_stiff.report.words import plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.planning.document import PlanDocument
-    from toolpath_stiff.readings.raw import LoopFigures, Reduction
+    from toolpath_stiff.readings.loop_figures import LoopFigures
+    from toolpath_stiff.readings.raw import Reduction
     from toolpath_stiff.readings.raw_records import Loop
 
 
@@ -266,7 +267,7 @@ MOST = 60  # loops in one picture; further ones are counted in its heading
 
 
 @picture
-def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str) -> Figure:
+def loops_png(loops: Sequence[tuple[Loop, LoopFigures]], title: str) -> Figure:
     """One small diagram a loop, in the order of the file, as PNG."""
     shown = min(len(loops), MOST)
     columns = min(COLUMNS, shown)
@@ -276,7 +277,7 @@ def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str)
         more = f"; the first {MOST} of {len(loops)} loops" if len(loops) > MOST else ""
         figure.suptitle(f"{title}: force over deflection{more}", x=0.02, ha="left", weight="bold", color=INK)
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, loop, one in zip(axes, loops, figures, strict=False):
+        for ax, (loop, one) in zip(axes, loops, strict=False):
             deflection = um_from_m(loop.deflection)
             ends = [int(np.argmin(loop.drive)), int(np.argmax(loop.drive))]
             ax.plot(deflection[ends], loop.force[ends], color=SECOND_ORANGE, linewidth=1.6, label="secant")
@@ -301,22 +302,31 @@ def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str)
         return figure
 
 
-def recorded(reduction: Reduction) -> tuple[list[Loop], list[LoopFigures]]:
-    """Loops with their records, and what they say; rows of a table of stiffnesses have none."""
-    pairs = [pair for pair in zip(reduction.loops, reduction.figures, strict=True) if len(pair[0].force)]
-    return [loop for loop, _ in pairs], [one for _, one in pairs]
+def reduction_figure(reduction: Reduction) -> Figure:
+    """Force against deflection of each loop; without records the struts over their dates. Raises `InputError`."""
+    if reduction.recorded:
+        return loops_png.figure(reduction.recorded, reduction.title)
+    if not dated(reduction.history):
+        raise InputError("nothing to draw: neither records nor several dates")
+    return history_png.figure(reduction.history)
 
 
-def loop_files(reduction: Reduction, out: Path, title: str, *, plots: bool = True) -> dict[Path, Content]:
-    """The measurement file, and with `plots` the loops drawn under `title`; dated struts over their dates."""
-    contents: dict[Path, Content] = {out: measurement_csv(reduction)}
-    if plots:
-        loops, figures = recorded(reduction)
-        if loops:
-            contents[out.with_name(f"{out.stem}_loops.png")] = loops_png(loops, figures, title)
-        if dated(reduction.history):
-            contents[out.with_name(f"{out.stem}_history.png")] = history_png(reduction.history)
-    return contents
+def reduction_pictures(reduction: Reduction, out: Path) -> dict[Path, Content]:
+    """The loops drawn, and dated struts over their dates, beside the measurement file `out`."""
+    pictures: dict[Path, Content] = {}
+    if reduction.recorded:
+        pictures[out.with_name(f"{out.stem}_loops.png")] = loops_png(reduction.recorded, reduction.title)
+    if dated(reduction.history):
+        pictures[out.with_name(f"{out.stem}_history.png")] = history_png(reduction.history)
+    return pictures
+
+
+def reduction_text(reduction: Reduction) -> str:
+    """The figures of the loops and the struts' histories; rows of a table of stiffnesses say nothing themselves."""
+    pairs = zip(reduction.to_dict()["loops"], reduction.loops, strict=True)
+    recorded = [entry for entry, loop in pairs if len(loop.force)]
+    history = history_text(reduction.history, undated=not recorded)
+    return "\n".join([loops_text(recorded), *history]) if recorded else "\n".join(history).lstrip("\n")
 
 
 def loops_text(entries: Sequence[Mapping[str, Any]]) -> str:
