@@ -18,9 +18,9 @@ from toolpath_stiff.diagnosis.document import DiagnosisDocument, document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.document import plan_csv, plan_rows
-from toolpath_stiff.planning.plan import Plan, plan_measurements, random_visits
+from toolpath_stiff.planning.plan import RivalPlan, plan_measurements, random_visits
 from toolpath_stiff.planning.rivals import rivals_of
+from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.visits import Costs, Menu
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
@@ -193,7 +193,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
     record |= {
         "rivals": [rival.name for rival in plan.rivals],
         "settleable": settleable(plan, truth),
-        "pairs": [[pair.first, pair.second, round(pair.gap, 2), pair.separable] for pair in plan.pairs],
+        "pairs": [[*pair.effects, round(pair.separation_sigma, 2), pair.separable] for pair in plan.pairs],
         "forecast": round(plan.after.settled, 3),
     }
     blind = random_visits(plan, POSES[-1], job.seed)
@@ -220,7 +220,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
     return record
 
 
-def _plan(diagnosis: Diagnosis, poses: int) -> Plan | None:
+def _plan(diagnosis: Diagnosis, poses: int) -> RivalPlan | None:
     """The plan behind `next_measurements`, which hands on its rows only; None where nothing rivals."""
     judgement = diagnosis.main
     rivals = rivals_of(judgement)
@@ -233,14 +233,14 @@ def _plan(diagnosis: Diagnosis, poses: int) -> Plan | None:
     )  # fmt: skip
 
 
-def settleable(plan: Plan, truth: str) -> bool:
+def settleable(plan: RivalPlan, truth: str) -> bool:
     """Whether tip stiffness can tell the truth from each rival; without the truth among them, the rivals apart."""
     known = truth in {rival.name for rival in plan.rivals}
-    return all(pair.separable for pair in plan.pairs if not known or truth in (pair.first, pair.second))
+    return all(pair.separable for pair in plan.pairs if not known or truth in pair.effects)
 
 
 def _measured(
-    case: case_module.Case, before: Diagnosis, plan: Plan, visits: Sequence[int], file: Path, seed: Sequence[int]
+    case: case_module.Case, before: Diagnosis, plan: RivalPlan, visits: Sequence[int], file: Path, seed: Sequence[int]
 ) -> dict[str, Any]:
     """What the hidden machine shows at these visits; clamps are numbered on."""
     file.write_text(plan_csv(plan_rows(plan.visits, visits, set(before.data.point.tolist()))), encoding="utf-8")

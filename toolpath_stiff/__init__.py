@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.by_hand import preview as preview
     from toolpath_stiff.api.case_studies import CaseStudy as CaseStudy
     from toolpath_stiff.api.case_studies import case_study as case_study
-    from toolpath_stiff.api.correction import Plan as Plan
     from toolpath_stiff.api.correction import Update as Update
     from toolpath_stiff.api.correction import plan as plan
     from toolpath_stiff.api.correction import update as update
@@ -51,7 +50,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.machines import recover_geometry as recover_geometry
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
-    from toolpath_stiff.api.next_visits import NextVisit as NextVisit
     from toolpath_stiff.api.next_visits import next_visit as next_visit
     from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import Placement as Placement
@@ -83,6 +81,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import TableError as TableError
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
+    from toolpath_stiff.planning.next_visit import NextVisit as NextVisit
+    from toolpath_stiff.planning.result import Plan as Plan
     from toolpath_stiff.readings.raw import Reduction as Reduction
     from toolpath_stiff.readings.raw import reduce as reduce
     from toolpath_stiff.stiffness.contract import Effect as Effect
@@ -95,7 +95,7 @@ _PUBLIC = {
     "analysis.results": ("Analysis",),
     "api.by_hand": ("Preview", "preview"),
     "api.case_studies": ("CaseStudy", "case_study"),
-    "api.correction": ("Plan", "Update", "plan", "update"),
+    "api.correction": ("Update", "plan", "update"),
     "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
     "api.effects": (
         "EffectCatalogue", "EffectCheck", "EffectDraft", "EffectFile", "check_effects", "draft_effect",
@@ -106,7 +106,7 @@ _PUBLIC = {
         "Machine", "MachineCheck", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry",
     ),
     "api.many": ("ManyAnalyses", "analyze_many"),
-    "api.next_visits": ("NextVisit", "next_visit"),
+    "api.next_visits": ("next_visit",),
     "api.placements": (
         "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
     ),
@@ -117,6 +117,8 @@ _PUBLIC = {
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
+    "planning.next_visit": ("NextVisit",),
+    "planning.result": ("Plan",),
     "readings.raw": ("Reduction", "reduce"),
     "stiffness.contract": ("Effect", "Parameter"),
 }  # fmt: skip

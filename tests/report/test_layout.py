@@ -19,10 +19,10 @@ from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
-from toolpath_stiff.planning.document import MOST_LEVELS, group_of, height_groups
+from toolpath_stiff.planning.gap_map import MOST_LEVELS, group_of, height_groups
 from toolpath_stiff.planning.visits import Visits
 from toolpath_stiff.readings.measurements import read_measurements
-from toolpath_stiff.report import case_study, figure, machine, measuring
+from toolpath_stiff.report import case_study, figure, machine, plan
 from toolpath_stiff.report import map as map_report
 from toolpath_stiff.report.analysis.page import page
 from toolpath_stiff.report.batch.index import batch_page
@@ -41,9 +41,7 @@ TOUCH = 1.5  # pixels that boxes may share: they are a little larger than the le
 def last(monkeypatch):
     """The figures that were drawn, last one last."""
     figures = []
-    for module in (
-        case_study, compare_pictures, diagnose_pictures, machine, map_report, measuring,
-    ):  # fmt: skip
+    for module in (case_study, compare_pictures, diagnose_pictures, machine, map_report, plan):
 
         def kept(*size, new=module.new_figure):
             figures.append(new(*size))
@@ -171,7 +169,7 @@ def visits_at(z):
 @pytest.mark.parametrize("heights", [[0.43, 0.78, 1.2, 1.49], [0.07, 0.43, 0.78, 1.13, 1.49, 1.2], [0.5]])
 def test_every_pose_is_in_the_panel_of_its_own_height(last, heights):
     visits = visits_at(np.array([*heights, heights[0]]))
-    measuring.plan_picture(visits, range(len(heights) + 1), ["vertical"] * (len(heights) + 1), None, "title", "text")
+    plan.plan_picture(visits, range(len(heights) + 1), ["vertical"] * (len(heights) + 1), None, "title", "text")
     found = {}
     for axes in last[-1].axes:
         z = float(re.match(r"z = ([\d.]+) mm", axes.get_title(loc="left")).group(1))

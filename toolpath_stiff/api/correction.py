@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.correction.update import Correction
-    from toolpath_stiff.planning.plan import Proposal
+    from toolpath_stiff.planning.result import Plan
 
 STEEPEST_TILT_DEG = 90.0
 COSTS = ("reading", "pose", "tool", "setup", "indicator")
@@ -219,58 +219,6 @@ def update(
     return Update(found, asked)
 
 
-class Plan(FolderResult):
-    """What to measure next, or first, and what that is expected to show.
-
-    Attributes
-    ----------
-    proposal
-        Visits, rivals and costs, with arrays in SI.
-    """
-
-    command: ClassVar[str] = "plan"
-
-    def __init__(self, proposal: Proposal, asked: Question, line: str) -> None:
-        from toolpath_stiff.planning.document import document
-
-        self.proposal, self.inputs = proposal, asked.inputs
-        self._document = document(proposal, line)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of plan.json."""
-        return dict(self._document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a reading, as in `plan.csv`: a measurement file with the stiffness left empty."""
-        import pandas as pd
-
-        from toolpath_stiff.planning.document import rows_of
-
-        return pd.DataFrame(rows_of(self.proposal))
-
-    def plot(self) -> Figure:
-        """The visits in the workspace."""
-        from toolpath_stiff.report.measuring import picture_arguments, plan_picture
-
-        return plan_picture.figure(*picture_arguments(self.proposal))
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.measuring import text
-
-        return text(self._document)
-
-    def _short(self) -> str:
-        from toolpath_stiff.report.words import counted
-
-        return f"{self._document['kind']}, {counted(len(self._document['visits']), 'clamping')}"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps plan`."""
-        from toolpath_stiff.report.measuring import files
-
-        return files(self.proposal, self._document, plots=plots)
-
-
 @machine_by_name
 def plan(
     machine: Machine | str | Path,
@@ -333,7 +281,7 @@ def plan(
     >>> list(found.files(plots=False))
     ['plan.csv', 'plan.json', 'plan_tables.npz']
     """
-    from toolpath_stiff.planning.plan import plan as plan_visits
+    from toolpath_stiff.planning.result import plan as plan_visits
     from toolpath_stiff.planning.visits import Costs
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
@@ -353,7 +301,7 @@ def plan(
         seed=seed or None,
     )
     own += ["--indicators"] if indicators else []
-    found = plan_visits(
+    return plan_visits(
         asked.model,
         None if asked.data is None else asked.readings,
         between=tuple(between),
@@ -367,10 +315,11 @@ def plan(
         indicators=indicators,
         costs=Costs(**costs),
         judgement=None if diagnosis is None else diagnosis.diagnosed.main,
-        files=asked.files,
+        names=asked.files,
+        line=asked.asked.command("plan", *own),
+        inputs=asked.inputs,
         **asked.common,
     )
-    return Plan(found, asked, asked.asked.command("plan", *own))
 
 
 def _costs(minutes: Mapping[str, float]) -> dict[str, float]:

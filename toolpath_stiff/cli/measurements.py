@@ -453,7 +453,7 @@ def plan(args: argparse.Namespace) -> int:
     """Plan, write the files, say what the plan promises; or the next pose of a plan."""
     if args.next is not None:
         return _next(args)
-    from toolpath_stiff.report.measuring import names
+    from toolpath_stiff.report.plan import names
 
     target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
     from toolpath_stiff.api.correction import plan

@@ -34,9 +34,9 @@ from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, jud
 from toolpath_stiff.inference.noise import JOINT_ERROR, Noise, noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.document import nothing_gained, plan_rows
-from toolpath_stiff.planning.plan import plan_measurements
+from toolpath_stiff.planning.plan import nothing_gained, plan_measurements
 from toolpath_stiff.planning.rivals import rivals_of
+from toolpath_stiff.planning.rows import plan_rows
 from toolpath_stiff.planning.visits import Costs, Menu
 from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
@@ -436,8 +436,8 @@ def next_measurements(
     for row in rows:
         row["why"] = plan.why[int(row["clamp"]) - 1]
     remarks = [
-        f"{pair.first} and {pair.second}: tip stiffness cannot tell them apart; put an indicator "
-        + " or ".join(f"{place}" for place in dict.fromkeys(pair.indicators.values()))
+        f"{' and '.join(pair.effects)}: tip stiffness cannot tell them apart; put an indicator "
+        + " or ".join(f"{place}" for place in dict.fromkeys(pair.indicator_across.values()))
         for pair in plan.pairs
         if not pair.separable
     ]
