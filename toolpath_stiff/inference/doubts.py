@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.covariances import Groups, Precision
-from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.inference.hypotheses import POWER_80
 from toolpath_stiff.inference.noise import Noise, Scatter
@@ -327,7 +327,7 @@ def slips_that_show(problem: Problem, fit: Fit) -> tuple[SlipSize, ...]:
     data = problem.predictor.data
     tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))
     wanted = float(np.sqrt(2.0 * np.log(tried / SLIPPED))) + POWER_80
-    projected = problem.scatter.precision.beside(fit.jacobian.T, _prior(fit))
+    projected = problem.projected(fit.jacobian)
     blocks = [(rows, projected.block(rows)) for rows in Groups.by(data.clamp).members() if len(rows) > 1]
     found = []
     for names, field, (step, *_), si, unit in POSE_STEPS:
@@ -354,7 +354,7 @@ def _suspect(data: Measurements, ways: Sequence[_Slip], odds: float) -> Suspect:
 
 def _looked_at(problem: Problem, fit: Fit, taken: NDArray[np.bool_]) -> tuple[list[Rows], list[Rows]]:
     """Rows that are far off, and clampings whose rows together are; the furthest of them."""
-    projected = problem.scatter.precision.beside(fit.jacobian.T, _prior(fit))
+    projected = problem.projected(fit.jacobian)
     pulls = projected.times(fit.residual)
     inflated = _inflation(fit)
     squared = np.where(taken, 0.0, pulls**2 / np.maximum(projected.diagonal, 1e-300)) / inflated
@@ -371,17 +371,10 @@ def _looked_at(problem: Problem, fit: Fit, taken: NDArray[np.bool_]) -> tuple[li
     return rows, [members for far, members in clampings[:MOST_CLAMPS] if far > 2.0]
 
 
-def _prior(fit: Fit) -> FloatArray:
-    prior = np.zeros((fit.jacobian.shape[1],) * 2)
-    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
-    return prior
-
-
 def _inflation(fit: Fit) -> float:
     """By how much more than noise the fit leaves: where the machine is not understood, rows are not to blame."""
-    projected = fit.scatter.precision.beside(fit.jacobian.T, _prior(fit))
     freedom = max(len(fit.residual) - fit.jacobian.shape[1], 1)
-    return float(max(1.0, projected.squares(fit.residual) / freedom))
+    return float(max(1.0, fit.projected.squares(fit.residual) / freedom))
 
 
 def _slips(data: Measurements, rows: Sequence[Rows], clampings: Sequence[Rows]) -> Iterator[_Slip]:
@@ -499,7 +492,7 @@ def _without(
     """Inverse covariance of what the fit leaves and its pulls, with wild rows widened and taken ones set aside."""
     rows, gone = np.array(wild, dtype=np.int64), np.flatnonzero(taken)
     wider = scatter.covariance.widened(rows, scatter.widening[rows]).widened(gone, np.full(len(gone), SET_ASIDE))
-    projected = wider.precision.beside(fit.jacobian.T, _prior(fit))
+    projected = wider.precision.beside(fit.jacobian.T, law_prior(fit.jacobian.shape[1]))
     return projected, projected.times(fit.residual)
 
 

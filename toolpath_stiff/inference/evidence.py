@@ -25,6 +25,13 @@ from toolpath_stiff.stiffness.model import ActiveEffect
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
 
 
+def law_prior(unknowns: int) -> FloatArray:
+    """(q, q) information of the strut law's prior about q unknowns, of which the law's two are the first."""
+    prior = np.zeros((unknowns, unknowns))
+    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+    return prior
+
+
 GRID = 24  # sizes a sign
 
 
@@ -116,6 +123,11 @@ class Fit:
         return np.abs(np.expm1(-self.residual))
 
     @property
+    def projected(self) -> Precision:
+        """Inverse covariance of what the fit leaves, under the scatter that it found."""
+        return self.scatter.precision.beside(self.jacobian.T, law_prior(self.jacobian.shape[1]))
+
+    @property
     def log_likelihood(self) -> float:
         """Of the residuals, the price of wild readings included."""
         return float(self.scatter.log_likelihood(self.residual))
@@ -184,9 +196,7 @@ class Problem:
 
         `jacobian` (n, 2 + p) of ln k to the strut law and p sizes.
         """
-        prior = np.zeros((jacobian.shape[1],) * 2)
-        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
-        return self.scatter.precision.beside(jacobian.T, prior)
+        return self.scatter.precision.beside(jacobian.T, law_prior(jacobian.shape[1]))
 
     def prior(self, table: Table, j: int) -> SizePrior:
         """Prior of a component's size, worked out once."""
@@ -225,8 +235,6 @@ class Problem:
             law = law + np.clip(np.linalg.solve(information, gradient[..., None])[..., 0], -0.5, 0.5)
         return law, self.observed + np.log(self.compliance(law, delta)), information
 
-    # -- scores ----------------------------------------------------------------------------------------------------
-
     def score_base(self) -> Fit:
         """The model without any further effect."""
         scatter, law = self.scatter, np.zeros(2)
@@ -262,13 +270,11 @@ class Problem:
         interval = likely_interval(scan.sizes, scan.profile)
         best = (np.array([scan.sizes[peak]]),)
         jacobian = self._jacobian((table,), best, law)
-        information = scatter.precision.times(jacobian.T) @ jacobian
-        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
-        constant = -0.5 * scatter.covariance.log_determinant - len(scatter.wild) * scatter.price
+        information = scatter.precision.times(jacobian.T) @ jacobian + law_prior(3)
         return Fit(
             (table.candidate,), best, (0,), law, residual, jacobian,
             np.asarray(np.linalg.pinv(information), dtype=float), scatter,
-            tables=(table,), log_evidence=log_integral + constant, interval=interval,
+            tables=(table,), log_evidence=log_integral + scatter.log_price, interval=interval,
         )  # fmt: skip
 
     def _scan(
@@ -394,8 +400,7 @@ class Problem:
         precision: Precision,
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
         """Law, residual, information and jacobian after fitting the chosen sizes, in place; None where that fails."""
-        prior = np.zeros((2 + len(chosen), 2 + len(chosen)))
-        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+        prior = law_prior(2 + len(chosen))
 
         def added() -> FloatArray:
             return sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))

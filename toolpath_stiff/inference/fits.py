@@ -70,8 +70,7 @@ def fit_effects(
     Point = tuple[FloatArray, FloatArray, FloatArray]  # law, all sizes, residual
 
     def equations(at: Point) -> NormalEquations:
-        jacobian = search.jacobian(*at)
-        return NormalEquations(jacobian, *_normal_equations(jacobian, at[2], at[0], scatter, law_free))
+        return _normal_equations(search.jacobian(*at), at[2], at[0], scatter, law_free)
 
     def move(at: Point, here: NormalEquations) -> tuple[Point, FloatArray] | None:
         step = search.newton_step(at[1], here.information, here.gradient)
@@ -102,31 +101,21 @@ def _pulls_on_absent(
     if not absent:
         return {}
     jacobian = search.jacobian(law, flat, residual)
-    information, gradient = _normal_equations(jacobian, residual, law, scatter, search.law_free)
-    inverse = scaled_inverse(information)
-    step = inverse @ gradient
+    equations = _normal_equations(jacobian, residual, law, scatter, search.law_free)
+    inverse = scaled_inverse(equations.information)
+    step = inverse @ equations.gradient
     return {i: (float(flat[i] + step[2 + i]), float(np.sqrt(max(inverse[2 + i, 2 + i], 0.0)))) for i in absent}
 
 
 def _normal_equations(
     jacobian: FloatArray, residual: FloatArray, law: FloatArray, scatter: Scatter, law_free: bool
-) -> tuple[FloatArray, FloatArray]:
+) -> NormalEquations:
     weighted = scatter.precision.times(jacobian.T)
-    information = weighted @ jacobian
-    gradient = weighted @ residual
+    information, gradient = weighted @ jacobian, weighted @ residual
     prior = 1.0 / LAW_PRIOR**2 if law_free else 1e12
     information[:2, :2] += prior * np.eye(2)
     gradient[:2] -= prior * law
-    return information, gradient
-
-
-def _equations_of(fit: Fit) -> tuple[FloatArray, FloatArray]:
-    """Those of the last step of a fit."""
-    return _normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
-
-
-def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
-    return np.asarray(scaled_inverse(information) @ gradient)
+    return NormalEquations(jacobian, information, gradient)
 
 
 @dataclass(frozen=True)
@@ -161,7 +150,7 @@ class _Search:
         By bounded-variable least squares where the plain step would leave them: cutting that off leads uphill where
         sizes trade off against each other.
         """
-        step = _solve(information, gradient)
+        step = np.asarray(scaled_inverse(information) @ gradient)
         low, high = (limit[list(self.free)] - flat[list(self.free)] for limit in self.limits())
         if ((step[2:] >= low) & (step[2:] <= high)).all():
             return step
@@ -255,9 +244,9 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
         start = np.array([_start(component, share) for component in candidate.components])
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
         place = np.concatenate([fit.law, *fit.sizes])
-        widths = 1.0 / np.sqrt(np.maximum(np.diag(_equations_of(fit)[0]), 1e-300))
+        last = _normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
         # Two starts mostly end in one place, and go on from there alike.
-        if not any((np.abs(place - other) < TOLERANCE * widths).all() for other in seen):
+        if not any((np.abs(place - other) < TOLERANCE * (1.0 / last.scale)).all() for other in seen):
             yield _nearly_settled(problem, fit)
         seen.append(place)
 
@@ -286,14 +275,15 @@ def _nearly_settled(problem: Problem, fit: Fit) -> tuple[Fit, bool]:
 
 def _gain_to_come(problem: Problem, fit: Fit) -> float:
     """Twice what one more step adds to the log posterior; sizes that it pulls beyond their bounds stay there."""
-    information, gradient = _equations_of(fit)
+    last = _normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
+    gradient = last.gradient
     search = _Search(problem, fit.candidates, fit.free, fit.law_free)
     flat = np.concatenate([fit.law, *fit.sizes])
     low, high = (
         np.concatenate([np.full(2, at), limit]) for at, limit in zip((-np.inf, np.inf), search.limits(), strict=True)
     )
     kept = ~((flat <= low) & (gradient <= 0.0) | (flat >= high) & (gradient >= 0.0))
-    return float(gradient[kept] @ scaled_inverse(information[np.ix_(kept, kept)]) @ gradient[kept])
+    return float(gradient[kept] @ scaled_inverse(last.information[np.ix_(kept, kept)]) @ gradient[kept])
 
 
 def _settled(problem: Problem, fit: Fit) -> Fit:
