@@ -14,17 +14,10 @@ from scipy.stats import norm
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, simple_noise, table_1
 from tests.updating.test_evidence import by_hand, logs_by_hand, one_table, scatter
+from toolpath_stiff.inference.confounding import CONFOUNDED, Confounding, _linked, confounding
+from toolpath_stiff.inference.detectable import Detectable, detectable_sizes
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.hypotheses import (
-    CONFOUNDED,
-    Confounding,
-    Detectable,
-    Family,
-    _linked,
-    confounding,
-    detectable_sizes,
-    score_families,
-)
+from toolpath_stiff.inference.hypotheses import Family, score_families
 from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect

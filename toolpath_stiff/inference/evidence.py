@@ -16,10 +16,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import Candidate, Sight, SizePrior, Table, likely_interval, log_comparable
+from toolpath_stiff.inference.candidates import Candidate, Table
 from toolpath_stiff.inference.covariances import Precision
 from toolpath_stiff.inference.noise import Noise, NormalEquations, Scatter, covariance, gauss_newton, scaled_inverse
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.size_priors import Sight, SizePrior, likely_interval, log_comparable
 from toolpath_stiff.stiffness.model import ActiveEffect
 
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %

@@ -23,9 +23,10 @@ from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.judgement import NAMED, Judgement, judge, question
+from toolpath_stiff.inference.judgement import NAMED, Judgement, judge
 from toolpath_stiff.inference.noise import LEAST, Noise, noise_models
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.planning.campaign import RISER, TABLE, Campaign, first_campaign
 from toolpath_stiff.planning.gaps import (

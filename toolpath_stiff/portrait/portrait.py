@@ -15,8 +15,8 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
-from toolpath_stiff.inference.fits import held_out
 from toolpath_stiff.inference.gates import Simulator
+from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.portrait.choice import Chosen, choose

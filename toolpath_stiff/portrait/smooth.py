@@ -10,8 +10,8 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Groups
+from toolpath_stiff.inference.discrepancies import POINT_TO_POINT, discrepancy_forms
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.gates import POINT_TO_POINT, discrepancy_forms
 from toolpath_stiff.inference.hypotheses import AMPLITUDES
 
 GENERAL = ("smooth over the workspace, different by direction", "linear over the workspace, different by direction")
