@@ -11,6 +11,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import Table, candidates_of, table_of
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.gates import Forms, Structure, set_wild_aside
+from toolpath_stiff.inference.quadrature import score_single
 from toolpath_stiff.inference.tails import normal_below
 from toolpath_stiff.stiffness.contract import Effect
 
@@ -69,7 +70,7 @@ def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
 def _scores(problem: Problem, table: Table, base: Fit) -> list[tuple[Fit, float]]:
     """Fits of one candidate with the log prior weight of each subset of components."""
     if table.knots:
-        return [(problem.score_single(table, base), 0.0)]
+        return [(score_single(problem, table, base), 0.0)]
     subsets = list(table.candidate.subsets())
     weight, found, start = -float(np.log(len(subsets))), [], base
     for free in subsets:
