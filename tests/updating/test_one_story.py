@@ -27,7 +27,7 @@ from toolpath_stiff.diagnosis import words as verdict_words
 from toolpath_stiff.diagnosis.document import document as diagnosis_document
 from toolpath_stiff.diagnosis.words import next_steps, verdict_text, why, words
 from toolpath_stiff.hints import Asked, parted
-from toolpath_stiff.inference.fits import raised_text, scatter_text
+from toolpath_stiff.inference.errors import raised_text, scatter_text
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.planning.rivals import errors_so_far, rivals_of

@@ -13,8 +13,8 @@ from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.correction.document import document
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.document import document as diagnosis_document
-from toolpath_stiff.inference.judgement import question
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.file import load_machine
 
 ASKED = "Are these readings of this machine?"

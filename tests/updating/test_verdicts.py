@@ -17,8 +17,9 @@ from tests.conftest import seeds
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
 from toolpath_stiff.diagnosis.diagnose import common_verdict
+from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate
 from toolpath_stiff.inference.judgement import (
     FALSE_ALARM,
     NONE,

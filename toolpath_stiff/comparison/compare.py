@@ -24,11 +24,11 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.inference.candidates import Candidate, Component
 from toolpath_stiff.inference.covariances import Covariance, Groups
-from toolpath_stiff.inference.doubts import suspect_entries, suspect_rows
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import Baseline, fit_effects
 from toolpath_stiff.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.slips import suspect_entries, suspect_rows
 from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.readings.history import NOTHING, HistoryDocument
 from toolpath_stiff.readings.measurements import Measurements, model_stiffness

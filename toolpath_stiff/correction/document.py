@@ -13,14 +13,9 @@ from toolpath_stiff.correction.strut_law import StrutLawSearch
 from toolpath_stiff.correction.update import Correction
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.document import HeldErrors, RoundedErrors, interval, rounded_errors
+from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent, errors_text
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.fits import (
-    LAW_REFITTED,
-    deviation_percent,
-    error_falls,
-    errors_text,
-    gain_in_standard_errors,
-)
+from toolpath_stiff.inference.left_out import error_falls, gain_in_standard_errors
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.contract import joined

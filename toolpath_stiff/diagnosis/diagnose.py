@@ -18,7 +18,15 @@ from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import testable_effects
-from toolpath_stiff.inference.doubts import (
+from toolpath_stiff.inference.confounding import Confounding, confounding
+from toolpath_stiff.inference.detectable import Detectable, detectable_sizes
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import Baseline, refine
+from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
+from toolpath_stiff.inference.left_out import HeldOut, held_out, of_readings
+from toolpath_stiff.inference.noise import JOINT_ERROR, Noise, noise_models
+from toolpath_stiff.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.inference.slips import (
     SlipSize,
     SuspectEntry,
     alone,
@@ -27,12 +35,7 @@ from toolpath_stiff.inference.doubts import (
     suspect_entries,
     suspect_rows,
 )
-from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import Baseline, HeldOut, held_out, of_readings, refine
-from toolpath_stiff.inference.hypotheses import Confounding, Detectable, Unexcluded, confounding, detectable_sizes
-from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
-from toolpath_stiff.inference.noise import JOINT_ERROR, Noise, noise_models
-from toolpath_stiff.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.planning.plan import nothing_gained, plan_measurements
 from toolpath_stiff.planning.rivals import rivals_of

@@ -22,12 +22,16 @@ from toolpath_stiff.diagnosis.words import (
 )
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import Component
-from toolpath_stiff.inference.doubts import SuspectEntry
+from toolpath_stiff.inference.confounding import CONFOUNDED
+from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.drawn import DrawnEntry
+from toolpath_stiff.inference.errors import error_figures
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.fits import error_figures, gain_in_standard_errors
-from toolpath_stiff.inference.hypotheses import CONFOUNDED, Detectable, Family, Unexcluded, averaged_interval
+from toolpath_stiff.inference.hypotheses import Family, averaged_interval
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
+from toolpath_stiff.inference.left_out import gain_in_standard_errors
+from toolpath_stiff.inference.slips import SuspectEntry
+from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.portrait.document import PortraitEntry, SameEntry, alike_entry, portrait_entry
 from toolpath_stiff.stiffness.contract import joined
 from toolpath_stiff.units import certain, json_number, mm_from_m, n_per_um_from_n_per_m

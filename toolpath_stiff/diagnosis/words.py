@@ -10,13 +10,15 @@ from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.diagnose import Diagnosis
 from toolpath_stiff.hints import Asked, both_names, command_line, hint, options
-from toolpath_stiff.inference.candidates import EXPECTED, choice_text
+from toolpath_stiff.inference.candidates import choice_text
+from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import Drawn, seen_readings
+from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR
-from toolpath_stiff.inference.fits import errors_text, raised_text, scatter_text
-from toolpath_stiff.inference.hypotheses import CONFOUNDED, MATTERS, Unexcluded
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
 from toolpath_stiff.inference.repeats import OUTLIERS
+from toolpath_stiff.inference.size_priors import EXPECTED
+from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.planning.plan import INDICATORS
 from toolpath_stiff.portrait.words import alike_text
 from toolpath_stiff.stiffness.contract import joined

@@ -14,6 +14,7 @@ from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
+from toolpath_stiff.stiffness.term_loads import along_pins, carriers, coupled, pair_stiffness, reading_share
 from toolpath_stiff.stiffness.terms import (
     AXES,
     IN_SERIES,
@@ -23,13 +24,8 @@ from toolpath_stiff.stiffness.terms import (
     VARIABLES,
     Constants,
     Term,
-    along_pins,
-    carriers,
-    coupled,
     factor_values,
     multiplied,
-    pair_stiffness,
-    reading_share,
     shape_values,
     variable_values,
 )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.defaults import MEAN_OVER_SD
 from toolpath_stiff.hints import parted
 from toolpath_stiff.inference.candidates import choice_text
-from toolpath_stiff.inference.fits import scatter_text
+from toolpath_stiff.inference.errors import scatter_text
 from toolpath_stiff.inference.noise import GUESSES
 from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, plain, shortened
 from toolpath_stiff.units import number

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.fits import LAW_REFITTED, deviation_percent
+from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent
 from toolpath_stiff.report.explanations import AS_GIVEN, best_explanation, figure_of, name_text, percent
 from toolpath_stiff.report.figure import (
     BLUE,

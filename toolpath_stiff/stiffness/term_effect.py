@@ -10,20 +10,8 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
-from toolpath_stiff.stiffness.terms import (
-    AXES,
-    IN_SERIES,
-    OF_FORCES,
-    UNITS,
-    Term,
-    carriers,
-    coupled,
-    formula,
-    pair_stiffness,
-    reading_share,
-    shaped,
-    strut_share,
-)
+from toolpath_stiff.stiffness.term_loads import carriers, coupled, pair_stiffness, reading_share, strut_share
+from toolpath_stiff.stiffness.terms import AXES, IN_SERIES, OF_FORCES, UNITS, Term, formula, shaped
 
 ASSUMED = "described from readings; usual sizes are engineering experience, no source"
 

@@ -45,7 +45,7 @@ LARGEST = 1e9
 
 SHAPE_KEYS = ("varies_with", "of", "shape", "constants")
 KEYS = ("name", "size", "meaning", "link", "action", "where", "along", *SHAPE_KEYS, "times")
-SHAPES_OF = {"constant": ["offset"], "direction": ["offset"], "setup": ["offset"], "force sign": ["sign"]}
+SHAPES_OF = {**dict.fromkeys(("constant", "direction", "setup"), ("offset",)), "force sign": ("sign",)}
 COLUMNS = {"tilt": ("", *AXES, *SWINGS), "joint offset": ("frame", "platform")}
 
 
@@ -150,7 +150,7 @@ def _shape(
     by_strut = () if of in (*IN_SERIES, "turning") else (*OF_FORCES, "strut length")
     seen = [name for name in VARIABLES if name not in ("order", *by_strut)]
     variable = toml.choice(f"{where}.varies_with", row.get("varies_with"), seen, f"one of {', '.join(seen)}")
-    shapes = SHAPES_OF.get(variable, [*FORMULAS][1:-1])
+    shapes = SHAPES_OF.get(variable, (*FORMULAS,)[1:-1])
     shape = toml.choice(f"{where}.shape", row.get("shape"), shapes, f"one of {', '.join(shapes)}")
     column = row.get("of", "")
     columns = [name for name in COLUMNS.get(action, COLUMNS.get(variable, ("",))) if not by_strut or name not in SWINGS]

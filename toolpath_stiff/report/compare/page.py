@@ -13,7 +13,7 @@ from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import directions, planes
 from toolpath_stiff.files import Content
-from toolpath_stiff.inference.fits import deviation_percent
+from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.compare.machine import machine_png
 from toolpath_stiff.report.compare.pictures import measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare.variables import load_path_png, variables_png

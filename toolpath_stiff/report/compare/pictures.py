@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions, planes
-from toolpath_stiff.inference.fits import deviation_percent
+from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.figure import FAINT, INK, MUTED, UNREACHABLE_RED, WITHIN, drawn, house_style, new_figure
 from toolpath_stiff.report.residuals import BAND, DIRECTION_COLOURS, RESIDUAL_MAP
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain, shortened

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.inference.fits import deviation_percent
+from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, envelope_png, ladder_png
 from toolpath_stiff.report.diagnose.portrait import portrait_png, portrait_section
 from toolpath_stiff.report.explanations import (
