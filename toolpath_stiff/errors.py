@@ -101,6 +101,16 @@ class InputError(TpsError):
         self.file, self.line, self.column = file, line, column
         super().__init__(self._message())
 
+    def in_line(self, file: str, line: int) -> InputError:
+        """The same error, of a line of a file.
+
+        Examples
+        --------
+        >>> print(InputError("no number").in_line("a.csv", 3))
+        a.csv:3: no number
+        """
+        return type(self)(self.found, expected=self.expected, hint=self.hint, file=file, line=line)
+
     def _message(self) -> str:
         where = [str(part) for part in (self.file, self.line, self.column) if part is not None]
         text = f"{':'.join(where)}: {self.found}" if where else self.found

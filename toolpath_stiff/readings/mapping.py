@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from toolpath_stiff.column_names import UNITS, heading_key, keys, parted, same_quantity, unit_of
-from toolpath_stiff.errors import InputError, MeasurementError
+from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.readings.dates import EXPECTED, is_date
 from toolpath_stiff.tables import Columns, Source, Table, read_table
 from toolpath_stiff.toml_reader import TomlReader
@@ -33,6 +33,10 @@ PARTS = {"YYYY": "%Y", "YY": "%y", "MM": "%m", "DD": "%d", "hh": "%H", "mm": "%M
 # Columns that are told by their cells.
 HELD = {"strut": re.compile("[1-6]"), "direction": re.compile("[+-]?[XYZxyz]"), DATE: re.compile(".+")}
 NUMBER = re.compile(r"[+-]?[\d.]+(e[+-]?\d+)?", re.IGNORECASE)
+ABSENT = {  # column -> what is said where it is missing, and what is expected
+    "direction": ("no direction", "direction, or dx,dy,dz"),
+    "stiffness_N_per_mm": ("no measured stiffness", "stiffness_N_per_mm, or force_N with displacement_um"),
+}
 YEAR, ALIKE = 4, 0.5  # letters of a year alone; likeness of two names that counts
 LIKE_MS = re.compile(r"\d{12,13}")  # from 1973 on
 FORMS = ("DD.MM.YYYY", "DD.MM.YYYY hh:mm", "YYYYMMDD", "YYYY/MM/DD", "DD/MM/YYYY", "MM/DD/YYYY", "DD.MM.YY", "ms")
@@ -216,12 +220,25 @@ def _forms(cells: Sequence[str]) -> list[str]:
     return [form for form in likely if cells and all(is_date(as_iso(cell, form)) for cell in cells)]
 
 
-def refuse(table: Table, found: str, needed: Sequence[str], expected: str = "", hint: str = "") -> InputError:
-    """An error about the heading that ends with the mapping to write."""
-    return MeasurementError(
-        found,
-        expected=expected,
-        hint="; ".join(filter(None, [hint, to_write(table, needed)])),
-        file=table.file,
-        line=table.heading_line,
-    )
+def check_heading(table: Table, known: Sequence[str], needed: Sequence[str], layouts: str = "") -> None:
+    """Raise `InputError` at the first thing that is wrong: a unit, a name there twice or almost right, or missing."""
+    heading, place = table.heading, {"file": table.file, "line": table.heading_line}
+    fault, expected, hint, long = "", "", "", [name for name in known if len(name) > 2]
+    if table.doubts:
+        fault, expected = table.doubts[0].fault, table.doubts[0].name
+        hint = f"did you mean {expected}? "
+    for name in filter(None, () if fault else heading):
+        if heading.count(name) > 1:
+            raise MeasurementError(f"column {name} stands twice", **place)  # type: ignore[arg-type]
+        near = difflib.get_close_matches(name, long, n=1, cutoff=0.75)
+        if name not in known and near and near[0] not in heading:
+            hint = f"did you mean {near[0]}? Otherwise give it another name"
+            raise MeasurementError(f"unknown column {name!r}", hint=hint, **place)  # type: ignore[arg-type]
+    absent = next((name for name in needed if name not in heading), "")
+    if absent and not fault:
+        fault, expected = ABSENT.get(absent, (f"column {absent} is missing", ""))
+    if fault:
+        hint += to_write(table, needed)
+        raise MeasurementError(fault, expected=layouts or expected, hint=hint, **place)  # type: ignore[arg-type]
+    if "direction" in heading and "dx" in heading:
+        raise MeasurementError("two directions", expected="direction, or dx,dy,dz", **place)  # type: ignore[arg-type]

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
-from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.dates import day_of, days_since_first
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
 from toolpath_stiff.readings.mapping import Mapped, mapped_table
+from toolpath_stiff.readings.measured_poses import pose_warnings
 from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
@@ -35,21 +34,6 @@ NIST_TABLE_1 = "nist-table1"
 
 
 RISER_ABOVE = 1.0  # m: of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser
-
-
-SINGULAR = 1e-6  # singularity index: the tip would be a million times softer than at the neutral pose
-
-
-# Section of the machine file -> the word in its limits' names.
-LIMIT_WORDS = {
-    "limits.strut_length": "length",
-    "limits.joint_angle": "angle",
-    "limits.workspace": "workspace",
-    "limits.singularity": "singularity",
-}
-
-
-NAMED = 5  # so many poses are named in a warning
 
 
 @dataclass(frozen=True)
@@ -206,7 +190,10 @@ def read_measurements(
     errors = errors or duplicates([row for file in files for row in file.rows], across_files=True)
     if errors:
         raise InputErrors(errors)
-    return with_offsets(_checked(_columns(files, machine), machine), machine)
+    data = _columns(files, machine)
+    places = list(zip(data.file.tolist(), data.line.tolist(), strict=True))
+    warnings = pose_warnings(machine, data.position, data.angles, data.tool_extension, places)
+    return with_offsets(replace(data, warnings=warnings), machine)
 
 
 def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
@@ -395,51 +382,6 @@ def _clampings(rows: list[Row], point: TextArray, setup: TextArray) -> TextArray
         ],
         dtype=str,
     )
-
-
-def _checked(data: Measurements, machine: Machine) -> Measurements:
-    """The same with warnings about poses beyond limits; singular and impossible poses are errors."""
-    rotation = data.rotation
-    struts = solve_struts(machine, data.position, rotation, data.tool_extension + machine.reference_tool_length)
-    index = singularity_index(machine, struts)
-    stiffness = machine.strut_law.stiffness(struts.lengths)
-    errors = []
-    for i in range(len(data)):
-        where = f"pose {_shown(data, i)}"
-        if not index[i] >= SINGULAR:
-            found = f"{where} is singular: the struts cannot hold the platform"
-        elif stiffness[i].min() <= 0.0:
-            found = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
-        else:
-            continue
-        errors.append(MeasurementError(found, hint="check the pose's unit", file=data.file[i], line=int(data.line[i])))
-    if errors:
-        raise InputErrors(errors)
-    stand = reach(machine, data.position, struts, rotation)
-    beyond: dict[str, list[int]] = {}
-    for row in np.flatnonzero(~stand.reachable).tolist():
-        beyond.setdefault(stand.limits[int(stand.limit[row])].name, []).append(row)
-    warnings = []
-    for name, those in beyond.items():
-        poses = list(dict.fromkeys(_shown(data, i) for i in those))
-        more = f" and {len(poses) - NAMED} more" if len(poses) > NAMED else ""
-        warnings.append(
-            f"measured beyond a limit of the machine file ({name}, {_origin(machine, name)}): "
-            f"{'; '.join(poses[:NAMED])}{more}. {stand.describe(those[0])}"
-        )
-    return replace(data, warnings=(*data.warnings, *warnings))
-
-
-def _origin(machine: Machine, limit: str) -> str:
-    """Where a limit comes from."""
-    quantity = next((q for q, word in LIMIT_WORDS.items() if word in limit), "")
-    return machine.origins.get(quantity, "origin not stated")
-
-
-def _shown(data: Measurements, i: int) -> str:
-    mm = ", ".join(f"{mm_from_m(value):g}" for value in data.position[i])
-    degrees = np.degrees(data.angles[i])
-    return f"({mm}) mm" + (f" at ({', '.join(f'{d:.4g}' for d in degrees)}) deg" if degrees.any() else "")
 
 
 def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -15,7 +14,7 @@ from toolpath_stiff.column_names import heading_key, same_quantity, unit_of
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import loop_of
-from toolpath_stiff.readings.mapping import DATE, refuse
+from toolpath_stiff.readings.mapping import DATE, check_heading
 from toolpath_stiff.readings.rows import (
     ANGLES,
     LABELS,
@@ -174,7 +173,9 @@ def read_raw(table: Table) -> RawRecords:
         Bad records, all of them.
     """
     file = table.file
-    unused = _check_heading(table)
+    layouts = f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}"
+    check_heading(table, KNOWN, _needed(table.heading), layouts)
+    unused = [name for name in table.heading if name and name not in KNOWN]
     notes = [f"{file}: column {name} is not used" for name in unused]
     if not table.rows:
         raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
@@ -189,7 +190,7 @@ def read_raw(table: Table) -> RawRecords:
                 continue
             values = _values(record)
         except InputError as error:
-            errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
+            errors.append(error.in_line(file, line))
             continue
         if DATE in record and not record[DATE]:
             errors.append(MeasurementError("no date", expected="one in every record", file=file, line=line))
@@ -223,17 +224,9 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
         Rows that are not of a strut alone, have no stiffness or none that could be; all of them.
     """
     heading, errors = table.heading, []
-    if table.doubts:
-        raise refuse(table, table.doubts[0].fault, ("strut", STIFFNESS[0]), table.doubts[0].name)
-    if "strut" not in heading and "loop" not in heading:
-        raise refuse(
-            table,
-            "stiffnesses without a column strut",
-            ("strut", STIFFNESS[0]),
-            "strut,date,stiffness_N_per_mm of struts alone, or raw records",
-            "readings of the tip need no reduction: `tps compare` takes them",
-        )
     known = ("strut", SERIAL, *LABELS, DATE, "length_mm", *STIFFNESS)
+    layouts = "strut,date,stiffness_N_per_mm of struts alone (readings of the tip need no reduction), or raw records"
+    check_heading(table, known, (STIFFNESS[0],) if "loop" in heading else ("strut", STIFFNESS[0]), layouts)
     notes = [f"{table.file}: column {name} is not used" for name in heading if name not in known]
     loops, figures, failed = [], [], []
     for line, cells in table.rows:
@@ -248,9 +241,7 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
                 continue
             own = n_per_m_from_n_per_mm(number(record, STIFFNESS[0])), optional_number(record, STIFFNESS[1])
         except InputError as error:
-            errors.append(
-                MeasurementError(error.found, expected=error.expected, hint=error.hint, file=table.file, line=line)
-            )
+            errors.append(error.in_line(table.file, line))
             continue
         none = np.empty(0)
         place = {name: record[name] for name in PLACE if record.get(name)}
@@ -315,34 +306,10 @@ def _by_time(records: list[Record]) -> list[list[Record]]:
     return list(times.values()) if min(map(len, times.values())) >= SHARED else [records]
 
 
-def _check_heading(table: Table) -> list[str]:
-    """Columns that are not used. Raises `InputError` at the first thing that is wrong."""
-    heading, place = list(table.heading), {"file": table.file, "line": table.heading_line}
-    needed = _needed(heading)
-    absent = next((name for name in needed if name not in heading), None)
-    if table.doubts:
-        raise refuse(table, table.doubts[0].fault, needed, table.doubts[0].name)
-    if absent:
-        layouts = f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}"
-        fault = "no direction" if absent == "direction" else f"column {absent} is missing"
-        raise refuse(table, fault, needed, layouts)
-    unused = [name for name in heading if name not in KNOWN]
-    for name in heading:
-        if heading.count(name) > 1:
-            raise MeasurementError(f"column {name} stands twice", **place)  # type: ignore[arg-type]
-    for name in unused:
-        near = next(iter(difflib.get_close_matches(name, KNOWN, n=1, cutoff=0.75)), None)
-        if near and near not in heading:
-            hint = f"did you mean {near}? Otherwise give it another name"
-            raise MeasurementError(f"unknown column {name!r}", hint=hint, **place)  # type: ignore[arg-type]
-    if "direction" in heading and any(name in heading for name in VECTOR):
-        raise MeasurementError("two directions", expected="direction, or dx,dy,dz", **place)  # type: ignore[arg-type]
-    return unused
-
-
-def _needed(heading: list[str]) -> tuple[str, ...]:
+def _needed(heading: Sequence[str]) -> tuple[str, ...]:
     """Columns that records need; a strut on a bench has neither pose nor jog."""
-    if any(heading_key(name).startswith("stiff") or same_quantity(unit_of(name), "N/mm") for name in heading):
+    stiffnesses = (heading_key(name).startswith("stiff") or same_quantity(unit_of(name), "N/mm") for name in heading)
+    if any(stiffnesses) and "displacement_um" not in heading:
         return ("strut", STIFFNESS[0])
     if "loop" in heading:
         return READINGS[1:]

@@ -6,7 +6,6 @@ so on). A bad row is named with its line; all bad rows of a file are reported to
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Mapping
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import LARGEST_UM, loop_of, loop_reading
-from toolpath_stiff.readings.mapping import DATE, refuse
+from toolpath_stiff.readings.mapping import DATE, check_heading
 from toolpath_stiff.stiffness.measuring_loop import TIP, MeasuringLoop
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
@@ -168,7 +167,18 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
         Bad rows, all of them.
     """
     file, heading, line = table.file, list(table.heading), table.heading_line
-    _check_heading(table, planned)
+    place = {"file": file, "line": line}
+    if "" in heading:
+        raise MeasurementError("a column without a name", **place)  # type: ignore[arg-type]
+    if not {*WIDE}.isdisjoint(heading) and not {
+        "direction",
+        *VECTOR,
+        "stiffness_N_per_mm",
+        "displacement_um",
+    }.isdisjoint(heading):
+        fault = "columns of the wide layout beside those of the long one"
+        raise MeasurementError(fault, hint="use one of the two", **place)  # type: ignore[arg-type]
+    check_heading(table, (*KNOWN, *WIDE, *WIDE_MODEL), _needed(heading, planned))
     if not table.rows:
         raise MeasurementError(
             "no rows below the heading", expected="one row a measured stiffness", file=file, line=line
@@ -188,52 +198,12 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
         try:
             rows += _rows_of(table.record(cells), more, file, line, planned)
         except InputError as error:
-            errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
+            errors.append(error.in_line(file, line))
     errors += duplicates(rows)
     if errors:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
     columns = {name for name in heading if name in KNOWN}
     return RowFile(tuple(rows), frozenset(columns), tuple(notes))
-
-
-def _check_heading(table: Table, planned: bool) -> None:
-    """Raise `InputError` at the first thing that is wrong with a heading."""
-    heading = list(table.heading)
-    wrong = _slip(heading)
-    if wrong is not None:
-        found, hint = wrong
-        raise MeasurementError(found, hint=hint, file=table.file, line=table.heading_line)
-    directions = ("direction" in heading) + (VECTOR[0] in heading)
-    if directions == 2:
-        raise MeasurementError(
-            "two directions", expected="direction, or dx,dy,dz", file=table.file, line=table.heading_line
-        )
-    needed = _needed(heading, planned)
-    absent = next((name for name in needed if name not in heading), None)
-    if table.doubts:
-        doubt = table.doubts[0]
-        raise refuse(table, doubt.fault, needed, doubt.name, f"did you mean {doubt.name}?")
-    if absent == "direction":
-        raise refuse(table, "no direction", needed, "direction, or dx,dy,dz")
-    if absent == "stiffness_N_per_mm":
-        raise refuse(table, "no measured stiffness", needed, "stiffness_N_per_mm, or force_N with displacement_um")
-    if absent:
-        raise refuse(table, f"column {absent} is missing", needed)
-
-
-def _slip(heading: list[str]) -> tuple[str, str] | None:
-    """Names that are there twice, almost those of a known column, or of two layouts; and what to do."""
-    for name in heading:
-        if not name or heading.count(name) > 1:
-            return f"column {name} stands twice" if name else "a column without a name", ""
-        if name not in KNOWN and name not in WIDE and name not in WIDE_MODEL:
-            near = difflib.get_close_matches(name, (*KNOWN, *WIDE), n=1, cutoff=0.75)
-            if near and near[0] not in heading:
-                return f"unknown column {name}", f"did you mean {near[0]}? Otherwise give it another name"
-    long = ("direction", *VECTOR, "stiffness_N_per_mm", "displacement_um")
-    if not {*WIDE}.isdisjoint(heading) and not {*long}.isdisjoint(heading):
-        return "columns of the wide layout beside those of the long one", "use one of the two"
-    return None
 
 
 def _needed(heading: list[str], planned: bool) -> tuple[str, ...]:
