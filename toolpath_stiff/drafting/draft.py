@@ -17,7 +17,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.correction.machines import data_hash
-from toolpath_stiff.diagnosis.diagnose import Diagnosis
+from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.drafting.source import GEOMETRY, HOOKS, INSTRUMENT, STRUCTURE, pieces_of
 from toolpath_stiff.hints import Asked, command_line, options
 from toolpath_stiff.portrait.terms import Term
@@ -122,10 +122,10 @@ def draft(diagnosis: Diagnosis, file: str) -> Draft:
     reason = _nothing_to_describe(diagnosis)
     if reason:
         return Draft(reason=reason)
-    asked = diagnosis.asked or Asked(diagnosis.files, diagnosis.machine.name)
+    asked = diagnosis.asked or Asked(diagnosis.names, diagnosis.machine.name)
     origin = Origin(
-        files=diagnosis.files,
-        sha256=data_hash(diagnosis.files),
+        files=diagnosis.names,
+        sha256=data_hash(diagnosis.names),
         readings=len(diagnosis.data),
         machine=diagnosis.machine.name,
         marks=tuple(sorted(set(reading_marks(diagnosis.data).tolist()))),
