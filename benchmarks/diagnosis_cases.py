@@ -215,7 +215,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
             more = folder / f"{label}_{n}.csv"
             more.write_text(_rows_of_clamps(further, clamps), encoding="utf-8")
             after = diagnose(machine(), read_measurements([file, more], machine()), plan_next=False)
-            settled = after.verdict == "identified" and after.plausible == (truth,)
+            settled = after.verdict == "identified" and after.plausible == [truth]
             record[f"{label}_{n}"] = [after.verdict, list(after.plausible), settled]
     return record
 

@@ -294,8 +294,8 @@ def test_the_fit_has_the_right_slopes_and_the_search_for_the_mean_error_its_ends
 
 @pytest.mark.parametrize("law", [CONSTANT, table_text(BENT)], ids=["constant", "table"])
 def test_compare_refits_the_law_too(law):
-    found = compare(machine_with(law), campaign(law)[1], draws=50).document
-    figures = found["baseline"]["strut_law_refitted"]
+    found = compare(machine_with(law), campaign(law)[1], draws=50)
+    figures = found.document["baseline"]["strut_law_refitted"]
     assert figures["mean_abs_error_percent"] < 2.0
     assert figures["excess_scatter_percent"] is not None
     assert len(figures["strut_law"]["N_per_um"]) == (1 if law == CONSTANT else 2)

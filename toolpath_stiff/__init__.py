@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.correction import Update as Update
     from toolpath_stiff.api.correction import plan as plan
     from toolpath_stiff.api.correction import update as update
-    from toolpath_stiff.api.diagnosis import Comparison as Comparison
-    from toolpath_stiff.api.diagnosis import Diagnosis as Diagnosis
     from toolpath_stiff.api.diagnosis import Measurements as Measurements
     from toolpath_stiff.api.diagnosis import compare as compare
     from toolpath_stiff.api.diagnosis import diagnose as diagnose
@@ -69,6 +67,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.programs import check as check
     from toolpath_stiff.api.programs import sample_path as sample_path
     from toolpath_stiff.case.case import Case as Case
+    from toolpath_stiff.comparison.compare import Comparison as Comparison
+    from toolpath_stiff.diagnosis.result import Diagnosis as Diagnosis
     from toolpath_stiff.errors import EffectError as EffectError
     from toolpath_stiff.errors import EffectFault as EffectFault
     from toolpath_stiff.errors import FileError as FileError
@@ -96,7 +96,7 @@ _PUBLIC = {
     "api.by_hand": ("Preview", "preview"),
     "api.case_studies": ("CaseStudy", "case_study"),
     "api.correction": ("Update", "plan", "update"),
-    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
+    "api.diagnosis": ("Measurements", "compare", "diagnose"),
     "api.effects": (
         "EffectCatalogue", "EffectCheck", "EffectDraft", "EffectFile", "check_effects", "draft_effect",
         "effect_template", "effects",
@@ -113,6 +113,8 @@ _PUBLIC = {
     "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
     "api.programs": ("ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
     "case.case": ("Case",),
+    "comparison.compare": ("Comparison",),
+    "diagnosis.result": ("Diagnosis",),
     "errors": (
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",

@@ -231,7 +231,7 @@ def test_what_the_tip_cannot_tell_an_indicator_names(joints):
     alone = diagnose(nist(), read_measurements(joints[0], nist()), plan_next=False)
     assert alone.verdict == "adequate" and "joint_compliance" in alone.plausible
     found = diagnose(nist(), read_measurements(list(joints), nist()), plan_next=False)
-    assert (found.verdict, found.plausible) == ("identified", ("joint_compliance",))
+    assert (found.verdict, found.plausible) == ("identified", ["joint_compliance"])
     written = document(found)
     # Errors are those of the tip's readings; the loops stand beside them.
     assert written["readings"] == 42 == len(found.before)
@@ -241,7 +241,8 @@ def test_what_the_tip_cannot_tell_an_indicator_names(joints):
 
 def test_compare_shows_loops_in_a_section_of_their_own(joints):
     data = read_measurements(list(joints), nist())
-    found = compare(nist(), data, draws=200).document
+    comparison = compare(nist(), data, draws=200)
+    found = comparison.document
     alone = compare(nist(), read_measurements(joints[0], nist()), draws=200).document
     assert found["baseline"] == alone["baseline"] and alone["loops"] == {"by_loop": [], "readings": []}
     across = {one["loop"]: one for one in found["loops"]["by_loop"]}
@@ -249,7 +250,7 @@ def test_compare_shows_loops_in_a_section_of_their_own(joints):
     one = found["loops"]["readings"][0]
     assert one["read_nm_per_N"] == pytest.approx(1e9 * data.compliance[42], rel=1e-6)
     assert one["off_nm_per_N"] == pytest.approx(one["read_nm_per_N"] - one["model_nm_per_N"], abs=1e-6)
-    assert "indicators beside the tip" in text(found)
+    assert "indicators beside the tip" in text(comparison)
 
 
 def test_update_counts_errors_over_the_tip_as_compare_does(joints):

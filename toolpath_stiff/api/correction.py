@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.diagnosis import Data, Diagnosis, Mapped, Noise, Question
+from toolpath_stiff.api.diagnosis import Data, Mapped, Noise, Question
 from toolpath_stiff.api.inputs import FARTHEST_MM, positive
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.errors import InputError
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.correction.update import Correction
+    from toolpath_stiff.diagnosis.result import Diagnosis
     from toolpath_stiff.planning.result import Plan
 
 STEEPEST_TILT_DEG = 90.0
@@ -314,7 +315,7 @@ def plan(
         setups=setups,
         indicators=indicators,
         costs=Costs(**costs),
-        judgement=None if diagnosis is None else diagnosis.diagnosed.main,
+        judgement=None if diagnosis is None else diagnosis.main,
         names=asked.files,
         line=asked.asked.command("plan", *own),
         inputs=asked.inputs,

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.api.inputs import Program, origin_word, pose_si, program_from, whole
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import Asked, options
-from toolpath_stiff.results import FolderResult, Progress, machine_by_name, teller
+from toolpath_stiff.results import Progress, machine_by_name, teller
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
-    from toolpath_stiff.comparison.compare import Comparison as Compared
-    from toolpath_stiff.diagnosis.diagnose import Diagnosis as Diagnosed
+    from toolpath_stiff.comparison.compare import Comparison
+    from toolpath_stiff.diagnosis.result import Diagnosis
     from toolpath_stiff.machine.model import Machine as MachineModel
     from toolpath_stiff.nc.moves import Program as NcProgram
     from toolpath_stiff.readings.measurements import Measurements as Readings
@@ -217,63 +216,6 @@ def _noise(percent: Noise) -> Noise:
     return shares[0] if len(shares) == 1 else (shares[0], shares[1])
 
 
-class Comparison(FolderResult):
-    """How far the model is from measurements, where, and how much of it is more than scatter.
-
-    Attributes
-    ----------
-    compared
-        Residuals and scatter as arrays in SI.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.compare("nist", "nist-table1", noise_percent=5)
-    >>> round(found.to_dict()["baseline"]["mean_abs_error_percent"], 2)
-    9.62
-    >>> found.to_frame()[["direction", "measured_N_per_mm", "modelled_N_per_mm"]].shape
-    (42, 3)
-    >>> list(found.files(plots=False)), type(found.plot()).__name__
-    (['compare.json', 'residuals.csv'], 'Figure')
-    """
-
-    command: ClassVar[str] = "compare"
-
-    def __init__(self, compared: Compared, inputs: tuple[str, ...]) -> None:
-        self.compared, self.inputs = compared, inputs
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of compare.json."""
-        return dict(self.compared.document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a reading, as in `residuals.csv`: measured, modelled, deviation, and what it may vary with."""
-        from toolpath_stiff.report.compare.page import residuals_csv
-
-        return _table(residuals_csv(self.compared))
-
-    def plot(self) -> Figure:
-        """Measured against modelled."""
-        from toolpath_stiff.report.compare.pictures import measured_modelled_png
-
-        return measured_modelled_png.figure(self.compared)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.compare.page import text
-
-        return "\n".join([text(self.compared.document), *self.compared.document["next"]])
-
-    def _short(self) -> str:
-        found = self.compared.document["baseline"]["mean_abs_error_percent"]
-        return f"{self.compared.document['machine']}, mean error {found:.2f} %"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps compare`."""
-        from toolpath_stiff.report.compare.page import files
-
-        return files(self.compared, plots=plots)
-
-
 @machine_by_name
 def compare(
     machine: Machine | str | Path,
@@ -318,71 +260,8 @@ def compare(
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     teller(progress)("comparing")
-    return Comparison(compare_readings(asked.model, asked.readings, asked=asked.asked, **asked.common), asked.inputs)
-
-
-class Diagnosis(FolderResult):
-    """Which physical effect the model lacks, if any.
-
-    Attributes
-    ----------
-    diagnosed
-        Hypotheses, fits, probabilities, with arrays in SI.
-    """
-
-    command: ClassVar[str] = "diagnose"
-
-    def __init__(self, diagnosed: Diagnosed, inputs: tuple[str, ...]) -> None:
-        from toolpath_stiff.diagnosis.document import document
-
-        self.diagnosed, self.inputs = diagnosed, inputs
-        self._document = document(diagnosed)
-
-    @property
-    def verdict(self) -> str:
-        """adequate, identified, described, ambiguous or unexplained."""
-        return self.diagnosed.verdict
-
-    @property
-    def plausible(self) -> list[str]:
-        """Effects that may be what is missing, the most likely first."""
-        return list(self.diagnosed.plausible)
-
-    @property
-    def best(self) -> str | None:
-        """The explanation that fits best among those left standing."""
-        return self.diagnosed.best
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of diagnose.json."""
-        return dict(self._document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The candidates, one a row: probability, errors, why not."""
-        import pandas as pd
-
-        return pd.DataFrame(self._document["candidates"])
-
-    def plot(self) -> Figure:
-        """The error as given, with the strut law refitted, and with each candidate."""
-        from toolpath_stiff.report.diagnose.pictures import ladder_png
-
-        return ladder_png.figure(self._document)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.explanations import text
-
-        return text(self._document)
-
-    def _short(self) -> str:
-        names = ", ".join(self.plausible)
-        return f"{self.verdict}: {names}" if names else self.verdict
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps diagnose`."""
-        from toolpath_stiff.report.diagnose.page import files
-
-        return files(self.diagnosed, self._document, plots=plots)
+    comparison = compare_readings(asked.model, asked.readings, asked=asked.asked, **asked.common)
+    return replace(comparison, inputs=asked.inputs)
 
 
 @machine_by_name
@@ -444,20 +323,20 @@ def diagnose(
         temperature=asked.on.temperature_C,
         seed=seed or None,
     )
-    found = diagnose_readings(
+    return diagnose_readings(
         asked.model,
         asked.readings,
         program=lambda: _case_study() if part is None else part.moves(origin, default),
         origin=origin,
         setup=conditions.setup,
         temperature=conditions.temperature,
-        files=asked.files,
-        command=asked.asked.command("diagnose", *own, *(part.words if part else ())),
+        names=asked.files,
+        line=asked.asked.command("diagnose", *own, *(part.words if part else ())),
         asked=asked.asked,
+        inputs=(*asked.inputs, *(part.inputs if part else ())),
         progress=teller(progress),
         **asked.common,
     )
-    return Diagnosis(found, (*asked.inputs, *(part.inputs if part else ())))
 
 
 def _case_study() -> NcProgram:
@@ -465,12 +344,3 @@ def _case_study() -> NcProgram:
     from toolpath_stiff.placement.case_study import case_study_program
 
     return case_study_program()
-
-
-def _table(csv: str) -> pd.DataFrame:
-    """CSV text as a DataFrame."""
-    import io
-
-    import pandas as pd
-
-    return pd.read_csv(io.StringIO(csv))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
+from toolpath_stiff.api.diagnosis import Data, Noise, Question
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from toolpath_stiff.correction.draft import Draft
+    from toolpath_stiff.diagnosis.result import Diagnosis
     from toolpath_stiff.stiffness.trial import Trial
 
 
@@ -332,14 +333,15 @@ def draft_effect(
         asked.model,
         asked.readings,
         plan_next=False,
-        files=asked.files,
-        command=asked.asked.command("diagnose", *options(seed=seed or None)),
+        names=asked.files,
+        line=asked.asked.command("diagnose", *options(seed=seed or None)),
         asked=asked.asked,
+        inputs=asked.inputs,
         progress=teller(progress),
         **asked.common,
     )
     drafted = draft(found, str(file))
-    return EffectDraft(name, drafted, Diagnosis(found, asked.inputs), next_of_draft(asked.asked, str(file)))
+    return EffectDraft(name, drafted, found, next_of_draft(asked.asked, str(file)))
 
 
 def effect_name(file: str | Path, ending: str = ".py") -> str:

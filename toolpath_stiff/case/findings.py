@@ -16,10 +16,11 @@ from toolpath_stiff.results import FolderResult, Progress
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
     from toolpath_stiff.api.correction import Update
-    from toolpath_stiff.api.diagnosis import Comparison, Diagnosis
     from toolpath_stiff.api.effects import EffectDraft
     from toolpath_stiff.api.placements import Placement
     from toolpath_stiff.case.steps import Step
+    from toolpath_stiff.comparison.compare import Comparison
+    from toolpath_stiff.diagnosis.result import Diagnosis
     from toolpath_stiff.planning.result import Plan
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 
 from toolpath_stiff.correction.machines import data_hash
-from toolpath_stiff.diagnosis.diagnose import Diagnosis
+from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.hints import Asked, command_line, options
 from toolpath_stiff.machine.writer import value_text
 from toolpath_stiff.portrait.portrait import Portrait, Sized
@@ -62,10 +62,10 @@ def draft(diagnosis: Diagnosis, file: str) -> Draft:
     reason = _nothing_to_describe(diagnosis)
     if reason or diagnosis.portrait is None:
         return Draft(reason=reason)
-    name, asked = PurePath(file).stem, diagnosis.asked or Asked(diagnosis.files, diagnosis.machine.name)
+    name, asked = PurePath(file).stem, diagnosis.asked or Asked(diagnosis.names, diagnosis.machine.name)
     source = (
-        f"{len(diagnosis.data)} readings of {joined(list(diagnosis.files))} "
-        f"(SHA-256 {data_hash(diagnosis.files)[:16]}), machine {diagnosis.machine.name}"
+        f"{len(diagnosis.data)} readings of {joined(list(diagnosis.names))} "
+        f"(SHA-256 {data_hash(diagnosis.names)[:16]}), machine {diagnosis.machine.name}"
     )
     drawn = asked.command("effects draft", "-o", file, *options(seed=diagnosis.seed or None))
     commands = [

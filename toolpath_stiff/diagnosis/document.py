@@ -8,7 +8,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.diagnose import Diagnosis
 from toolpath_stiff.diagnosis.words import (
     assumptions,
     beside_text,
@@ -38,6 +37,7 @@ from toolpath_stiff.units import certain, json_number, mm_from_m, n_per_um_from_
 
 if TYPE_CHECKING:
     from toolpath_stiff.comparison.loop_readings import LoopsDocument
+    from toolpath_stiff.diagnosis.result import Diagnosis
 
 
 TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
@@ -285,7 +285,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
             {"effect": name, "missing": list(columns)} for name, columns in sorted(diagnosis.cannot_test.items())
         ],
         "next_measurements": list(diagnosis.next_measurements),
-        "next": next_steps(diagnosis, diagnosis.asked or Asked(diagnosis.files)),
+        "next": next_steps(diagnosis, diagnosis.asked or Asked(diagnosis.names)),
         "by_noise": {name: _in_short(judgement) for name, judgement in diagnosis.judgements.items()},
         "noise": _noise(main),
         "gates": _gates(main),
@@ -313,10 +313,10 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "seed": diagnosis.seed,
         "machine": diagnosis.machine.name,
         "effects": diagnosis.predictor.effects_that_act,
-        "data": list(diagnosis.files),
+        "data": list(diagnosis.names),
         "readings": len(diagnosis.data),
         "loops": certain(diagnosis.loops),
-        "command": diagnosis.command,
+        "command": diagnosis.line,
     }
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.diagnose import Diagnosis
 from toolpath_stiff.hints import Asked, both_names, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.confounding import CONFOUNDED
@@ -23,6 +23,9 @@ from toolpath_stiff.planning.plan import INDICATORS
 from toolpath_stiff.portrait.words import alike_text
 from toolpath_stiff.stiffness.contract import joined
 from toolpath_stiff.units import mm_from_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.diagnosis.result import Diagnosis
 
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
 

@@ -14,9 +14,9 @@ from toolpath_stiff.files import Content
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.judgement import NAMED, Judgement, judge
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.inference.noise import Noise, noise_models
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.planning.campaign import RISER, TABLE, Campaign, first_campaign
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements, plan_text

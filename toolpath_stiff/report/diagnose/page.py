@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -36,6 +35,7 @@ from toolpath_stiff.report.explanations import (
     row_name,
     significant,
 )
+from toolpath_stiff.report.explanations import text as explanations_text
 from toolpath_stiff.report.loops import loops_section
 from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
 from toolpath_stiff.report.residuals import before_after_png
@@ -43,8 +43,8 @@ from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, mac
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
-    from toolpath_stiff.diagnosis.diagnose import Diagnosis
     from toolpath_stiff.diagnosis.document import DiagnosisDocument
+    from toolpath_stiff.diagnosis.result import Diagnosis
 
 
 # Picture -> the question that it answers, and how it is read.
@@ -266,17 +266,17 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return (*data, *pictures, "report.html") if plots else data
 
 
-def files(diagnosis: Diagnosis, document: DiagnosisDocument, *, plots: bool = True) -> dict[str, Content]:
-    """`document` as JSON, one row a reading, and with `plots` pictures and page."""
-    contents: dict[str, Content] = {
-        "diagnose.json": json.dumps(document, indent=2, ensure_ascii=False) + "\n",
-        "residuals.csv": residuals_csv(diagnosis),
-    }
-    return contents | (_pictures(document, diagnosis) if plots else {})
+def text(diagnosis: Diagnosis) -> str:
+    """The diagnosis in some 25 lines."""
+    return explanations_text(diagnosis.document)
 
 
-def _pictures(document: DiagnosisDocument, diagnosis: Diagnosis) -> dict[str, Content]:
-    """The pictures that have something to show, and the page with them."""
+def files(diagnosis: Diagnosis, *, plots: bool = True) -> dict[str, Content]:
+    """The document as JSON, one row a reading, and with `plots` the pictures that have something to show, and page."""
+    contents: dict[str, Content] = {"diagnose.json": diagnosis.to_json(), "residuals.csv": residuals_csv(diagnosis)}
+    if not plots:
+        return contents
+    document = diagnosis.document
     pictures: dict[str, bytes | None] = {
         "ladder.png": ladder_png(document),
         "portrait.png": portrait_png(document, diagnosis.data, diagnosis.portrait),
@@ -286,7 +286,7 @@ def _pictures(document: DiagnosisDocument, diagnosis: Diagnosis) -> dict[str, Co
         "envelope.png": envelope_png(document),
     }
     drawn = {name: picture for name, picture in pictures.items() if picture is not None}
-    return {**drawn, "report.html": diagnose_html(document, drawn)}
+    return {**contents, **drawn, "report.html": diagnose_html(document, drawn)}
 
 
 def residuals_csv(diagnosis: Diagnosis) -> str:
