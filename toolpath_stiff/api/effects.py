@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from toolpath_stiff.diagnosis.result import Diagnosis
-
     from toolpath_stiff.drafting.draft import Draft
     from toolpath_stiff.stiffness.trial import Trial
 
