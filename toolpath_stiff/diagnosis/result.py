@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.diagnosis.document import DiagnosisDocument, document
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.confounding import Confounding
@@ -116,9 +116,11 @@ class Diagnosis(FolderResult):
     inputs: tuple[str, ...] = ()
 
     @cached_property
-    def document(self) -> DiagnosisDocument:
+    def document(self) -> dict[str, Any]:
         """The content of diagnose.json."""
-        return document(self)
+        # The module that writes it reads this class: to import it above would be a circle.
+        written: dict[str, Any] = import_module("toolpath_stiff.diagnosis.document").document(self)
+        return written
 
     def to_dict(self) -> dict[str, Any]:
         """The content of diagnose.json."""
