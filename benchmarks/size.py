@@ -8,12 +8,6 @@ of CPU and 1 GB with all its files (two samples a move: one at each end); a line
 
 from __future__ import annotations
 
-import os
-
-for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[variable] = "1"
-
-# ruff: noqa: E402 - the thread limits above must come first
 import argparse
 import io
 import statistics
