@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.defaults import VERSION as _VERSION
 
 if TYPE_CHECKING:
+    from toolpath_stiff.analysis.grid import StiffnessMap as StiffnessMap
+    from toolpath_stiff.analysis.poses import PoseStiffness as PoseStiffness
     from toolpath_stiff.analysis.results import Analysis as Analysis
     from toolpath_stiff.api.by_hand import Preview as Preview
     from toolpath_stiff.api.by_hand import preview as preview
@@ -62,8 +64,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
     from toolpath_stiff.api.placements import try_placement as try_placement
-    from toolpath_stiff.api.poses import PoseStiffness as PoseStiffness
-    from toolpath_stiff.api.poses import StiffnessMap as StiffnessMap
     from toolpath_stiff.api.poses import map_stiffness as map_stiffness
     from toolpath_stiff.api.poses import pose as pose
     from toolpath_stiff.api.poses import read_poses as read_poses
@@ -92,6 +92,8 @@ __version__ = _VERSION
 
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
+    "analysis.grid": ("StiffnessMap",),
+    "analysis.poses": ("PoseStiffness",),
     "analysis.results": ("Analysis",),
     "api.by_hand": ("Preview", "preview"),
     "api.case_studies": ("CaseStudy", "case_study"),
@@ -110,7 +112,7 @@ _PUBLIC = {
     "api.placements": (
         "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
     ),
-    "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
+    "api.poses": ("map_stiffness", "pose", "read_poses"),
     "api.programs": ("ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
     "case.case": ("Case",),
     "errors": (

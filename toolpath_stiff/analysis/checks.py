@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.poses import PoseReport, evaluate_poses
+from toolpath_stiff.analysis.poses import PoseStiffness, evaluate_poses
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
@@ -388,8 +388,8 @@ class MachineCheck:
 
     wrong: tuple[str, ...]
     doubtful: tuple[str, ...]
-    neutral: PoseReport
-    origin: PoseReport
+    neutral: PoseStiffness
+    origin: PoseStiffness
     symmetry: Symmetry
 
     @property
@@ -426,7 +426,7 @@ def check_machine(model: StiffnessModel) -> MachineCheck:
     return MachineCheck(tuple(wrong), tuple(doubtful), neutral, origin, symmetry)
 
 
-def _at(model: StiffnessModel, pose: Pose) -> PoseReport:
+def _at(model: StiffnessModel, pose: Pose) -> PoseStiffness:
     values = np.array([pose])
     return evaluate_poses(model, values[:, :3], values[:, 3:])
 
@@ -457,7 +457,7 @@ def _implausible(where: str, struts: list[tuple[float, float]]) -> Iterator[str]
         )
 
 
-def _stiffness(report: PoseReport) -> list[str]:
+def _stiffness(report: PoseStiffness) -> list[str]:
     softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
     if ROBOT <= softest <= BEYOND:
         return []
@@ -465,7 +465,7 @@ def _stiffness(report: PoseReport) -> list[str]:
     return [f"at the neutral pose the softest direction has {softest:.3g} N/um at the tool, {beside}"]
 
 
-def neutral_words(machine: Machine, report: PoseReport) -> str:
+def neutral_words(machine: Machine, report: PoseStiffness) -> str:
     """Stiffness at the neutral pose as one would say it."""
     x, y, z, *angles = (float(v) for v in machine.limits.neutral_pose)
     pose = " ".join(f"{axis}{mm_from_m(v) + 0.0:g}" for axis, v in zip("XYZ", (x, y, z), strict=True))

@@ -135,7 +135,7 @@ def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: Array
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine, solve_struts
+    >>> from toolpath_stiff.machine.file import load_machine, solve_struts
     >>> machine = load_machine("nist")
     >>> position = [[0.0, 0.0, 0.8], [0.0, 0.0, 3.0]]
     >>> found = reach(machine, position, solve_struts(machine, position))

@@ -13,8 +13,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load, geometric_directions
-from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import gauge_of, reach

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.report.figure import BLUE, house_style, new_figure, picture
-from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness.model import acting_names, condition_warnings, effects_stated
+from toolpath_stiff.stiffness.model import acting_names, condition_warnings
 from toolpath_stiff.stiffness.truss import HUB, TIP, platform_bars, platform_nodes
 from toolpath_stiff.units import (
     deg_from_rad,
@@ -30,7 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.analysis.checks import MachineCheck
-    from toolpath_stiff.analysis.poses import PoseReport
     from toolpath_stiff.machine.limits import Reach
     from toolpath_stiff.stiffness.contract import Effect, Parameter
     from toolpath_stiff.stiffness.model import StiffnessModel
@@ -38,7 +35,6 @@ if TYPE_CHECKING:
 
 
 STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
-POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 TOP = 0.84  # of the picture's height, below the headings
 BELOW = -0.1  # of the picture's height: the views' empty rims lie beyond it
 ZOOMS = np.arange(1.5, 0.5, -0.05)  # of a view, the largest at which its axes and labels stay in its half
@@ -323,63 +319,6 @@ def check_text(file: str, model: StiffnessModel, found: MachineCheck) -> str:
             f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; "
             f"{found.origin.reach.describe(0)}"
         )
-    return "\n".join(lines)
-
-
-def pose_csv(poses: FloatArray, found: PoseReport) -> str:
-    """One row a pose; `poses` (n, 6) in mm and degrees."""
-    columns = pose_columns(poses, found)
-    return ",".join(columns) + "\n" + csv_rows(columns, {name: pose_decimals(name) for name in columns})
-
-
-def pose_columns(poses: FloatArray, found: PoseReport) -> dict[str, Any]:
-    """Column -> values of the table, in the shop's units."""
-    names = np.array([limit.name for limit in found.reach.limits] or ["none"])
-    columns: dict[str, Any] = {name: poses[:, i] for i, name in enumerate(POSE_COLUMNS)}
-    for i, axis in enumerate("xyz"):
-        columns[f"k{axis}_N_per_mm"] = n_per_mm_from_n_per_m(found.along_axes[:, i])
-    for which, direction, stiffness in (
-        ("softest", found.softest, found.softest_stiffness),
-        ("stiffest", found.stiffest, found.stiffest_stiffness),
-    ):
-        columns[f"{which}_N_per_mm"] = n_per_mm_from_n_per_m(stiffness)
-        for i, axis in enumerate("xyz"):
-            columns[f"{which}_d{axis}"] = direction[:, i]
-    for i in range(6):
-        columns[f"strut{i + 1}_mm"] = mm_from_m(found.strut_lengths[:, i])
-    columns["extrapolated"] = found.extrapolated.astype(int)
-    columns["margin"] = found.reach.margin
-    columns["margin_limit"] = names[found.reach.limit]
-    return columns
-
-
-def pose_decimals(name: str) -> int | None:
-    """Decimals of a column; None: a whole number or a word."""
-    if name in ("extrapolated", "margin_limit"):
-        return None
-    return 4 if name.endswith("N_per_mm") else 6
-
-
-def pose_text(model: StiffnessModel, values: Mapping[str, Any], found: PoseReport) -> str:
-    """One pose: `values` are those of its row of `pose_columns`."""
-    x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
-
-    named = machine_text({"machine": model.machine.title, **effects_stated(model)})
-    lines = [f"{named}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n"]
-    for axis in "xyz":
-        lines.append(f"  stiffness along {axis.upper()}   {values[f'k{axis}_N_per_mm']:10.0f} N/mm")
-    for which in ("softest", "stiffest"):
-        dx, dy, dz = (values[f"{which}_d{axis}"] + 0.0 for axis in "xyz")
-        lines.append(
-            f"  {which:<10} direction{values[f'{which}_N_per_mm']:10.0f} N/mm along ({dx:.3f}, {dy:.3f}, {dz:.3f})"
-        )
-    lengths = "  ".join(f"{values[f'strut{i}_mm']:.3f}" for i in range(1, 7))
-    lines.append(f"  struts 1 to 6        {lengths} mm")
-    lines.append(f"  nearest limit        {found.reach.describe(0)} (margin {values['margin']:.3f} of its span)")
-    if values["extrapolated"]:
-        lines.append("  the strut law is extrapolated at this pose")
-    for warning in condition_warnings(model):
-        lines.append(f"  warning              {warning}")
     return "\n".join(lines)
 
 
