@@ -246,7 +246,7 @@ def campaign(law: str) -> tuple[str, Measurements]:
 def test_the_rig_reads_the_law_by_itself(law):
     """Readings of the nominal machine are those of the model: two programs that share no stiffness code."""
     machine, (data, nominal) = machine_with(law), (campaign(law)[1], parse_nominal(text_with(law), "mine.toml"))
-    rows = exercise.case.rows_of(exercise.case.paper_campaign())
+    rows = case.rows_of(case.paper_campaign())
     plain = readings(nominal, HiddenMachine(), rows)
     modelled = np.exp(Predictor(machine, data).log_stiffness())
     np.testing.assert_allclose(plain, modelled, rtol=1e-9)
