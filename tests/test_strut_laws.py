@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
-from toolpath_stiff.analysis.checks import check_machine
+from toolpath_stiff.analysis.machine_check import check_machine
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.correction.strut_law import minimise_mean_error

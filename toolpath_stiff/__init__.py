@@ -20,6 +20,10 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.defaults import VERSION as _VERSION
 
 if TYPE_CHECKING:
+    from toolpath_stiff.analysis.grid import StiffnessMap as StiffnessMap
+    from toolpath_stiff.analysis.machine_check import MachineCheck as MachineCheck
+    from toolpath_stiff.analysis.poses import PoseStiffness as PoseStiffness
+    from toolpath_stiff.analysis.program_check import ProgramCheck as ProgramCheck
     from toolpath_stiff.analysis.results import Analysis as Analysis
     from toolpath_stiff.api.by_hand import Preview as Preview
     from toolpath_stiff.api.by_hand import preview as preview
@@ -31,8 +35,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.diagnosis import Measurements as Measurements
     from toolpath_stiff.api.diagnosis import compare as compare
     from toolpath_stiff.api.diagnosis import diagnose as diagnose
-    from toolpath_stiff.api.effects import EffectCatalogue as EffectCatalogue
-    from toolpath_stiff.api.effects import EffectCheck as EffectCheck
     from toolpath_stiff.api.effects import EffectDraft as EffectDraft
     from toolpath_stiff.api.effects import EffectFile as EffectFile
     from toolpath_stiff.api.effects import check_effects as check_effects
@@ -41,7 +43,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.effects import effects as effects
     from toolpath_stiff.api.inputs import Program as Program
     from toolpath_stiff.api.machines import Machine as Machine
-    from toolpath_stiff.api.machines import MachineCheck as MachineCheck
     from toolpath_stiff.api.machines import MachineFile as MachineFile
     from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
     from toolpath_stiff.api.machines import machine_template as machine_template
@@ -56,12 +57,9 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
     from toolpath_stiff.api.placements import try_placement as try_placement
-    from toolpath_stiff.api.poses import PoseStiffness as PoseStiffness
-    from toolpath_stiff.api.poses import StiffnessMap as StiffnessMap
     from toolpath_stiff.api.poses import map_stiffness as map_stiffness
     from toolpath_stiff.api.poses import pose as pose
     from toolpath_stiff.api.poses import read_poses as read_poses
-    from toolpath_stiff.api.programs import ProgramCheck as ProgramCheck
     from toolpath_stiff.api.programs import SampledPath as SampledPath
     from toolpath_stiff.api.programs import analyze as analyze
     from toolpath_stiff.api.programs import check as check
@@ -85,33 +83,34 @@ if TYPE_CHECKING:
     from toolpath_stiff.planning.result import Plan as Plan
     from toolpath_stiff.readings.raw import Reduction as Reduction
     from toolpath_stiff.readings.raw import reduce as reduce
+    from toolpath_stiff.stiffness.catalogue import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.stiffness.contract import Effect as Effect
     from toolpath_stiff.stiffness.contract import Parameter as Parameter
+    from toolpath_stiff.stiffness.trial import EffectCheck as EffectCheck
 
 __version__ = _VERSION
 
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
+    "analysis.grid": ("StiffnessMap",),
+    "analysis.machine_check": ("MachineCheck",),
+    "analysis.poses": ("PoseStiffness",),
+    "analysis.program_check": ("ProgramCheck",),
     "analysis.results": ("Analysis",),
     "api.by_hand": ("Preview", "preview"),
     "api.case_studies": ("CaseStudy", "case_study"),
     "api.correction": ("Update", "plan", "update"),
     "api.diagnosis": ("Measurements", "compare", "diagnose"),
-    "api.effects": (
-        "EffectCatalogue", "EffectCheck", "EffectDraft", "EffectFile", "check_effects", "draft_effect",
-        "effect_template", "effects",
-    ),
+    "api.effects": ("EffectDraft", "EffectFile", "check_effects", "draft_effect", "effect_template", "effects"),
     "api.inputs": ("Program",),
-    "api.machines": (
-        "Machine", "MachineCheck", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry",
-    ),
+    "api.machines": ("Machine", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.next_visits": ("next_visit",),
     "api.placements": (
         "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
     ),
-    "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
-    "api.programs": ("ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
+    "api.poses": ("map_stiffness", "pose", "read_poses"),
+    "api.programs": ("SampledPath", "analyze", "check", "sample_path"),
     "case.case": ("Case",),
     "comparison.compare": ("Comparison",),
     "diagnosis.result": ("Diagnosis",),
@@ -122,7 +121,9 @@ _PUBLIC = {
     "planning.next_visit": ("NextVisit",),
     "planning.result": ("Plan",),
     "readings.raw": ("Reduction", "reduce"),
+    "stiffness.catalogue": ("EffectCatalogue",),
     "stiffness.contract": ("Effect", "Parameter"),
+    "stiffness.trial": ("EffectCheck",),
 }  # fmt: skip
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}
 

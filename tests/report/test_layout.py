@@ -14,8 +14,8 @@ from tests.browser import needs_browser, painted
 from tests.report import diagnose_documents as documents
 from tests.report.factory import short
 from tests.stiffness.cases import nist
+from toolpath_stiff.analysis.grid import map_stiffness
 from toolpath_stiff.analysis.loads import parse_load
-from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
@@ -119,7 +119,7 @@ def test_the_machine_is_whole_and_its_axes_named(last, pose, monkeypatch):
 
 
 def test_slices_of_a_map_fill_their_rows_and_no_figure_lies_on_another(last, mapped):
-    map_report.map_picture(nist(), mapped)
+    map_report.map_picture(mapped)
     assert len({round(axes.get_position().x0, 3) for axes in last[-1].axes[:4]}) == 2
     assert_whole_and_apart(last[-1])
 
@@ -200,7 +200,7 @@ def test_all_pages_have_one_style_sheet_with_a_dark_half(mapped):
     pages = {
         "analysis": page(analysis),
         "batch": batch_page([]),
-        "map": map_page(nist(), mapped),
+        "map": map_page(mapped, "nist"),
         "diagnosis": diagnose_html(documents.identified(), {}),
     }
     shared = asset("page.css")
@@ -221,7 +221,7 @@ def test_surfaces_of_a_map_stand_above_their_planes(tmp_path):
     """Seen from the front a surface rises from its plane: the stiffest is higher on the screen than the softest."""
     one = map_stiffness(build_model(nist()), (-0.1, 0.1), (-0.1, 0.1), [0.8], parse_load("radial"), 9)
     front = "document.querySelector('[data-view=front]').click()"
-    rows = painted(map_page(nist(), one), tmp_path, front)["view"]
+    rows = painted(map_page(one, "nist"), tmp_path, front)["view"]
     ramp = [rows[colour] for colour in page_colours()["colours"] if colour in rows]  # softest first
     assert len(ramp) > 5
     assert ramp[-1] < ramp[0] - 50

@@ -18,8 +18,8 @@ from toolpath_stiff.analysis.document import (
     without_nan,
     words_turn_the_platform,
 )
+from toolpath_stiff.analysis.evaluation import Evaluation, Progress, evaluate
 from toolpath_stiff.analysis.loads import Load, parse_load
-from toolpath_stiff.analysis.poses import PoseStiffness, Progress, evaluate
 from toolpath_stiff.analysis.statistics import (
     EvaluatedPath,
     sample_columns,
@@ -228,7 +228,7 @@ def analyze(
     >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.nc.reader import parse_program
     >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc")
-    >>> round(analyze(load_machine("nist"), slot, origin=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0)).summary()["mean_N_per_mm"])
+    >>> round(analyze(load_machine("nist"), slot, origin=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0)).mean_N_per_mm)
     54353
     """
     model = machine if isinstance(machine, StiffnessModel) else build_model(machine)
@@ -265,7 +265,7 @@ def _effective_origin(machine: Machine, program: Program, origin: Pose | None) -
     return chosen, source
 
 
-def _warnings(samples: Samples, at: PoseStiffness) -> list[str]:
+def _warnings(samples: Samples, at: Evaluation) -> list[str]:
     """What the evaluation itself has to say."""
     found = []
     rapids = ~samples.cutting & ~at.reachable

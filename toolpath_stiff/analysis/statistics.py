@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff import defaults
+from toolpath_stiff.analysis.evaluation import Evaluation, evaluate
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, follows_motion, headline_of, headline_words
-from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
 from toolpath_stiff.errors import InputError
@@ -73,7 +73,7 @@ class EvaluatedPath:
     load: Load
     force: float
     samples: Samples
-    at: PoseStiffness
+    at: Evaluation
     model: StiffnessModel
     origin: Pose
     origin_source: str
@@ -140,11 +140,6 @@ class EvaluatedPath:
         if not about.any():
             about, weight = self.samples.cutting & self.at.reachable, np.ones(len(weight))
         return self.at.stiffness[about], weight[about]
-
-    @property
-    def deflection(self) -> FloatArray:
-        """(n,) m, the tip's deflection along the load under `force`."""
-        return np.asarray(self.force / self.at.stiffness)
 
     @property
     def out_of_reach(self) -> BoolArray:

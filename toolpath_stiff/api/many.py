@@ -24,7 +24,7 @@ from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.processes import ProcessPool, death
 from toolpath_stiff.report.analysis.summary import TABLES
-from toolpath_stiff.report.batch.index import files, names, text
+from toolpath_stiff.report.batch.index import files, names
 from toolpath_stiff.report.batch.programs import (
     Found,
     Listed,
@@ -33,6 +33,7 @@ from toolpath_stiff.report.batch.programs import (
     figures_of,
     find_programs,
     report_folders,
+    terminal_summary,
 )
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, Result, one_of
@@ -111,7 +112,7 @@ class ManyAnalyses(Result):
         return pd.DataFrame(columns_of(self.outcomes))
 
     def __str__(self) -> str:
-        return text(self.outcomes)
+        return terminal_summary(self.outcomes)
 
     def _short(self) -> str:
         return f"{counted(len(self.outcomes), 'program')}, {len(self.failed) or 'none'} failed"

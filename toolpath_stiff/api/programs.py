@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from toolpath_stiff.analysis import Analysis
+    from toolpath_stiff.analysis.program_check import ProgramCheck
     from toolpath_stiff.path import Samples
 
 FASTEST_STRUT_MM_PER_MIN = 1e6
@@ -240,74 +241,6 @@ def sample_path(
     return SampledPath(read.name, samples, read.warnings, left)
 
 
-class ProgramCheck(Result):
-    r"""What a program uses, what is not understood, extents, times, and what a machine says to it.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
-    >>> found
-    <ProgramCheck: slot.nc, 1 error>
-    >>> found.errors == [one for one in found.findings if one["severity"] == "error"]
-    True
-    >>> found.to_frame()["line"].tolist(), found.to_dict()["complete"]
-    ([3], False)
-    """
-
-    command: ClassVar[str] = "check"
-
-    def __init__(self, document: dict[str, Any]) -> None:
-        self._document = document
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self._document
-
-    @property
-    def findings(self) -> list[dict[str, Any]]:
-        """What was found: line, column, subject, text, severity."""
-        return list(self._document["findings"])
-
-    @property
-    def errors(self) -> list[dict[str, Any]]:
-        """The findings that keep the program from running as it stands."""
-        from toolpath_stiff.nc.checking import ERROR
-
-        return [one for one in self.findings if one["severity"] == ERROR]
-
-    def to_frame(self) -> pd.DataFrame:
-        """The findings, one a row."""
-        import pandas as pd
-
-        return pd.DataFrame(self.findings, columns=["line", "column", "code", "text", "severity", "count"])
-
-    def save(self, file: str | Path) -> Path:
-        r"""Write the JSON document to a file, whole or not at all.
-
-        Examples
-        --------
-        >>> import pathlib, tempfile
-        >>> import toolpath_stiff as tps
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     tps.check(tps.Program.from_text("G21\nM2")).save(pathlib.Path(folder) / "check.json").name
-        'check.json'
-        """
-        from toolpath_stiff.files import write_atomically
-
-        return write_atomically(file, self.to_json())
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.check import text
-
-        return text(self._document)
-
-    def _short(self) -> str:
-        from toolpath_stiff.report.words import counted
-
-        return f"{self._document['program']}, {counted(len(self.errors), 'error') if self.errors else 'no errors'}"
-
-
 def check(
     program: Program | str | Path,
     machine: Machine | str | Path | None = "nist",
@@ -343,7 +276,7 @@ def check(
     >>> [(one["line"], one["severity"]) for one in found.errors]
     [(3, 'error')]
     """
-    from toolpath_stiff.analysis.checks import check_program
+    from toolpath_stiff.analysis.program_check import check_program
 
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
@@ -354,15 +287,13 @@ def check(
         speed = m_per_s_from_mm_per_min(
             positive("strut speed", strut_speed_mm_per_min, "mm/min", FASTEST_STRUT_MM_PER_MIN)
         )
-    return ProgramCheck(
-        check_program(
-            part.lines,
-            part.name,
-            machine=None if on is None else on.model.machine,
-            origin=None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
-            step=m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
-            strut_speed=speed,
-            controller=part.controller,
-            **part.options,
-        )
+    return check_program(
+        part.lines,
+        part.name,
+        machine=None if on is None else on.model.machine,
+        origin=None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
+        step=m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
+        strut_speed=speed,
+        controller=part.controller,
+        **part.options,
     )

@@ -405,7 +405,7 @@ def _effects_list(args: argparse.Namespace) -> int:
 
 
 def _effects_show(args: argparse.Namespace) -> int:
-    from toolpath_stiff.report.machine import describe_effect, effect_details
+    from toolpath_stiff.report.effects import describe_effect, effect_details
     from toolpath_stiff.results import json_text
     from toolpath_stiff.stiffness.catalogue import find_effect
 

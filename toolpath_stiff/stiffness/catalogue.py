@@ -9,19 +9,24 @@ import difflib
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
 from types import CodeType, ModuleType
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.results import Result
 from toolpath_stiff.stiffness import effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect
 from toolpath_stiff.stiffness.guard import check_declarations, line_in, line_of
 from toolpath_stiff.stiffness.term_file import effects_of_terms
 
 ENTRY_POINTS = "toolpath_stiff.effects"
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
@@ -182,3 +187,50 @@ def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
                 )
             found[effect.name] = effect
     return found
+
+
+class EffectCatalogue(Result):
+    """Effects, in the order of the load path.
+
+    Attributes
+    ----------
+    effects
+        The effects themselves.
+    broken
+        Plug-ins that do not load -> why.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> catalogue = tps.effects()
+    >>> catalogue["weak_strut"].link, catalogue.broken
+    ('struts', {})
+    >>> catalogue.to_frame().columns.tolist()
+    ['link', 'name', 'title', 'equation', 'source', 'load_dependent']
+    >>> len(catalogue.to_dict()["effects"]) == len(catalogue.effects)
+    True
+    """
+
+    command: ClassVar[str] = "effects"
+    shown_by: ClassVar[str] = "effects"
+
+    def __init__(self, effects: Sequence[Effect], broken: Mapping[str, str]) -> None:
+        self.effects, self.broken = list(effects), dict(broken)
+
+    def __getitem__(self, name: str) -> Effect:
+        """An effect by its name."""
+        return next(effect for effect in self.effects if effect.name == name)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What each effect declares, in its own units."""
+        return {"effects": [self.view.describe_effect(effect) for effect in self.effects], "broken": self.broken}
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row an effect: link of the load path, name, title, equation, source."""
+        import pandas as pd
+
+        columns = ["link", "name", "title", "equation", "source", "load_dependent"]
+        return pd.DataFrame(self.to_dict()["effects"])[columns]
+
+    def _short(self) -> str:
+        return f"{len(self.effects)} effects"

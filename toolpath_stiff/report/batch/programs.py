@@ -241,13 +241,6 @@ COLUMNS: Mapping[str, int | None] = {
 PLUNGE_KEYS = ("length_mm", "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm")
 
 
-SAME_NAME = (
-    "machine", "load", "force_N", "samples", "cutting_length_mm", "rapid_length_mm", "time_s", "mean_N_per_mm",
-    "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um", "headline", "min_margin", "min_margin_line",
-    "out_of_reach_samples", "extrapolated_share",
-)  # fmt: skip
-
-
 @dataclass(frozen=True)
 class Outcome:
     """What became of a program.
@@ -282,7 +275,7 @@ class Outcome:
 
 def figures_of(summary: Mapping[str, Any]) -> dict[str, Any]:
     """The values of `COLUMNS` from a `summary.json`: small, however long the program."""
-    found = {name: summary[name] for name in SAME_NAME}
+    found = {name: summary[name] for name in COLUMNS if name in summary}
     place = summary["weakest"]
     if place is not None:
         keys = ("line", "text", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")

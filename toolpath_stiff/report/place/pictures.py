@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolpath_stiff.analysis.grid import map_stiffness
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.placement.document import FIGURES
 from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
