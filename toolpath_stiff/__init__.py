@@ -22,7 +22,6 @@ from toolpath_stiff.defaults import VERSION as _VERSION
 if TYPE_CHECKING:
     from toolpath_stiff.api.by_hand import Preview as Preview
     from toolpath_stiff.api.by_hand import preview as preview
-    from toolpath_stiff.api.case_studies import CaseStudy as CaseStudy
     from toolpath_stiff.api.case_studies import case_study as case_study
     from toolpath_stiff.api.correction import Plan as Plan
     from toolpath_stiff.api.correction import Reduction as Reduction
@@ -85,6 +84,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import TableError as TableError
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
+    from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
     from toolpath_stiff.stiffness.contract import Effect as Effect
     from toolpath_stiff.stiffness.contract import Parameter as Parameter
 
@@ -93,7 +93,7 @@ __version__ = _VERSION
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
     "api.by_hand": ("Preview", "preview"),
-    "api.case_studies": ("CaseStudy", "case_study"),
+    "api.case_studies": ("case_study",),
     "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
     "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
     "api.effects": (
@@ -116,6 +116,7 @@ _PUBLIC = {
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
+    "placement.case_study": ("CaseStudy",),
     "stiffness.contract": ("Effect", "Parameter"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}
