@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.next_visits import NextVisit as NextVisit
     from toolpath_stiff.api.next_visits import next_visit as next_visit
     from toolpath_stiff.api.placements import KeepOut as KeepOut
-    from toolpath_stiff.api.placements import Placement as Placement
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
     from toolpath_stiff.api.placements import RewrittenProgram as RewrittenProgram
     from toolpath_stiff.api.placements import place as place
@@ -85,6 +84,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
     from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
+    from toolpath_stiff.placement.result import Placement as Placement
     from toolpath_stiff.stiffness.contract import Effect as Effect
     from toolpath_stiff.stiffness.contract import Parameter as Parameter
 
@@ -107,7 +107,7 @@ _PUBLIC = {
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.next_visits": ("NextVisit", "next_visit"),
     "api.placements": (
-        "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
+        "KeepOut", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
     ),
     "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
@@ -117,6 +117,7 @@ _PUBLIC = {
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
     "placement.case_study": ("CaseStudy",),
+    "placement.result": ("Placement",),
     "stiffness.contract": ("Effect", "Parameter"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}

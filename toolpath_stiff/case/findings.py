@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.correction import Plan, Update
     from toolpath_stiff.api.diagnosis import Comparison, Diagnosis
     from toolpath_stiff.api.effects import EffectDraft
-    from toolpath_stiff.api.placements import Placement
     from toolpath_stiff.api.programs import Analysis
     from toolpath_stiff.case.steps import Step
+    from toolpath_stiff.placement.result import Placement
 
 
 Found = TypeVar("Found", bound=FolderResult)
