@@ -40,7 +40,14 @@ class Result(ABC):
 
     @property
     def view(self) -> Any:
-        """The module that makes text, figures and files of it, imported when first asked for."""
+        """The module that makes text, figures and files of it, imported when first asked for.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.CaseStudy.shown_by
+        'case_study'
+        """
         return import_module(f"toolpath_stiff.report.{self.shown_by}")
 
     @abstractmethod

@@ -72,6 +72,8 @@ class CaseStudy(FolderResult):
     >>> study = tps.case_study("nist", slot, {"low": (0, 0, 500), "high": (0, 0, 900)}, step_mm=10)
     >>> study.to_frame()[["region", "z_mm"]].values.tolist()
     [['low', 500.0], ['high', 900.0]]
+    >>> study.is_own
+    True
     """
 
     command: ClassVar[str] = "case-study"

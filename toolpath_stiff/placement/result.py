@@ -72,6 +72,10 @@ class Placement(FolderResult):
     ('', 'G0 X0 Y0 Z5')
     >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
     (1, ['placements.csv', 'placement.json'], 'balanced')
+    >>> found.objective, found.picked, list(found.trade_offs), found.machine_stated["machine"]
+    ('balanced', False, ['mean', 'range', 'weakest'], 'nist')
+    >>> found.offsets.linuxcnc[:3]
+    'G21'
     >>> type(found.plot()).__name__
     'Figure'
     """

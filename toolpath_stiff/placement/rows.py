@@ -124,6 +124,6 @@ def analyzed_row(analysis: Analysis, number: int | None = None, like: PlacementR
         plunges["mean_N_per_mm"],
         plunges["min_N_per_mm"],
         share(analysis.at.extrapolated, analysis.samples.cutting),
-        like and like.margin,
-        like and like.rapid_margin,
+        like.margin if like else None,
+        like.rapid_margin if like else None,
     )
