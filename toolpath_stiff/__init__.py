@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.analysis.results import Analysis as Analysis
     from toolpath_stiff.api.by_hand import Preview as Preview
     from toolpath_stiff.api.by_hand import preview as preview
-    from toolpath_stiff.api.case_studies import CaseStudy as CaseStudy
     from toolpath_stiff.api.case_studies import case_study as case_study
     from toolpath_stiff.api.correction import Update as Update
     from toolpath_stiff.api.correction import plan as plan
@@ -51,7 +50,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.many import analyze_many as analyze_many
     from toolpath_stiff.api.next_visits import next_visit as next_visit
     from toolpath_stiff.api.placements import KeepOut as KeepOut
-    from toolpath_stiff.api.placements import Placement as Placement
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
     from toolpath_stiff.api.placements import RewrittenProgram as RewrittenProgram
     from toolpath_stiff.api.placements import place as place
@@ -79,6 +77,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import TableError as TableError
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
+    from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
+    from toolpath_stiff.placement.result import Placement as Placement
     from toolpath_stiff.planning.next_visit import NextVisit as NextVisit
     from toolpath_stiff.planning.result import Plan as Plan
     from toolpath_stiff.readings.raw import Reduction as Reduction
@@ -98,7 +98,7 @@ _PUBLIC = {
     "analysis.program_check": ("ProgramCheck",),
     "analysis.results": ("Analysis",),
     "api.by_hand": ("Preview", "preview"),
-    "api.case_studies": ("CaseStudy", "case_study"),
+    "api.case_studies": ("case_study",),
     "api.correction": ("Update", "plan", "update"),
     "api.diagnosis": ("Measurements", "compare", "diagnose"),
     "api.effects": ("EffectDraft", "EffectFile", "check_effects", "draft_effect", "effect_template", "effects"),
@@ -106,9 +106,7 @@ _PUBLIC = {
     "api.machines": ("Machine", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.next_visits": ("next_visit",),
-    "api.placements": (
-        "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
-    ),
+    "api.placements": ("KeepOut", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement"),
     "api.poses": ("map_stiffness", "pose", "read_poses"),
     "api.programs": ("SampledPath", "analyze", "check", "sample_path"),
     "case.case": ("Case",),
@@ -118,6 +116,8 @@ _PUBLIC = {
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
+    "placement.case_study": ("CaseStudy",),
+    "placement.result": ("Placement",),
     "planning.next_visit": ("NextVisit",),
     "planning.result": ("Plan",),
     "readings.raw": ("Reduction", "reduce"),

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
     from toolpath_stiff.api.correction import Update
     from toolpath_stiff.api.effects import EffectDraft
-    from toolpath_stiff.api.placements import Placement
     from toolpath_stiff.case.steps import Step
     from toolpath_stiff.comparison.compare import Comparison
     from toolpath_stiff.diagnosis.result import Diagnosis
+    from toolpath_stiff.placement.result import Placement
     from toolpath_stiff.planning.result import Plan
 
 
