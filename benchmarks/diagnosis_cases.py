@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.diagnosis.diagnose import Diagnosis, diagnose
-from toolpath_stiff.diagnosis.document import DiagnosisDocument, document
+from toolpath_stiff.diagnosis.document import document
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Machine
@@ -110,9 +111,7 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     return _heading(job) | judged(rows, truth, folder)[0]
 
 
-def judged(
-    rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: Any
-) -> tuple[dict[str, Any], DiagnosisDocument]:
+def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: Any) -> tuple[dict[str, Any], Document]:
     """Truth, verdict and probabilities of a case as a record, and the whole document; `stated` goes to `diagnose`."""
     file = folder / "measurements.csv"
     file.write_text(exercise.csv_text(rows), encoding="utf-8")
@@ -137,7 +136,7 @@ def judged(
     return record, found
 
 
-def _right_effect(found: DiagnosisDocument, hidden: dict[str, Any]) -> dict[str, Any]:
+def _right_effect(found: Document, hidden: dict[str, Any]) -> dict[str, Any]:
     """How the effect that was hidden fares: place, errors, adequacy, and whether its intervals hold the truth."""
     names = [candidate["effect"] for candidate in found["candidates"]]
     if hidden["effect"] not in names:

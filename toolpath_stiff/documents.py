@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+Document = Mapping[str, Any]  # what a JSON file holds, or a part of it, by the file's own keys
+
 
 def to_dict(value: Any) -> Any:
     """Plain data: dataclasses as dictionaries, their fields in order; None is kept, numpy becomes Python."""
