@@ -22,6 +22,7 @@ from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.lathes import lathe_program
 from toolpath_stiff.nc.moves import RAPID, Moves, Program
 from toolpath_stiff.nc.operations import split_comments
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
 from toolpath_stiff.nc.words import HEAD_LINES, looks_like_cutter_location, read_lines, split_lines
@@ -99,12 +100,8 @@ def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = Non
     for at in places:
         what = language_of(lines[at])
         if what is not None:
-            return ProgramError(
-                f"{lines[at].strip()[:40]!r} is {what}, which is not read",
-                expected="G code",
-                hint=HINTS[what],
-                file=name,
-                line=at + 1,
+            return Place(name, at + 1).fail(
+                f"{lines[at].strip()[:40]!r} is {what}, which is not read", "G code", HINTS[what]
             )
     return None
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.cutter_location.geometry import AxisError
 from toolpath_stiff.nc.cutter_location.modes import one_frame
 from toolpath_stiff.nc.cutter_location.motion import to_point
 from toolpath_stiff.nc.cutter_location.state import State
@@ -180,7 +179,7 @@ def _perform(state: State, statement: Statement, point: list[float] | None) -> N
             execute(state, statement)
         else:
             to_point(state, point)
-    except (ArcError, AxisError) as error:
+    except ArcError as error:
         raise state.fail(error.found, error.expected) from None
     state.last_word = statement.word or state.last_word
 

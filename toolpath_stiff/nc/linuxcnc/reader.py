@@ -30,8 +30,8 @@ from toolpath_stiff.nc.linuxcnc.inputs import (
 from toolpath_stiff.nc.linuxcnc.runner import StoppedError, find_rs274, message_and_line, run_rs274
 from toolpath_stiff.nc.moves import Moves, ToolUse, Unsupported
 from toolpath_stiff.nc.state import START
-from toolpath_stiff.nc.tables import Offsets, ToolEntry
-from toolpath_stiff.units import ShopPose, m_from_mm
+from toolpath_stiff.nc.tables import Offsets, ToolEntry, tool_of
+from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.linuxcnc.runner import Limits, Run
@@ -169,7 +169,7 @@ class _Session:
             unsupported=tuple(self._unsupported()),
             warnings=tuple(self._warnings(says, given, follower)),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program", *self._left_out()),
-            tools=tuple(self._tool_use(number) for number in follower.used_tools),
+            tools=tuple(tool_of(self.tools, number).in_use() for number in follower.used_tools),
             turning=self._turning(),
         )
 
@@ -288,17 +288,6 @@ class _Session:
         early = [line for line in self.lines if line.number < follower.first_motion]
         zeroed = any(OFFSET_CODES.search(line.plain) and SETS_G54.search(line.plain) for line in early)
         return at_first if moved else before, given or moved or zeroed
-
-    def _tool_use(self, number: int) -> ToolUse:
-        entry = (self.tools or {}).get(number, ToolEntry(number))
-        return ToolUse(
-            number,
-            m_from_mm(entry.length),
-            m_from_mm(entry.diameter),
-            entry.remark,
-            m_from_mm(entry.stick_out),
-            entry.material,
-        )
 
     def _turning(self) -> dict[str, int]:
         found: dict[str, int] = {}
