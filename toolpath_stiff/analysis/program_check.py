@@ -20,7 +20,7 @@ from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches
 from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.nc.operations import find_operations
-from toolpath_stiff.nc.reader import ZERO
+from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.path import BLOCK, Samples, move_durations, place, sample_moves
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
