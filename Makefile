@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PROGRAM ?= programs/pocket.nc
 
-.PHONY: demo studio test lint docs dist benchmark clean
+.PHONY: demo studio test lint house docs dist benchmark clean
 
 demo: $(VENV)/.run
 	$(BIN)/tps analyze $(PROGRAM) --out reports/demo --replace
@@ -26,6 +26,10 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# The budgets of .ci/house.toml; `make house RUNS=--runs` counts the functions and types that runs pass as well.
+house: $(VENV)/.dev
+	$(BIN)/python .ci/house.py . $(RUNS)
 
 docs: $(VENV)/.dev
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env -c docs -d docs/_build/doctrees . docs/_build/html

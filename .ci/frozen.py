@@ -1,7 +1,7 @@
-"""What every command makes of the packaged programs, machines and data: stored, and held against what was stored before.
+"""What every command makes of the packaged programs, machines and data: stored, and held against an earlier store.
 
-`frozen.py make FOLDER` runs all commands and keeps files and terminal text below FOLDER; `frozen.py compare BEFORE AFTER`
-prints what differs and exits 1 where anything does. PNG files count as pictures: they are compared by their pixels' bytes.
+`frozen.py make FOLDER [PATTERN]` runs the commands (whose names the pattern matches) and keeps files and terminal text
+below FOLDER; `frozen.py compare BEFORE AFTER` prints what differs, byte by byte, and exits 1 where anything does.
 """
 
 from __future__ import annotations
@@ -70,8 +70,9 @@ def commands() -> Iterator[tuple[str, list[str]]]:
         for command in ("compare", "diagnose", "plan"):
             machine = ["--machine", f"{folder}/machine.toml"]
             yield f"{command}_{hidden}", [command, f"{folder}/measurements.csv", *machine, *out]
-    yield "update_one", ["update", "{out}/../rig_one/exercise/measurements.csv", "--machine",
-                         "{out}/../rig_one/exercise/machine.toml", "--add", "weak_strut", "-o", "{out}/better.toml", *out]  # fmt: skip
+    exercise = "{out}/../rig_one/exercise"
+    words = [f"{exercise}/measurements.csv", "--machine", f"{exercise}/machine.toml", "--add", "weak_strut"]
+    yield "update_one", ["update", *words, "-o", "{out}/better.toml", *out]
     for command in ("analyze", "path", "check", "pose", "map", "machine", "place", "case-study", "effects", "reduce",
                     "compare", "diagnose", "update", "plan", "rig", "studio"):  # fmt: skip
         yield f"help_{command}", [command, "--help"]

@@ -1,4 +1,4 @@
-"""The house in figures that folding cannot please: `house.py [ROOT]` exits 1 where a figure is above .ci/house.toml.
+"""The house in figures that folding cannot please: `house.py ROOT [--runs] [--places]`; 1 where one is too high.
 
 Counted by syntax tree and tokens: no line is longer, shorter or hidden for it.
 """
@@ -12,6 +12,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import tokenize
 import tomllib
 from collections import Counter
@@ -30,7 +31,7 @@ NOT_CODE = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, to
 Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 RUNS = {
     "analyze": ["analyze", "programs/pocket.nc", "--out", "{out}"],
-    "diagnose": ["diagnose", "nist_table1", "--out", "{out}"],
+    "diagnose": ["diagnose", "nist-table1", "--out", "{out}"],
     "place": ["place", "programs/pocket.nc", "--x", "-300:300", "--y", "-300:300", "--z", "400:1250", "--out", "{out}"],
 }
 
@@ -109,27 +110,29 @@ def modules_of(root: Path) -> list[Module]:
 
 
 def modules_too_long(module: Module, most: int = 300) -> Iterator[str]:
+    """Modules of more lines than a subject takes; one table of data apart."""
     if module.lines - module.longest_table > most:
         yield f"{module.path}: {module.lines} lines"
 
 
 def init_that_defines(module: Module, most: int = 40) -> Iterator[str]:
+    """Room doors (`__init__.py`) that define something, or are long; the package's own holds the public names."""
     if module.path.name == "__init__.py":
-        defined = [
-            n.name for n in module.tree.body if isinstance(n, Definition) and n.name not in ("__getattr__", "__dir__")
-        ]
-        table = module.longest_table if len(module.path.parts) == 1 else 0  # the public names
-        if defined or (len(module.path.parts) > 1 and module.lines - table > most):
+        names = [node.name for node in module.tree.body if isinstance(node, Definition)]
+        defined = [name for name in names if name not in ("__getattr__", "__dir__")]
+        if defined or (len(module.path.parts) > 1 and module.lines > most):
             yield f"{module.path}: {', '.join(defined) or f'{module.lines} lines'}"
 
 
 def banners(module: Module) -> Iterator[str]:
+    """Comments that part a module, `# -- subject`."""
     for token in tokenize.generate_tokens(io.StringIO(module.text).readline):
         if token.type == tokenize.COMMENT and re.match(r"#\s*(--|==|\*\*|~~|##)", token.string):
             yield f"{module.path}:{token.start[0]}"
 
 
 def modules_of_two_subjects(module: Module) -> Iterator[str]:
+    """Modules with two groups of three or more definitions that never name each other."""
     names = {node.name: node for node in module.tree.body if isinstance(node, Definition)}
     group = {name: name for name in names}
 
@@ -148,6 +151,7 @@ def modules_of_two_subjects(module: Module) -> Iterator[str]:
 
 
 def forwarding_functions(module: Module) -> Iterator[str]:
+    """Functions that only hand names and constants on to another."""
     for function in module.functions:
         body = [n for n in function.body if not _is_text(n) and not isinstance(n, ast.Import | ast.ImportFrom)]
         if len(body) != 1 or not isinstance(body[0], ast.Return | ast.Expr) or not isinstance(body[0].value, ast.Call):
@@ -159,12 +163,14 @@ def forwarding_functions(module: Module) -> Iterator[str]:
 
 
 def untyped_documents(module: Module) -> Iterator[str]:
+    """`dict[str, Any]`, of any mapping."""
     for node in module.nodes:
         if isinstance(node, ast.Subscript) and ast.unparse(node) in ("dict[str, Any]", "Mapping[str, Any]"):
             yield f"{module.path}:{node.lineno}"
 
 
 def late_imports(module: Module) -> Iterator[str]:
+    """Imports within functions."""
     for function in module.functions:
         for node in ast.walk(function):
             if isinstance(node, ast.Import | ast.ImportFrom):
@@ -172,6 +178,7 @@ def late_imports(module: Module) -> Iterator[str]:
 
 
 def long_parameter_lists(module: Module) -> Iterator[str]:
+    """Functions of eight arguments or more, `self` and public functions of the api apart."""
     for function in module.functions:
         given = function.args
         names = [argument.arg for argument in [*given.posonlyargs, *given.args, *given.kwonlyargs]]
@@ -182,6 +189,7 @@ def long_parameter_lists(module: Module) -> Iterator[str]:
 
 
 def vague_names(module: Module) -> Iterator[str]:
+    """Variables, arguments and attributes whose names say nothing."""
     for node in module.nodes:
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             name = node.id
@@ -196,6 +204,7 @@ def vague_names(module: Module) -> Iterator[str]:
 
 
 def functions_of_60_lines(module: Module) -> Iterator[str]:
+    """Functions of 60 lines or more, docstring apart."""
     for function in module.functions:
         first = function.body[0]
         text = (first.end_lineno or 0) - first.lineno + 1 if ast.get_docstring(function) else 0
@@ -265,15 +274,22 @@ finally:
 """
 
 
-def run_of(root: Path, command: list[str], out: Path) -> list[int]:
-    """Functions and types of the package that a command passes; calls are counted, in this process alone."""
-    words = [word.format(out=out) for word in command]
-    ended = subprocess.run(
-        [sys.executable, "-c", COUNTER.replace("{package}", PACKAGE), *words],
-        cwd=root, env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    counts: list[int] = json.loads(ended.stderr.splitlines()[-1])
-    return counts
+def runs(root: Path) -> dict[str, float]:
+    """Functions and types of the package that the commands of `RUNS` pass, in one process each."""
+    figures: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, command in RUNS.items():
+            words = [word.format(out=f"{folder}/{name}") for word in command]
+            ended = subprocess.run(
+                [sys.executable, "-c", COUNTER.replace("{package}", PACKAGE), *words],
+                cwd=root,
+                env={**os.environ, "PYTHONPATH": str(root)},
+                capture_output=True,
+                text=True,
+                check=True,
+            )
+            figures[f"{name}_functions"], figures[f"{name}_types"] = json.loads(ended.stderr.splitlines()[-1])
+    return figures
 
 
 def judge(budget: dict[str, dict[str, float]], figures: dict[str, dict[str, float]]) -> list[tuple[str, float, float]]:
@@ -289,10 +305,12 @@ def judge(budget: dict[str, dict[str, float]], figures: dict[str, dict[str, floa
 
 def main() -> int:
     """Print figures beside budgets; 1 where one is above, with the places of broken rules."""
-    root = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[1]).resolve()
+    root = Path(sys.argv[1]).resolve()
     budget = tomllib.loads((root / ".ci" / "house.toml").read_text("utf-8"))
     modules = modules_of(root)
     figures = {**figures_of(modules), "beside": beside(root, modules)}
+    if "--runs" in sys.argv:
+        figures["runs"] = runs(root)
     rows = judge(budget, figures)
     for name, count, most in rows:
         print(f"{name:<36}{count:>10,}{most:>10,}{'   above' if count > most else ''}")

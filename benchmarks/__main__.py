@@ -6,12 +6,6 @@ its round, the medians are printed. Absolute times depend on the machine; the ra
 
 from __future__ import annotations
 
-import os
-
-for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[variable] = "1"
-
-# ruff: noqa: E402 - the thread limits above must come first
 import argparse
 import sys
 from importlib.util import find_spec

@@ -11,16 +11,65 @@ from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 
+from benchmarks.pages import write_page
+
 Record = dict[str, Any]
 Collect = Callable[[str, Callable[[Any], Record], Sequence[Any]], list[Record]]
 
 
-def add_run_arguments(parser: argparse.ArgumentParser, records: Path, out: Path) -> None:
-    """How many processes, where the records of the cases and the tables go."""
+def run_benchmark(
+    parser: argparse.ArgumentParser,
+    arguments: Sequence[str] | None,
+    make_records: Callable[[argparse.Namespace], list[Record]],
+    report: Callable[[Sequence[Record], str], tuple[str, bool]],
+    *,
+    records: Path,
+    out: Path | None,
+) -> int:
+    """The exit code of a benchmark on blind cases, 1 if a bar is not cleared; its page is printed and written.
+
+    Parameters
+    ----------
+    parser
+        With the options that say which cases are run.
+    arguments
+        Of the command line.
+    make_records
+        Runs the cases that the options say.
+    report
+        Makes the page of the records and of the command, and says whether all bars are cleared.
+    records, out
+        Where the records of the cases and the page go unless said otherwise; None: the page is printed alone.
+    """
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     parser.add_argument("--records", type=Path, default=records, help="JSON lines, one a case")
     parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
-    parser.add_argument("--out", type=Path, default=out, help=f"markdown file to write (default: {out.name} beside)")
+    parser.add_argument("--out", type=Path, default=out, help="markdown file to write")
+    args = parser.parse_args(arguments)
+    text, cleared = report(
+        read_records(args.records) if args.table_only else make_records(args), _command(parser, args)
+    )
+    print(text)
+    if args.out:
+        write_page(args.out, text, of_records=args.table_only)
+    return 0 if cleared else 1
+
+
+def _command(parser: argparse.ArgumentParser, args: argparse.Namespace) -> str:
+    """The command line that says what was run: the options that are not as usual."""
+    words = [parser.prog]
+    for name, value in vars(args).items():
+        values = value if isinstance(value, list) else [value]
+        usual = parser.get_default(name)
+        if name not in ("jobs", "records", "table_only") and value != usual and tuple(values) != usual:
+            words += [f"--{name.replace('_', '-')}", *map(str, values)]
+    return " ".join(words)
+
+
+def run_cases(args: argparse.Namespace, name: str, run: Callable[[Any], Record], jobs: Sequence[Any]) -> list[Record]:
+    """The records of all cases, in as many processes as the options say."""
+    with case_loop(args.jobs, args.records) as collect:
+        return collect(name, run, jobs)
 
 
 @contextmanager

@@ -7,12 +7,6 @@ diagnosed again.
 
 from __future__ import annotations
 
-import os
-
-for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-
-# ruff: noqa: E402 - the thread limits above must come before numpy
 import argparse
 import json
 import resource
@@ -23,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.case_loop import case_loop, read_records
+from benchmarks.case_loop import case_loop, document, run_benchmark
 from benchmarks.diagnosis_bars import FLOOR_PERCENT, Figure, Record, figures, middle_of
 from benchmarks.diagnosis_cases import PLANNED_CASES, Job, make_jobs, run
 from benchmarks.diagnosis_tables import (
@@ -39,7 +33,6 @@ from benchmarks.diagnosis_tables import (
     two_table,
     verdicts_table,
 )
-from benchmarks.pages import write_page
 from toolpath_stiff.rig import case, exercise
 
 FIRST_SEED = 41_000_000  # chosen once, before the first run
@@ -119,15 +112,9 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
         ("Cases that count against a bar", failures_table(good)),
         ("Intervals that miss the truth", missed_intervals_table(good)),
     ]
-    if broken:
-        rows = [f"- {r['layout']} {r['group']} {r['seed']}: `{r['error'].strip().splitlines()[-1]}`" for r in broken]
-        parts.insert(1, ("Cases that broke", rows))
-    lines = ["# Diagnosis on blind cases", "", _WHAT.format(low=seeds[0], high=seeds[-1], floor=FLOOR_PERCENT), ""]
-    for heading, body in parts:
-        lines += [*([f"## {heading}", ""] if heading else []), *body, ""]
-    lines.append(f"Made by `{command}`.")
+    what = _WHAT.format(low=seeds[0], high=seeds[-1], floor=FLOOR_PERCENT)
     cleared = not broken and all(figure.cleared is not False for figure in found)
-    return "\n".join(lines) + "\n", cleared
+    return document("Diagnosis on blind cases", what, parts, broken, command), cleared
 
 
 _WHAT = (
@@ -165,26 +152,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--outside", type=int, default=60, help="cases outside the catalogue (default: 60)")
     parser.add_argument("--two", type=int, default=20, help="cases with two hidden effects (default: 20)")
     parser.add_argument("--misstated", type=int, default=30, help="cases with the scatter stated wrongly (default: 30)")
-    parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
-    parser.add_argument("--records", type=Path, default=RECORDS, help="JSON lines, one a case")
-    parser.add_argument("--table-only", action="store_true", help="print the table from --records again")
-    parser.add_argument("--out", type=Path, help="write the tables to this file as well")
-    args = parser.parse_args(arguments)
-    if args.table_only:
-        records = read_records(args.records)
-    else:
+
+    def make_records(args: argparse.Namespace) -> list[Record]:
         jobs = make_jobs(args.first_seed, args.each, args.none, args.outside, args.two, args.misstated)
-        records = run_all(jobs, args.jobs, args.records)
-    counts = {"first-seed": FIRST_SEED, "each": 8, "none": 150, "outside": 60, "two": 20, "misstated": 30}
-    given = {name: getattr(args, name.replace("-", "_")) for name in counts}
-    options = "".join(f" --{name} {value}" for name, value in given.items() if value != counts[name])
-    text, cleared = report(
-        records, f"python -m benchmarks.diagnosis{options}" + (f" --out {args.out}" if args.out else "")
-    )
-    print(text)
-    if args.out:
-        write_page(args.out, text, of_records=args.table_only)
-    return 0 if cleared else 1
+        return run_all(jobs, args.jobs, args.records)
+
+    return run_benchmark(parser, arguments, make_records, report, records=RECORDS, out=None)
 
 
 if __name__ == "__main__":

@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.diagnosis.diagnose import Diagnosis, diagnose
-from toolpath_stiff.diagnosis.document import DiagnosisDocument, document
+from toolpath_stiff.diagnosis.document import document
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.document import plan_csv, plan_rows
-from toolpath_stiff.planning.plan import Plan, plan_measurements, random_visits
+from toolpath_stiff.planning.plan import RivalPlan, plan_measurements, random_visits
 from toolpath_stiff.planning.rivals import rivals_of
+from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.visits import Costs, Menu
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
@@ -110,9 +111,7 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     return _heading(job) | judged(rows, truth, folder)[0]
 
 
-def judged(
-    rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: Any
-) -> tuple[dict[str, Any], DiagnosisDocument]:
+def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: Any) -> tuple[dict[str, Any], Document]:
     """Truth, verdict and probabilities of a case as a record, and the whole document; `stated` goes to `diagnose`."""
     file = folder / "measurements.csv"
     file.write_text(exercise.csv_text(rows), encoding="utf-8")
@@ -137,7 +136,7 @@ def judged(
     return record, found
 
 
-def _right_effect(found: DiagnosisDocument, hidden: dict[str, Any]) -> dict[str, Any]:
+def _right_effect(found: Document, hidden: dict[str, Any]) -> dict[str, Any]:
     """How the effect that was hidden fares: place, errors, adequacy, and whether its intervals hold the truth."""
     names = [candidate["effect"] for candidate in found["candidates"]]
     if hidden["effect"] not in names:
@@ -193,7 +192,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
     record |= {
         "rivals": [rival.name for rival in plan.rivals],
         "settleable": settleable(plan, truth),
-        "pairs": [[pair.first, pair.second, round(pair.gap, 2), pair.separable] for pair in plan.pairs],
+        "pairs": [[*pair.effects, round(pair.separation_sigma, 2), pair.separable] for pair in plan.pairs],
         "forecast": round(plan.after.settled, 3),
     }
     blind = random_visits(plan, POSES[-1], job.seed)
@@ -215,12 +214,12 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
             more = folder / f"{label}_{n}.csv"
             more.write_text(_rows_of_clamps(further, clamps), encoding="utf-8")
             after = diagnose(machine(), read_measurements([file, more], machine()), plan_next=False)
-            settled = after.verdict == "identified" and after.plausible == (truth,)
+            settled = after.verdict == "identified" and after.plausible == [truth]
             record[f"{label}_{n}"] = [after.verdict, list(after.plausible), settled]
     return record
 
 
-def _plan(diagnosis: Diagnosis, poses: int) -> Plan | None:
+def _plan(diagnosis: Diagnosis, poses: int) -> RivalPlan | None:
     """The plan behind `next_measurements`, which hands on its rows only; None where nothing rivals."""
     judgement = diagnosis.main
     rivals = rivals_of(judgement)
@@ -233,14 +232,14 @@ def _plan(diagnosis: Diagnosis, poses: int) -> Plan | None:
     )  # fmt: skip
 
 
-def settleable(plan: Plan, truth: str) -> bool:
+def settleable(plan: RivalPlan, truth: str) -> bool:
     """Whether tip stiffness can tell the truth from each rival; without the truth among them, the rivals apart."""
     known = truth in {rival.name for rival in plan.rivals}
-    return all(pair.separable for pair in plan.pairs if not known or truth in (pair.first, pair.second))
+    return all(pair.separable for pair in plan.pairs if not known or truth in pair.effects)
 
 
 def _measured(
-    case: case_module.Case, before: Diagnosis, plan: Plan, visits: Sequence[int], file: Path, seed: Sequence[int]
+    case: case_module.Case, before: Diagnosis, plan: RivalPlan, visits: Sequence[int], file: Path, seed: Sequence[int]
 ) -> dict[str, Any]:
     """What the hidden machine shows at these visits; clamps are numbered on."""
     file.write_text(plan_csv(plan_rows(plan.visits, visits, set(before.data.point.tolist()))), encoding="utf-8")

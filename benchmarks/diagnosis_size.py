@@ -8,12 +8,6 @@ the cost grows at most as n^1.5; 10,000 readings end with a verdict.
 
 from __future__ import annotations
 
-import os
-
-for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[variable] = "1"
-
-# ruff: noqa: E402 - the thread limits above must come first
 import argparse
 import math
 import sys

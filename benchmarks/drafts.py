@@ -8,12 +8,6 @@ noise is stated half as large as it is, so that the draft is read off scatter.
 
 from __future__ import annotations
 
-import os
-
-for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-
-# ruff: noqa: E402 - the thread limits above must come before numpy
 import argparse
 import sys
 import tempfile
@@ -25,13 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.case_loop import Record, add_run_arguments, case_loop, document, read_records
+from benchmarks.case_loop import Record, document, run_benchmark, run_cases
 from benchmarks.diagnosis_bars import Figure, share
 from benchmarks.diagnosis_cases import machine
 from benchmarks.diagnosis_tables import bars_table, summary
-from benchmarks.pages import write_page
+from toolpath_stiff.correction.draft import draft
 from toolpath_stiff.diagnosis.diagnose import diagnose
-from toolpath_stiff.drafting.draft import draft
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.judgement import judge
@@ -88,18 +81,18 @@ def _drafted(job: Job, folder: Path) -> dict[str, Any]:
     file = folder / "old.csv"
     file.write_text(exercise.csv_text({name: np.asarray(values)[old] for name, values in case.rows.items()}))
     before = diagnose(machine(), read_measurements(file, machine()), noise=noise, plan_next=False)
-    made = draft(before, "missing.py")
+    made = draft(before, "missing.toml")
     links = [] if not made.text or before.portrait is None else [one.term.link for one in before.portrait.terms]
     truth = [link for effect in case.truth["effects"] for link in effect["links"]]
     record = {"verdict": before.verdict, "drafted": list(made.effects), "links": links, "truth": truth, "judged": {}}
     if not made.text:
         return record
-    (folder / "missing.py").write_text(made.text)
+    (folder / "missing.toml").write_text(made.text)
     for what, table in tables.items():
         mixed = {n: np.where(old, np.asarray(case.rows[n]), np.asarray(table[n])) for n in case.rows}
         file = folder / f"{what}.csv"
         file.write_text(exercise.csv_text(mixed))
-        record["judged"][what] = _judged(file, str(folder / "missing.py"), noise)
+        record["judged"][what] = _judged(file, str(folder / "missing.toml"), noise)
     return record
 
 
@@ -169,28 +162,14 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print; exit code 1 if a bar is not cleared."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.drafts", description=__doc__)
-    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument("--cases", type=int, default=16, help="drafts of unknowns (default: 16)")
     parser.add_argument("--noise-cases", type=int, default=8, help="drafts of noise (default: 8)")
-    add_run_arguments(parser, RECORDS, OUT)
-    args = parser.parse_args(arguments)
-    if args.table_only:
-        records = read_records(args.records)
-    else:
-        with case_loop(args.jobs, args.records) as collect:
-            records = collect("drafted", run, make_jobs(args.first_seed, args.cases, args.noise_cases))
-    options = "".join(
-        f" {name} {value}"
-        for name, value, usual in (
-            ("--cases", args.cases, 16), ("--noise-cases", args.noise_cases, 8),
-            ("--first-seed", args.first_seed, FIRST_SEED),
-        )
-        if value != usual
-    )  # fmt: skip
-    text, cleared = report(records, f"python -m benchmarks.drafts{options}")
-    print(text)
-    write_page(args.out, text, of_records=args.table_only)
-    return 0 if cleared else 1
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
+
+    def make_records(args: argparse.Namespace) -> list[Record]:
+        return run_cases(args, "drafted", run, make_jobs(args.first_seed, args.cases, args.noise_cases))
+
+    return run_benchmark(parser, arguments, make_records, report, records=RECORDS, out=OUT)
 
 
 if __name__ == "__main__":

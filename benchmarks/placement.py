@@ -26,11 +26,13 @@ from toolpath_stiff.nc.controller import read_controller
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
-from toolpath_stiff.placement.document import FIGURES
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import representative_path, work_path
-from toolpath_stiff.placement.placing import Placed, Task, place_program
+from toolpath_stiff.placement.placing import place_program
+from toolpath_stiff.placement.result import Placement
+from toolpath_stiff.placement.rows import FIGURES
 from toolpath_stiff.placement.search import SearchRules
+from toolpath_stiff.placement.task import Task
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import closed_form
 from toolpath_stiff.stiffness.model import build_model
@@ -74,7 +76,7 @@ def random_program(seed: int) -> Program:
     return parse_program("\n".join([*lines, "M2", ""]), f"random {seed}", default_origin=MODEL.machine.default_origin)
 
 
-def placed(program: Program, step: float = 2e-3) -> Placed:
+def placed(program: Program, step: float = 2e-3) -> Placement:
     """The program placed as the README's command places it."""
 
     def read(origin: tuple[float, ...]) -> Program:
@@ -90,14 +92,17 @@ def kept(program: Program) -> tuple[str, bool]:
         found = placed(program)
     except UnreachableError as error:
         return f"| {program.name} | refused: {error} | | | | | yes |", True
-    now, before = found.summary["chosen"], found.summary["before"]
+    now, before = found.chosen, found.present
     samples = found.best.samples
     rapids = int((~samples.cutting & ~found.best.at.reachable).sum())
     if before is None:
         return f"| {program.name} | out of reach | | | {rapids} | said | {'no' if rapids else 'yes'} |", not rapids
-    change = [100.0 * (now[key] / before[key] - 1.0) for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")]
+    change = [
+        100.0 * (getattr(now, key) / getattr(before, key) - 1.0)
+        for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
+    ]
     worse = change[0] < -1e-7 or change[1] > 1e-7 or change[2] < -1e-7
-    said = bool(found.summary["worse"]) and found.summary["warnings"][0].startswith("WORSE")
+    said = bool(found.worse) and found.warnings[0].startswith("WORSE")
     passed = (not worse or said) and rapids == 0
     cells = " | ".join(f"{value:+.2f}" for value in change)
     return f"| {program.name} | {cells} | {rapids} | {'said' if said else '-'} | {'yes' if passed else 'NO'} |", passed
@@ -165,7 +170,7 @@ def against_grid(name: str) -> tuple[str, bool]:
     final = whole.figures(np.vstack([grid[nearest], BOUNDS.placements(np.array(polished))]))
     allowed = rules.violation(final) == 0.0
     by = float(np.where(allowed, dominance(final.objectives, ours), 0.0).max())
-    poses = found.summary["search"]["pose_evaluations"]
+    poses = found.search["pose_evaluations"]
     times = cpu / (poses * kernel_seconds(bool(path.abc.any())))
     passed = by <= DOMINATED and times <= TIMES_KERNEL
     if name == "pocket.nc":
@@ -187,7 +192,7 @@ def ends(program: Program) -> tuple[str, bool]:
     """A row of the third table: each end of the front against Sobol points with a local search on the whole path."""
     from scipy.stats import qmc
 
-    front = np.array([[row[key] for key in FIGURES.values()] for row in placed(program, ENDS_STEP).summary["front"]])
+    front = np.array([[getattr(row, key) for key in FIGURES.values()] for row in placed(program, ENDS_STEP).front])
     path = work_path(program, ENDS_STEP, LOAD, program.origin)
     whole = Evaluator(MODEL, path, LOAD, 1000.0)
     now = whole.figures(np.array([program.origin]))

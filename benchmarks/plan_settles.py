@@ -23,10 +23,11 @@ import numpy as np
 from benchmarks.pages import write_page
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.planning.document import plan_csv, plan_rows
 from toolpath_stiff.planning.gaps import SETTLED, plan_minutes
 from toolpath_stiff.planning.next_visit import TABLES, next_visit, tables_of
-from toolpath_stiff.planning.plan import Plan, plan, random_visits
+from toolpath_stiff.planning.plan import RivalPlan, random_visits
+from toolpath_stiff.planning.result import plan
+from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig.case import Case, again, draw_case
 from toolpath_stiff.rig.exercise import csv_text, read_plan
@@ -68,19 +69,19 @@ def run(seed: int, hidden: str, folder: Path) -> Outcome | None:
     if before.verdict != "ambiguous" and hidden != "joint_compliance":
         return None
     proposal = plan(machine, data, n=POSES, indicators=True, judgement=before.main)
-    assert isinstance(proposal.plan, Plan)
+    assert isinstance(proposal.choice, RivalPlan)
     (folder / TABLES).write_bytes(tables_of(proposal))
-    visits, chosen = proposal.plan.visits, proposal.plan.chosen
+    visits, chosen = proposal.choice.visits, proposal.choice.chosen
     minutes, files = [], list[str]()
-    for name, some in (("plan", chosen), ("random", random_visits(proposal.plan, POSES, seed))):
-        taken = [_measured(case, proposal.plan, visit, folder / f"{name}{k}.csv", k) for k, visit in enumerate(some)]
+    for name, some in (("plan", chosen), ("random", random_visits(proposal.choice, POSES, seed))):
+        taken = [_measured(case, proposal.choice, visit, folder / f"{name}{k}.csv", k) for k, visit in enumerate(some)]
         files = files or taken
         needed = _needed(folder, taken)
         minutes.append(plan_minutes(visits, some[:needed], proposal.costs, proposal.menu))
     after = diagnose(machine, read_measurements([str(tip), *files], machine), plan_next=False)
     right = set(after.plausible if after.verdict == "identified" else ()) == set(case.truth["hidden"])
-    outlook = proposal.plan.after
-    rivals = [one.name for one in proposal.plan.rivals]
+    outlook = proposal.choice.after
+    rivals = [one.name for one in proposal.choice.rivals]
     true = " + ".join(sorted(case.truth["hidden"]))
     expected_if = outlook.settled_if[rivals.index(true)] if true in rivals else outlook.settled
     return Outcome(
@@ -104,7 +105,7 @@ def _needed(folder: Path, files: list[str]) -> int:
     return len(files)
 
 
-def _measured(case: Case, planned: Plan, visit: int, file: Path, number: int) -> str:
+def _measured(case: Case, planned: RivalPlan, visit: int, file: Path, number: int) -> str:
     """A visit measured on the case's machine, as a file."""
     rows = plan_rows(planned.visits, [visit])
     for row in rows:

@@ -5,21 +5,14 @@ Blind cases of the rig: each kind of unknown, 4 to 15 % rms, and sound machines;
 
 from __future__ import annotations
 
-import os
-
-for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-
-# ruff: noqa: E402 - the thread limits above must come before numpy
 import argparse
 import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.case_loop import Record, add_run_arguments, case_loop, document, read_records
+from benchmarks.case_loop import Record, document, run_benchmark, run_cases
 from benchmarks.diagnosis_tables import bars_table, summary
-from benchmarks.pages import write_page
 from benchmarks.portrait_bars import calibration_table, failures_table, figures, kinds_table
 from benchmarks.portrait_cases import LAYOUTS, make_jobs, run
 from toolpath_stiff.rig.unknowns import UNKNOWNS
@@ -70,30 +63,19 @@ _PROBABILITIES = (
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print; exit code 1 if a bar is not cleared."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.portrait", description=__doc__)
-    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument("--cases", type=int, default=CASES, help=f"cases of each kind and layout (default: {CASES})")
     parser.add_argument("--sound", type=int, default=SOUND, help=f"sound machines of each layout (default: {SOUND})")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument("--layouts", nargs="+", choices=LAYOUTS, default=LAYOUTS, metavar="LAYOUT")
     parser.add_argument(
         "--only", nargs="+", choices=list(UNKNOWNS), default=(), metavar="KIND", help="kinds of unknown"
     )
-    add_run_arguments(parser, RECORDS, OUT)
-    args = parser.parse_args(arguments)
-    if args.table_only:
-        records = read_records(args.records)
-    else:
+
+    def make_records(args: argparse.Namespace) -> list[Record]:
         jobs = make_jobs(args.first_seed, args.cases, args.sound, args.layouts, args.only)
-        with case_loop(args.jobs, args.records) as collect:
-            records = collect("diagnosed", run, jobs)
-    options = f" --cases {args.cases}" if args.cases != CASES else ""
-    options += f" --sound {args.sound}" if args.sound != SOUND else ""
-    options += f" --first-seed {args.first_seed}" if args.first_seed != FIRST_SEED else ""
-    options += f" --layouts {' '.join(args.layouts)}" if tuple(args.layouts) != LAYOUTS else ""
-    options += f" --only {' '.join(args.only)}" if args.only else ""
-    text, cleared = report(records, f"python -m benchmarks.portrait{options}")
-    print(text)
-    write_page(args.out, text, of_records=args.table_only)
-    return 0 if cleared else 1
+        return run_cases(args, "diagnosed", run, jobs)
+
+    return run_benchmark(parser, arguments, make_records, report, records=RECORDS, out=OUT)
 
 
 if __name__ == "__main__":

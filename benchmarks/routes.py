@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.analysis.poses import evaluate
+from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices

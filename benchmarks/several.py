@@ -6,22 +6,15 @@ effects by 10, 7 and 5 %.
 
 from __future__ import annotations
 
-import os
-
-for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-
-# ruff: noqa: E402 - the thread limits above must come before numpy
 import argparse
 import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.case_loop import Record, add_run_arguments, case_loop, document, read_records
+from benchmarks.case_loop import Record, document, run_benchmark, run_cases
 from benchmarks.diagnosis_bars import JUST_SEEN, holds_truth
 from benchmarks.diagnosis_tables import bars_table, summary
-from benchmarks.pages import write_page
 from benchmarks.several_bars import false_name, figures, named_rows, slip_found, slip_visible, strongest_right
 from benchmarks.several_cases import GROUPS, make_jobs, run
 
@@ -121,27 +114,18 @@ _WHAT = (
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print; exit code 1 if a bar is not cleared."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.several", description=__doc__)
-    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument(
         "--cases", type=int, default=200,
         help="pairs; half as many of three effects, of each kind with outliers and of sound tables, a tenth of each "
         "stated noise and of each slip (default: 200)",
     )  # fmt: skip
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS, metavar="GROUP", help=", ".join(GROUPS))
-    add_run_arguments(parser, RECORDS, OUT)
-    args = parser.parse_args(arguments)
-    if args.table_only:
-        records = read_records(args.records)
-    else:
-        with case_loop(args.jobs, args.records) as collect:
-            records = collect("diagnosed", run, make_jobs(args.first_seed, args.cases, args.only))
-    options = f" --cases {args.cases}" if args.cases != 200 else ""
-    options += f" --first-seed {args.first_seed}" if args.first_seed != FIRST_SEED else ""
-    options += f" --only {' '.join(args.only)}" if tuple(args.only) != GROUPS else ""
-    text, cleared = report(records, f"python -m benchmarks.several{options}")
-    print(text)
-    write_page(args.out, text, of_records=args.table_only)
-    return 0 if cleared else 1
+
+    def make_records(args: argparse.Namespace) -> list[Record]:
+        return run_cases(args, "diagnosed", run, make_jobs(args.first_seed, args.cases, args.only))
+
+    return run_benchmark(parser, arguments, make_records, report, records=RECORDS, out=OUT)
 
 
 if __name__ == "__main__":

@@ -8,12 +8,6 @@ of CPU and 1 GB with all its files (two samples a move: one at each end); a line
 
 from __future__ import annotations
 
-import os
-
-for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[variable] = "1"
-
-# ruff: noqa: E402 - the thread limits above must come first
 import argparse
 import io
 import statistics
@@ -159,7 +153,7 @@ def writing(report: Report, lines: int, rounds: int) -> None:
     import pyarrow.parquet as pq
 
     from toolpath_stiff.analysis import analyze
-    from toolpath_stiff.analysis.statistics import sample_columns, samples_csv, samples_frame, samples_parquet
+    from toolpath_stiff.analysis.statistics import sample_columns, samples_csv, samples_parquet
     from toolpath_stiff.machine.file import load_machine
 
     analysis = analyze(load_machine("nist"), parse_program(program("5-axis", lines)), origin=(0, 0, 0.8, 0, 0, 0))
@@ -171,7 +165,7 @@ def writing(report: Report, lines: int, rounds: int) -> None:
     ways: dict[str, Callable[[], object]] = {
         "tps csv": lambda: sum(map(len, samples_csv(analysis))),
         "pyarrow csv": lambda: pc.write_csv(table(), io.BytesIO()),
-        "pandas csv": lambda: samples_frame(analysis).iloc[: rows // 10].to_csv(float_format="%.6f"),
+        "pandas csv": lambda: analysis.to_frame().iloc[: rows // 10].to_csv(float_format="%.6f"),
         "tps parquet": lambda: sum(map(len, samples_parquet(analysis))),
         "pyarrow parquet": lambda: pq.write_table(table(), io.BytesIO()),
     }

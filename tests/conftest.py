@@ -181,7 +181,7 @@ def judgements_are_shared(predictors_are_shared: None) -> Iterator[None]:
     """
     from tests.updating import cases
     from toolpath_stiff.diagnosis import diagnose as diagnosis
-    from toolpath_stiff.planning import plan as planning
+    from toolpath_stiff.planning import result as planning
 
     def shared(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) -> Judgement:
         """`judge(...)`, of the caller's own problem and noise."""

@@ -169,7 +169,7 @@ def test_the_page_says_how_far_the_papers_conclusions_go():
     page = (ROOT / "docs" / "case_study.md").read_text("utf-8")
     for z in (400, 1200):
         places = [(x, y, z, turn) for x in (-300, 0, 300) for y in (-300, 0, 300) for turn in (0, 45)]
-        found = [analyze(model, program, origin=origin_of(*at), step=1e-2).summary() for at in places]
+        found = [analyze(model, program, origin=origin_of(*at), step=1e-2).to_dict() for at in places]
         means, ranges = (np.array([one[f"{what}_N_per_mm"] for one in found]) for what in ("mean", "range"))
         spread = f"{100 * (means.max() / means.min() - 1):.1f} %"
         assert spread in page, spread

@@ -222,7 +222,7 @@ class Trap(Effect):
 def trap(shop, seconds):
     (shop / "trap.py").write_text(TRAP)
     (shop / "trap.toml").write_text(_nist() + f'\n[[effect]]\nname = "trap"\nseconds_s = {seconds}\n')
-    return ["--machine", "trap.toml", "--effects", "trap.py"]
+    return ["--machine", "trap.toml", "--effects", "trap.py", "--allow-unchecked-effects"]
 
 
 def test_a_killed_process_is_a_failing_program(shop, capsys):
@@ -262,7 +262,7 @@ def test_ctrl_c_leaves_whole_reports_and_nothing_else(shop):
             os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert error == "tps: interrupted; no file is half-written\n"
-    assert set(files_of(shop / "reports")) == {"a/part/samples.csv", "a/part/summary.json"}
+    assert set(files_of(shop / "reports")) == {"INCOMPLETE.txt", "a/part/samples.csv", "a/part/summary.json"}
     assert {path.name for path in (shop / "reports").rglob(".*")} <= {MANIFEST}
 
 

@@ -99,23 +99,23 @@ def test_what_nothing_explains_is_written_and_tried(here, capsys):
     said.portrait = portrait
     lines = [line for _, line in map(parted, next_steps(said, asked))]
     assert lines[1:] == [
-        "tps effects draft data.csv -o missing.py --noise 3",
-        "tps diagnose data.csv --effects missing.py --noise 3",
+        "tps effects draft data.csv -o missing.toml --noise 3",
+        "tps diagnose data.csv --effects missing.toml --noise 3",
     ]
 
 
 def test_a_draft_is_written_and_its_commands_run(here, capsys):
     rows, _ = case.make_case(7, layout="paper", hidden="saddle_overhang", size=0.1)
     (here / "a saddle.csv").write_text(exercise.csv_text(rows), encoding="utf-8")
-    first = "tps effects draft 'a saddle.csv' -o missing.py"
+    first = "tps effects draft 'a saddle.csv' -o missing.toml"
     printed = run(first, capsys)
     assert [shlex.split(line)[1] for line in printed] == ["effects", "diagnose", "plan"]
-    assert all("missing.py" in line for line in printed) and "'a saddle.csv'" in printed[1]
+    assert all("missing.toml" in line for line in printed) and "'a saddle.csv'" in printed[1]
     run(printed[0], capsys)
-    assert any(line.startswith("tps update") and "--effects missing.py" in line for line in run(printed[1], capsys))
+    assert any(line.startswith("tps update") and "--effects missing.toml" in line for line in run(printed[1], capsys))
     assert run(first, capsys, code=2) == []
-    assert main(["effects", "draft", "a saddle.csv", "--noise", "20", "-o", "other.py"]) == 0
-    assert "nothing to describe" in capsys.readouterr().out and not (here / "other.py").exists()
+    assert main(["effects", "draft", "a saddle.csv", "--noise", "20", "-o", "other.toml"]) == 0
+    assert "nothing to describe" in capsys.readouterr().out and not (here / "other.toml").exists()
     again = Asked(("data.csv",), effects=("my_effect.py",))
     assert again.new_effect() == "my_effect_2.py"
 

@@ -9,8 +9,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from toolpath_stiff.analysis.grid import map_stiffness, turning_points
 from toolpath_stiff.analysis.loads import parse_load
-from toolpath_stiff.analysis.poses import evaluate_poses, map_stiffness, turning_points
+from toolpath_stiff.analysis.poses import evaluate_poses
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.stiffness.model import build_model
@@ -38,7 +39,7 @@ def test_map_is_the_pose_evaluation_on_a_grid():
 
 def test_z_map_is_threefold_symmetric():
     angles = np.deg2rad(np.array([10.0, 130.0, 250.0]))
-    from toolpath_stiff.analysis.poses import around_axis
+    from toolpath_stiff.analysis.grid import around_axis
 
     values = around_axis(MODEL, 0.15, 1.2, parse_load("z"), angles)
     np.testing.assert_allclose(values, values[0], rtol=1e-12)

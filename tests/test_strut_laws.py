@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
-from toolpath_stiff.analysis.checks import check_machine
-from toolpath_stiff.analysis.results import analyze, assumptions
+from toolpath_stiff.analysis.machine_check import check_machine
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.correction.strut_law import minimise_mean_error
 from toolpath_stiff.errors import InputError
@@ -209,7 +209,7 @@ def test_what_is_said_of_the_law():
     value, unit = {row[0]: row[1:3] for row in machine_figures(TABLE)}["strut stiffness"]
     assert value.startswith("46.5 N/um at 2561.6 mm, 45 N/um at 2700, ") and unit == "mm, linear between"
     run = parse_program(SLOT)
-    said = [assumptions(analyze(build_model(one), run)) for one in (CONSTANT_MACHINE, TABLE)]
+    said = [analyze(build_model(one), run).assumptions for one in (CONSTANT_MACHINE, TABLE)]
     assert any("the same at every length" in line for line in said[0])
     assert any("extrapolated outside 2561.6 to 3213.2 mm" in line for line in said[1])
     assert not check_machine(build_model(CONSTANT_MACHINE)).wrong
@@ -246,7 +246,7 @@ def campaign(law: str) -> tuple[str, Measurements]:
 def test_the_rig_reads_the_law_by_itself(law):
     """Readings of the nominal machine are those of the model: two programs that share no stiffness code."""
     machine, (data, nominal) = machine_with(law), (campaign(law)[1], parse_nominal(text_with(law), "mine.toml"))
-    rows = exercise.case.rows_of(exercise.case.paper_campaign())
+    rows = case.rows_of(case.paper_campaign())
     plain = readings(nominal, HiddenMachine(), rows)
     modelled = np.exp(Predictor(machine, data).log_stiffness())
     np.testing.assert_allclose(plain, modelled, rtol=1e-9)
@@ -294,8 +294,8 @@ def test_the_fit_has_the_right_slopes_and_the_search_for_the_mean_error_its_ends
 
 @pytest.mark.parametrize("law", [CONSTANT, table_text(BENT)], ids=["constant", "table"])
 def test_compare_refits_the_law_too(law):
-    found = compare(machine_with(law), campaign(law)[1], draws=50).document
-    figures = found["baseline"]["strut_law_refitted"]
+    found = compare(machine_with(law), campaign(law)[1], draws=50)
+    figures = found.document["baseline"]["strut_law_refitted"]
     assert figures["mean_abs_error_percent"] < 2.0
     assert figures["excess_scatter_percent"] is not None
     assert len(figures["strut_law"]["N_per_um"]) == (1 if law == CONSTANT else 2)

@@ -15,7 +15,7 @@ A tree, so that a caller can catch as much as it can handle::
       InputErrors           several input errors together
       EffectFault           a user's own effect breaks the contract
 
->>> from toolpath_stiff.machine import load_machine
+>>> from toolpath_stiff.machine.file import load_machine
 >>> try:
 ...     load_machine("nits")
 ... except MachineFileError as error:
@@ -100,6 +100,16 @@ class InputError(TpsError):
         self.found, self.expected, self.hint = _cut(found), expected, hint
         self.file, self.line, self.column = file, line, column
         super().__init__(self._message())
+
+    def in_line(self, file: str, line: int) -> InputError:
+        """The same error, of a line of a file.
+
+        Examples
+        --------
+        >>> print(InputError("no number").in_line("a.csv", 3))
+        a.csv:3: no number
+        """
+        return type(self)(self.found, expected=self.expected, hint=self.hint, file=file, line=line)
 
     def _message(self) -> str:
         where = [str(part) for part in (self.file, self.line, self.column) if part is not None]
@@ -259,7 +269,7 @@ class PoseError(InputError):
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> from toolpath_stiff.machine import forward_kinematics
+    >>> from toolpath_stiff.machine.kinematics import forward_kinematics
     >>> try:
     ...     forward_kinematics(tps.Machine.load("nist").model.machine, [[1.0] * 6], [[0.0, 0.0, 0.8, 0.0, 0.0, 0.0]])
     ... except tps.PoseError as error:

@@ -90,6 +90,8 @@ class Asked:
         Files with the user's own effects.
     noise, strut_spread
         Relative sd of one reading, or of repeat and clamping, None if not given; of the struts' stiffnesses.
+    columns
+        Which columns the files call otherwise, as --columns has it.
     """
 
     data: tuple[str, ...]
@@ -97,6 +99,7 @@ class Asked:
     effects: tuple[str, ...] = ()
     noise: float | tuple[float, float] | None = None
     strut_spread: float = defaults.STRUT_SPREAD
+    columns: str | None = None
 
     def command(self, name: str, *own: str, machine: str | None = None, effects: Sequence[str] = ()) -> str:
         """`tps name` on the same data with the same options; `own` words of that command come after the machine.
@@ -107,7 +110,7 @@ class Asked:
         return command_line(
             *name.split(),
             *self.data,
-            *options(machine=chosen if chosen != defaults.MACHINE else None),
+            *options(columns=self.columns, machine=chosen if chosen != defaults.MACHINE else None),
             *own,
             *options(effects=[*self.effects, *effects], noise=self._noise()),
             *options(strut_spread=percent(self.strut_spread) if self.strut_spread != defaults.STRUT_SPREAD else None),
@@ -128,10 +131,10 @@ class Asked:
         name = NUMBERED.sub("", stem) + "-updated" + (f"-{number}" if number > 1 else "") + ".toml"
         return str(path.with_name(name))
 
-    def new_effect(self, stem: str = "my_effect") -> str:
+    def new_effect(self, stem: str = "my_effect", ending: str = ".py") -> str:
         """A name for a file with an effect of the user's own that is not among the given ones."""
         taken, number = {PurePath(file).name for file in self.effects}, 1
-        while (name := f"{stem}{f'_{number}' if number > 1 else ''}.py") in taken:
+        while (name := f"{stem}{f'_{number}' if number > 1 else ''}{ending}") in taken:
             number += 1
         return name
 

@@ -7,6 +7,7 @@ turn with the work, the vertical platform never yaws. With it the machine's 120-
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -19,11 +20,14 @@ from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves, held_once
-from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
+from toolpath_stiff.rotations import along_tool_axis, roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
 
 ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
 BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
+BORDER = np.cos(defaults.PLUNGE_ANGLE) - 1e-12  # of the cosine; beyond it a sample is a cut whatever rounding does
+HALVINGS = 50  # to the last digit of a share of a move
+ROUNDED = 1e-9  # rad, or of a cosine
 MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
 
 
@@ -54,14 +58,14 @@ class Samples:
     tangent
         (n, 3) unit vector of the tip's motion; 0 where only rotary axes move.
     weight
-        (n,) m, the length of cutting path that the sample stands for (trapezoidal rule within its move);
-        0 for rapids and for moves of the rotary axes alone.
+        (n,) m, the length of cutting path that the sample stands for (trapezoidal rule within its move, apart for
+        plunges and cuts where a sample stands between them); 0 for rapids and for moves of the rotary axes alone.
     feed
         (n,) m/s; nan for rapids.
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> samples = sample_moves(parse_program("G21 G90 F600\nG0 Z5\nG1 Z0\nX40\nM30\n").moves, step=0.01)
     >>> samples
     <Samples: 9 samples, 50 mm of path>
@@ -117,7 +121,7 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> moves = parse_program("G21 G90 F600\nG1 X40\nM30\n").moves
     >>> placed = place(moves, (0.1, 0.0, 0.8, 0.0, 0.0, np.pi / 2))
     >>> placed.end[:, :3].round(9).tolist()  # m
@@ -168,7 +172,7 @@ def move_durations(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Flo
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> moves = parse_program("G21 G90 F600\nG0 Z5\nG1 Z0\nX40\nM30\n").moves
     >>> move_durations(moves).round(3).tolist()  # s; the rapid at 10 m/min
     [0.03, 0.5, 4.0]
@@ -183,6 +187,9 @@ def sample_moves(
     origin: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 ) -> Samples:
     r"""Sample moves along their true path, both ends of every move included.
+
+    Where a plunge becomes a cut within a move, the cut has a sample at the border, so that its extremes do not depend
+    on the step.
 
     Parameters
     ----------
@@ -202,7 +209,7 @@ def sample_moves(
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> moves = parse_program("G21 G90 F600\nG2 X20 Y0 I10 J0\nM30\n").moves
     >>> samples = sample_moves(place(moves, (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)), step=0.016)
     >>> (samples.position * 1e3).round(3).tolist()  # mm
@@ -213,7 +220,8 @@ def sample_moves(
     length = move_lengths(moves)
     turn = _turn(moves)
     pieces = _pieces(moves, length, turn, step)
-    counts = pieces.astype(np.int64) + 1
+    border = _plunge_borders(moves, pieces, length, origin)
+    counts = pieces.astype(np.int64) + 1 + np.bincount(border[0], minlength=len(moves))
     duration = _durations(moves, length, turn, rapid_feed)
     cutting = moves.motion != RAPID
     columns = {
@@ -225,17 +233,77 @@ def sample_moves(
         "pieces": pieces,
     }
     samples = _empty_samples(int(counts.sum()))
-    last = np.cumsum(counts)
-    first_move, first_sample = 0, 0
-    while first_move < len(moves):
-        # At least one move, and no more samples than a block holds.
-        end = max(int(np.searchsorted(last, first_sample + BLOCK, side="right")), first_move + 1)
-        block = slice(first_move, end)
-        rows = slice(first_sample, int(last[end - 1]))
+    first_sample = 0
+    for block in _blocks(counts):
+        rows = slice(first_sample, first_sample + int(counts[block].sum()))
         some = {name: column[block] for name, column in columns.items()}
-        _sample_block(moves.take(block), counts[block], some, first_move, origin, samples.take(rows))
-        first_move, first_sample = end, rows.stop
+        put = slice(*np.searchsorted(border[0], (block.start, block.stop)))
+        extra = border[0][put] - block.start, border[1][put]
+        _sample_block(moves.take(block), counts[block], some, extra, block.start, origin, samples.take(rows))
+        first_sample = rows.stop
     return replace(samples, tool=held_once(samples.tool), tool_length=held_once(samples.tool_length))
+
+
+def _blocks(counts: IntArray) -> Iterator[slice]:
+    """Slices of moves with so many samples each: at least one move, and no more samples than a block holds."""
+    last = np.cumsum(counts)
+    first, before = 0, 0
+    while first < len(counts):
+        end = max(int(np.searchsorted(last, before + BLOCK, side="right")), first + 1)
+        yield slice(first, end)
+        first, before = end, int(last[end - 1])
+
+
+def _plunge_borders(
+    moves: Moves, pieces: FloatArray, length: FloatArray, origin: ArrayLike
+) -> tuple[IntArray, FloatArray]:
+    """(k,) move and (k,) share of it where a plunge becomes a cut or a cut a plunge, in order along the path."""
+    upright = along_tool_axis(moves.arc_normal, place_orientations(moves.start[:, 3:], origin))
+    turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).sum(axis=1)
+    # An arc across the axis keeps its angle to it.
+    leaning = (moves.arc_sweep != 0.0) & (np.abs(upright) < 1.0 - ROUNDED)
+    rows = np.flatnonzero((moves.motion != RAPID) & (length > 0.0) & (leaning | (turn > 0.0)))
+    # Lines lean by no more than the axes turn.
+    lean = np.arccos(np.minimum(np.abs(_along(moves, rows, np.zeros(len(rows)), origin)), 1.0))
+    near = np.abs(lean - defaults.PLUNGE_ANGLE) <= turn[rows] + ROUNDED
+    rows = rows[near | (moves.arc_sweep[rows] != 0.0)]
+    # A plunge within a small arc may be narrower than the step.
+    finer = np.maximum(np.ceil(np.abs(moves.arc_sweep[rows]) / ANGULAR_STEP / pieces[rows]), 1.0).astype(np.int64)
+    counts = finer * pieces[rows].astype(np.int64)
+    parts = [
+        _borders_of_block(moves.take(rows[block]), counts[block], finer[block], origin) for block in _blocks(counts + 1)
+    ]
+    which = [rows[block][part[0]] for block, part in zip(_blocks(counts + 1), parts, strict=True)]
+    return (
+        np.concatenate([np.empty(0, dtype=np.int64), *which]),
+        np.concatenate([np.empty(0), *(part[1] for part in parts)]),
+    )
+
+
+def _borders_of_block(
+    moves: Moves, counts: IntArray, finer: IntArray, origin: ArrayLike
+) -> tuple[IntArray, FloatArray]:
+    """As `_plunge_borders`, of moves divided into `counts` pieces, of which `finer` lie between two samples."""
+    move = np.repeat(np.arange(len(moves)), counts + 1)
+    index = np.arange(len(move)) - np.repeat(np.cumsum(counts + 1) - counts - 1, counts + 1)
+    plunge = np.abs(_along(moves, move, index / counts[move], origin)) >= BORDER
+    before = np.flatnonzero((plunge[1:] != plunge[:-1]) & (move[1:] == move[:-1]))
+    move, cut = move[before], index[before + plunge[before]]
+    inner, outer = index[before + ~plunge[before]] / counts[move], cut / counts[move]
+    first = outer.copy()
+    for _ in range(HALVINGS):
+        middle = 0.5 * (inner + outer)
+        plunges = np.abs(_along(moves, move, middle, origin)) >= BORDER
+        inner, outer = np.where(plunges, middle, inner), np.where(plunges, outer, middle)
+    new = (outer != first) | (cut % finer[move] != 0)  # else it is a sample anyway
+    return move[new], outer[new]
+
+
+def _along(moves: Moves, move: IntArray, u: FloatArray, origin: ArrayLike) -> FloatArray:
+    """(n,) cosine of the angle between the motion of the tip and the tool axis at shares u of moves."""
+    first = moves.start[move, 3:]
+    abc = place_orientations(first + u[:, None] * (moves.end[move, 3:] - first), origin)
+    return along_tool_axis(points_along(moves, move, u)[1], abc)
 
 
 def _turn(moves: Moves) -> FloatArray:
@@ -282,14 +350,20 @@ def _sample_block(
     moves: Moves,
     counts: IntArray,
     columns: dict[str, FloatArray],
+    border: tuple[IntArray, FloatArray],
     first_move: int,
     origin: ArrayLike,
     into: Samples,
 ) -> None:
-    """Samples of some moves, into their rows. `columns` holds what is known of each move."""
-    move = np.repeat(np.arange(len(moves)), counts)
+    """Samples of some moves, into their rows. `columns` holds what is known of each move, `border` further shares."""
+    even = counts - np.bincount(border[0], minlength=len(moves))
+    move = np.repeat(np.arange(len(moves)), even)
+    u = (np.arange(len(move)) - np.repeat(np.cumsum(even) - even, even)) / np.repeat(columns["pieces"], even)
+    if len(border[0]):
+        move, u = np.concatenate([move, border[0]]), np.concatenate([u, border[1]])
+        order = np.lexsort((u, move))
+        move, u = move[order], u[order]
     last = np.cumsum(counts) - 1
-    u = (np.arange(len(move)) - np.repeat(last + 1 - counts, counts)) / np.repeat(columns["pieces"], counts)
     into.position[:], into.tangent[:] = points_along(moves, move, u)
     first, turned = moves.start[:, 3:], moves.end[:, 3:] - moves.start[:, 3:]
     programmed = np.repeat(first, counts, axis=0)
@@ -307,6 +381,14 @@ def _sample_block(
     into.weight[:] = np.repeat(columns["piece"], counts)
     into.weight[u == 0.0] *= 0.5
     into.weight[last] *= 0.5
+    if len(border[0]):
+        before = np.maximum(np.diff(u, prepend=0.0), 0.0)  # 0 at the first sample of a move
+        uneven = np.isin(move, border[0])
+        # What lies between the border and a sample of a plunge is plunged, all of it.
+        plunge = np.abs(along_tool_axis(into.tangent, angles)) >= BORDER
+        share = 0.5 + 0.5 * np.diff(plunge.astype(float), prepend=float(plunge[0]))
+        after = np.append((before * (1.0 - share))[1:], 0.0)
+        into.weight[uneven] = ((before * share + after) * columns["length"][move])[uneven]
 
 
 def _fastest_part(moves: Moves) -> FloatArray:
@@ -354,7 +436,7 @@ def path_columns(samples: Samples, rows: slice = slice(None)) -> dict[str, NDArr
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> samples = sample_moves(parse_program("G21 G90 F600\nG1 X40\nM30\n").moves, step=0.02)
     >>> columns = path_columns(samples)
     >>> columns["x_mm"].tolist(), columns["motion"].tolist()

@@ -6,6 +6,7 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, ParamSpec, TypeVar
 
@@ -35,6 +36,19 @@ class Result(ABC):
     """
 
     command: ClassVar[str] = ""  # the command that gives the same result
+    shown_by: ClassVar[str] = ""  # the module of `report` that shows it
+
+    @property
+    def view(self) -> Any:
+        """The module that makes text, figures and files of it, imported when first asked for.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.map_stiffness("nist", points=5).view.__name__
+        'toolpath_stiff.report.map'
+        """
+        return import_module(f"toolpath_stiff.report.{self.shown_by}")
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
@@ -47,9 +61,9 @@ class Result(ABC):
         ['machine', 'notes', 'text']
         """
 
-    @abstractmethod
     def __str__(self) -> str:
         """The result as text, as a terminal shows it."""
+        return str(self.view.text(self))
 
     @abstractmethod
     def _short(self) -> str:

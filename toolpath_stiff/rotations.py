@@ -77,6 +77,13 @@ def roll_pitch_yaw(rotation: ArrayLike) -> FloatArray:
     return np.stack([roll, pitch, yaw], axis=-1)
 
 
+def along_tool_axis(vector: FloatArray, abc: FloatArray) -> FloatArray:
+    """(n,) components of vectors (n, 3) along the tool axis, the platform's z, at roll, pitch, yaw (n, 3) rad."""
+    if not abc[:, :2].any():  # upright
+        return vector[:, 2]
+    return np.asarray(np.einsum("ni,ni->n", vector, rotation_matrices(abc)[:, :, 2]))
+
+
 def rotation_about_z(angle: ArrayLike) -> FloatArray:
     """Rotation matrices about z, (..., 3, 3), of angles (...) in rad.
 

@@ -129,6 +129,14 @@ DIGITS = 5  # significant digits of a fitted figure
 CERTAIN, DECIMALS = 7, 8
 
 
+def number(value: float | None, digits: int = 0) -> str:
+    """A figure with thin groups of thousands ("45 123"), "-" where there is none."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    text = f"{value:,.{digits}f}".replace(",", " ")
+    return text.replace("-", "", 1) if float(text.replace(" ", "")) == 0.0 else text
+
+
 def json_number(value: float, digits: int = DIGITS) -> float | None:
     """A float of some significant digits; None for what JSON cannot hold."""
     return float(f"{value:.{digits}g}") if math.isfinite(value) else None

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from toolpath_stiff.analysis import analyze, evaluate, parse_load
+from toolpath_stiff.analysis.document import required_stiffness_missed
 from toolpath_stiff.analysis.loads import load_directions, softest_directions, stiffest_directions
 from toolpath_stiff.analysis.poses import evaluate_poses
-from toolpath_stiff.analysis.results import required_stiffness_missed
 from toolpath_stiff.analysis.statistics import weakest_places
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.file import load_machine
@@ -34,7 +34,7 @@ def analyse_text(text: str, **options):
     ],
 )
 def test_case_study_squares(origin, mean, spread):
-    figures = analyse_text(SQUARE, origin=origin).summary()
+    figures = analyse_text(SQUARE, origin=origin).to_dict()
     # Printed to 10 N/mm, the sampling behind the mean not stated: end points counted or not move it by 1e-4.
     assert figures["mean_N_per_mm"] == pytest.approx(mean, abs=5 + 1e-4 * mean)
     assert figures["range_N_per_mm"] == pytest.approx(spread, abs=5)
@@ -44,7 +44,7 @@ def test_table_1_point_through_the_whole_tool():
     # A 2 um cut along X through the upper plane's centre; Table 1 gives 57950 N/mm along X and Y there.
     text = "F100\nG0 X-0.001\nG1 X0.001\n"
     for load, stiffness in (("tangential", 57950), ("normal", 57950), ("axial", 110141), ("z", 110141)):
-        figures = analyse_text(text, origin=(0, 0, 1.268225, 0, 0, 0), load=load).summary()
+        figures = analyse_text(text, origin=(0, 0, 1.268225, 0, 0, 0), load=load).to_dict()
         assert figures["mean_N_per_mm"] == pytest.approx(stiffness, abs=1), load
 
 
@@ -60,10 +60,10 @@ def test_turning_by_120_degrees_changes_nothing():
 def test_mean_is_weighted_by_length_not_by_samples():
     # A long and a short cut: halving the step must not move the mean, and each cut weighs by its length.
     text = "F100\nG0 X-50\nG1 X50\nG1 Y3 Z1\n"
-    coarse, fine = (analyse_text(text, step=step).summary()["mean_N_per_mm"] for step in (1e-3, 1e-4))
+    coarse, fine = (analyse_text(text, step=step).to_dict()["mean_N_per_mm"] for step in (1e-3, 1e-4))
     assert coarse == pytest.approx(fine, rel=1e-5)
     parts = [
-        analyse_text(t).summary()["mean_N_per_mm"] for t in ("F100\nG0 X-50\nG1 X50\n", "F100\nG0 X50\nG1 Y3 Z1\n")
+        analyse_text(t).to_dict()["mean_N_per_mm"] for t in ("F100\nG0 X-50\nG1 X50\n", "F100\nG0 X50\nG1 Y3 Z1\n")
     ]
     slope = np.sqrt(10.0)
     assert fine == pytest.approx((100 * parts[0] + slope * parts[1]) / (100 + slope), rel=1e-5)
@@ -73,7 +73,7 @@ def test_rapids_are_kept_and_do_not_count():
     analysis = analyse_text(SQUARE)
     rapid = ~analysis.samples.cutting
     assert rapid.any() and not analysis.counted[rapid].any()
-    figures = analysis.summary()
+    figures = analysis.to_dict()
     assert figures["cutting_length_mm"] == pytest.approx(800)
     assert figures["rapid_length_mm"] == pytest.approx(100 * np.sqrt(2))
     assert figures["samples"] == len(analysis.samples) == len(analysis.to_frame())
@@ -89,7 +89,7 @@ def test_out_of_reach_is_refused_with_the_first_line_and_partial_keeps_the_rest(
     analysis = analyse_text(text, partial=True)
     bad = analysis.out_of_reach
     assert bad.any() and np.isnan(analysis.at.stiffness[bad]).all()
-    assert np.isfinite(analysis.summary()["mean_N_per_mm"])
+    assert np.isfinite(analysis.to_dict()["mean_N_per_mm"])
     with pytest.raises(UnreachableError):
         analyse_text("F1000\nG0 X3000\nG1 X3100\n", partial=True)  # nothing is left
 
@@ -155,9 +155,9 @@ def test_tilted_axis_for_axial_loads():
 
 def test_required_stiffness_lists_the_lines_below_weakest_first():
     analysis = analyse_text(SQUARE)
-    missed = required_stiffness_missed(analysis, analysis.summary()["mean_N_per_mm"] * 1e3)
+    missed = required_stiffness_missed(analysis, analysis.to_dict()["mean_N_per_mm"] * 1e3)
     assert missed and [s for _, s in missed] == sorted(s for _, s in missed)
-    assert missed[0][0] == analysis.summary()["weakest"]["line"]
+    assert missed[0][0] == analysis.to_dict()["weakest"]["line"]
     assert required_stiffness_missed(analysis, 1.0) == []
 
 
@@ -172,8 +172,8 @@ def test_weakest_places_are_apart_and_begin_with_the_weakest():
 def test_extrapolated_share():
     # At z = 800 mm on the axis all struts are 2.87 m, inside the published range; at 1268 mm two lengths of 2.526 m.
     text = "F100\nG0 X-1\nG1 X1\n"
-    assert analyse_text(text).summary()["extrapolated_share"] == 0.0
-    assert analyse_text(text, origin=(0, 0, 1.268225, 0, 0, 0)).summary()["extrapolated_share"] == 1.0
+    assert analyse_text(text).to_dict()["extrapolated_share"] == 0.0
+    assert analyse_text(text, origin=(0, 0, 1.268225, 0, 0, 0)).to_dict()["extrapolated_share"] == 1.0
 
 
 def test_machine_coordinates_need_the_origin_they_were_read_for():
@@ -183,7 +183,7 @@ def test_machine_coordinates_need_the_origin_they_were_read_for():
 
 
 def test_assumptions_are_said():
-    text = " ".join(str(a) for a in analyse_text(SQUARE).summary()["assumptions"])
+    text = " ".join(str(a) for a in analyse_text(SQUARE).to_dict()["assumptions"])
     for words in (
         "default; --origin (origin_mm_deg)",
         "reference_tool assumed",

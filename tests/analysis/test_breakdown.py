@@ -41,7 +41,7 @@ def analyzed(text: str, **options: object) -> Analysis:
 
 
 def test_operations_by_hand() -> None:
-    rows = analyzed(TWO).summary()["per_operation"]
+    rows = analyzed(TWO).to_dict()["per_operation"]
     assert [row["name"] for row in rows] == ["T1", "WALL", "T2"]
     assert [row["tool"] for row in rows] == [1, 1, 2]
     first, second, third = rows
@@ -62,7 +62,7 @@ def check_parts(analysis: Analysis, key: str) -> None:
 
     A tool that never cuts has no row: its rapids and their time are in none.
     """
-    summary = analysis.summary()
+    summary = analysis.to_dict()
     rows = summary[key]
     whole = ("rapid_length_mm", "time_s") if key == "per_operation" else ()
     for name in ("cutting_length_mm", "out_of_reach_samples", *whole):
@@ -133,7 +133,7 @@ def test_the_parts_of_any_program_make_the_whole(lines: list[str]) -> None:
 def test_an_operation_out_of_reach_has_no_figures() -> None:
     text = "G1 X10 F500\nX0\n(TOO FAR)\nG0 X5000\nG1 X5100\n(BACK)\nG0 X0\nG1 X10\n"
     analysis = analyzed(text, partial=True)
-    near, far, back = analysis.summary()["per_operation"]
+    near, far, back = analysis.to_dict()["per_operation"]
     assert far["name"] == "TOO FAR"
     assert all(far[name] is None for name in (*FIGURES, "weakest", "min_margin", "min_margin_limit"))
     assert far["out_of_reach_samples"] == int(analysis.out_of_reach.sum())
@@ -148,7 +148,7 @@ def test_a_tool_of_two_lengths_has_two_rows() -> None:
         {"end": (0.1, 0.05, 0.0), "tool": 1, "tool_length": 0.08},
         {"end": (0.0, 0.05, 0.0), "tool": 1},
     ]
-    rows = make_analysis(moves).summary()["per_tool"]
+    rows = make_analysis(moves).to_dict()["per_tool"]
     assert [(row["tool"], row["length_mm"]) for row in rows] == [(1, None), (1, pytest.approx(80.0))]
     assert [row["cutting_length_mm"] for row in rows] == pytest.approx([200.0, 50.0])
 
@@ -157,9 +157,9 @@ def test_the_approach_before_a_tools_length_is_in_force_is_the_tools_time() -> N
     text = "T3 M6\nG0 X100\nG43 H3 Z20\nG1 Z0 F600\nX90\n"
     program = parse_program(text, "part.nc", tools={3: ToolEntry(3, length=100.0)})
     analysis = analyze(load_machine("nist"), program)
-    (row,) = analysis.summary()["per_tool"]
+    (row,) = analysis.to_dict()["per_tool"]
     assert row["length_mm"] == pytest.approx(100.0)
-    assert row["time_s"] == pytest.approx(analysis.summary()["time_s"])
+    assert row["time_s"] == pytest.approx(analysis.to_dict()["time_s"])
 
 
 def test_the_samples_tell_their_operation() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from toolpath_stiff.analysis.checks import check_parts, figures
+from toolpath_stiff.analysis.program_check import check_parts, figures
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.nc.checking import check_lines
 

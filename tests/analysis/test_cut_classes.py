@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 
 from tests.report.factory import make_analysis
 from toolpath_stiff.analysis import LOADS, analyze, parse_load
+from toolpath_stiff.analysis.document import required_stiffness_missed
 from toolpath_stiff.analysis.loads import along_tool_axis, headline_rows, plunging_rows
-from toolpath_stiff.analysis.results import required_stiffness_missed
 from toolpath_stiff.analysis.statistics import FIGURES, stiffness_figures, weakest_places
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.case_study import case_study_program, wavy_program
+from toolpath_stiff.stiffness.model import build_model
 
 TANGENTIAL = parse_load("tangential")
 
@@ -93,11 +94,11 @@ def analyzed(text, **options):
 
 def alone(text, **options):
     """Figures of a program of one class alone."""
-    return analyzed(text, **options).summary()
+    return analyzed(text, **options).to_dict()
 
 
 def test_plunges_no_longer_rule_the_range_of_the_readmes_example():
-    summary = analyze(NIST, read_program(str(PROGRAMS / "pocket.nc"))).summary()
+    summary = analyze(NIST, read_program(str(PROGRAMS / "pocket.nc"))).to_dict()
     # Three feeds down in the program's text: lines 13, 39 and 65, 5 + 3 + 12 mm.
     assert (summary["plunges"]["moves"], summary["plunges"]["length_mm"]) == (3, pytest.approx(20.0))
     assert summary["headline"] == "across the tool axis"
@@ -107,7 +108,7 @@ def test_plunges_no_longer_rule_the_range_of_the_readmes_example():
 
 
 def test_a_program_that_only_plunges_says_so():
-    summary = analyze(NIST, read_program(str(PROGRAMS / "drilling.nc"))).summary()
+    summary = analyze(NIST, read_program(str(PROGRAMS / "drilling.nc"))).to_dict()
     assert summary["headline"] == "plunges only"
     assert all(summary[name] == summary["plunges"][name] for name in FIGURES)
     assert {row["headline"] for row in (*summary["per_tool"], *summary["per_operation"])} == {"plunges only"}
@@ -132,7 +133,7 @@ def test_a_plunge_of_a_leaning_tool():
     moves = [{"start": (0, 0, 0, *pose), "end": (*down, *pose)}, {"end": (*down[:2], down[2] + 0.01, *pose)}]
     analysis = make_analysis(moves)
     assert analysis.samples.move[analysis.plunging].tolist() == [0] * int((analysis.samples.move == 0).sum())
-    assert analysis.summary()["plunges"]["length_mm"] == pytest.approx(10.0)
+    assert analysis.to_dict()["plunges"]["length_mm"] == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize("load", ["normal", "axial", "softest", "z"])
@@ -143,7 +144,7 @@ def test_other_loads_count_every_cut(load):
 
 def test_require_catches_a_weak_plunge():
     analysis = analyzed("G1 Z-4 F100\nG1 X40\n")
-    level = analysis.summary()["plunges"]["max_N_per_mm"] * 1e3 + 1.0
+    level = analysis.to_dict()["plunges"]["max_N_per_mm"] * 1e3 + 1.0
     assert {line for line, _ in required_stiffness_missed(analysis, level)} == {1, 2}
     assert weakest_places(analysis) and not analysis.plunging[weakest_places(analysis)].any()
 
@@ -159,7 +160,7 @@ def test_the_classes_together_are_the_old_figures(steps, size):
     counted, plunging = analysis.counted, analysis.plunging
     assert not (analysis.headline & analysis.set_aside).any()
     np.testing.assert_array_equal(analysis.headline | analysis.set_aside, counted)
-    whole, summary = stiffness_figures(analysis, counted), analysis.summary()
+    whole, summary = stiffness_figures(analysis, counted), analysis.to_dict()
     blocks = [summary, *([summary["plunges"]] if plunging.any() else [])]
     length = [float(analysis.samples.weight[rows].sum()) for rows in (counted & ~plunging, plunging)]
     assert min(block["min_N_per_mm"] for block in blocks) == whole["min_N_per_mm"]
@@ -181,3 +182,14 @@ def test_the_table_of_samples_says_the_class_whatever_the_load():
         frame = analyzed(text, load=load).to_frame()
         found = frame.groupby("line")["cut"].agg(lambda cut: "".join(sorted(set(cut))))
         assert found.to_dict() == {1: "", 2: "plunge", 3: "across", 4: ""}, load
+
+
+@pytest.mark.parametrize("arc", ["G18 G3 X20 Z25 I20 K0", "G19 G2 Y20 Z25 J20 K0", "G1 Z30 B20"])
+def test_the_range_of_cuts_that_begin_within_a_plunge_does_not_depend_on_the_step(arc):
+    model, program = build_model(load_machine("nist")), parse_program(f"G21 G90 F600\nG0 Z5\n{arc}\nM30\n")
+    origin = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
+    coarse, fine = (
+        [stiffness_figures(found, found.headline)[key] for key in ("range_N_per_mm", "mean_N_per_mm")]
+        for found in (analyze(model, program, origin=origin, step=step) for step in (1e-3, 5e-5))
+    )
+    assert coarse == pytest.approx(fine, rel=1e-3)

@@ -39,7 +39,7 @@ def soft_joints(machine=NIST, size=5.0):
 def test_a_machine_without_uncertainty_has_no_band(program):
     found = analyze(NIST, program, step=0.05)
     assert found.parameter_band is None
-    assert "parameter_uncertainty" not in found.summary()
+    assert "parameter_uncertainty" not in found.to_dict()
 
 
 def test_a_law_wrong_by_one_factor_makes_the_stiffness_wrong_by_it(program):
@@ -51,8 +51,8 @@ def test_a_law_wrong_by_one_factor_makes_the_stiffness_wrong_by_it(program):
     relative = found.parameter_band.deviation[counted] / found.at.stiffness[counted]
     # 2e-4 of it: each constant is moved alone by 0.02 % of itself, over which the stiffness bends by as much.
     assert relative == pytest.approx(0.02, rel=2e-4)
-    figures = found.summary()["parameter_uncertainty"]
-    assert figures["mean_sd_N_per_mm"] == pytest.approx(0.02 * found.summary()["mean_N_per_mm"], rel=2e-4)
+    figures = found.to_dict()["parameter_uncertainty"]
+    assert figures["mean_sd_N_per_mm"] == pytest.approx(0.02 * found.to_dict()["mean_N_per_mm"], rel=2e-4)
     assert figures["largest_sd_percent"] == pytest.approx(2.0, rel=2e-4)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from toolpath_stiff.analysis import poses
+from toolpath_stiff.analysis import evaluation
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.stiffness.model import build_model
@@ -20,12 +20,12 @@ def test_a_pose_under_several_loads_is_as_each_by_itself():
     along = generator.normal(size=(n, 3))
     along[::17] = 0.0  # no direction: the softest stands in
     along[np.any(along != 0.0, axis=1)] /= np.linalg.norm(along[np.any(along != 0.0, axis=1)], axis=1)[:, None]
-    new = poses._new_poses(position, angles, tool)
+    new = evaluation._new_poses(position, angles, tool)
     assert 0.4 * n < np.count_nonzero(new) < 0.8 * n
     for load in ("tangential", "axial"):
-        together = poses.evaluate(NIST, position, angles, along, tool, parse_load(load))
+        together = evaluation.evaluate(NIST, position, angles, along, tool, parse_load(load))
         mixed = generator.permutation(n)
-        apart = poses.evaluate(NIST, position[mixed], angles[mixed], along[mixed], tool[mixed], parse_load(load))
+        apart = evaluation.evaluate(NIST, position[mixed], angles[mixed], along[mixed], tool[mixed], parse_load(load))
         np.testing.assert_allclose(together.stiffness[mixed], apart.stiffness, rtol=1e-12)
         np.testing.assert_allclose(together.strut_lengths[mixed], apart.strut_lengths, rtol=1e-14)
         np.testing.assert_allclose(together.margin[mixed], apart.margin, rtol=1e-9)

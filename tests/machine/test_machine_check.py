@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from toolpath_stiff.analysis.checks import check_machine
+from toolpath_stiff.analysis.machine_check import check_machine
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
 from toolpath_stiff.machine.symmetry import find_symmetry

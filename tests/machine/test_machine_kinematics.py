@@ -16,7 +16,7 @@ from toolpath_stiff.machine.kinematics import (
     solve_struts,
     solve_struts_at,
 )
-from toolpath_stiff.machine.limits import machine_limits, reach
+from toolpath_stiff.machine.limits import Extremes, machine_limits, reach
 from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
 from toolpath_stiff.rotations import rotation_about_z, rotation_matrices
 
@@ -189,7 +189,7 @@ def test_a_gauge_says_what_reach_says(tilted, tool):
         np.testing.assert_allclose(found.value[sure], wanted.value[sure], rtol=1e-13)
         np.testing.assert_array_equal(found.limit[sure], wanted.limit[sure])
         np.testing.assert_array_equal(found.reachable, wanted.reachable)
-        np.testing.assert_allclose(gauge_of(machine).extremes(*known).margin, wanted.margin, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(Extremes(gauge_of(machine), *known).margin, wanted.margin, rtol=1e-7, atol=1e-7)
 
 
 def test_a_gauge_leaves_an_angle_near_zero_to_the_exact_formula():

@@ -150,7 +150,7 @@ def test_the_command_takes_files_and_folders_and_fails_on_another_path(tmp_path,
     monkeypatch.setattr("sys.argv", ["conformance", str(tmp_path), "--out", str(tmp_path / "table.md")])
     assert conformance.main() == 0
     text = (tmp_path / "table.md").read_text()
-    assert text == capsys.readouterr().out.removesuffix("\n")
+    assert text.startswith(capsys.readouterr().out.rstrip("\n"))
     assert "1 same feed path" in text and "1 refused" in text
     monkeypatch.setattr(conformance, "difference", lambda one, two: 0.02)
     assert conformance.main() == 1

@@ -229,6 +229,15 @@ def test_refusals_name_their_line(text, line, what):
 
 
 @needs_rs274
+@pytest.mark.parametrize(("words", "tool"), [("G43", 4), ("G43 H7", 7), ("H007 G43", 7)])
+def test_both_readers_give_the_same_tool_table_to_copy(words, tool):
+    for interpreter in ("linuxcnc", "builtin"):
+        with pytest.raises(InputError) as error:
+            parse_program(f"G1 X1 F100\nT4 M6\n{words}\nG1 X2\n", interpreter=interpreter)
+        assert error.value.hint.endswith(f":\ntool,length_mm\n{tool},LENGTH")
+
+
+@needs_rs274
 def test_block_delete_percent_and_what_follows_the_end():
     text = "%\nG1 X1 F100\n/ X2\n/3 X3\n%\nX4\n"
     np.testing.assert_allclose(linuxcnc(text).moves.end[:, 0] * 1e3, [1, 2, 3])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.nc.test_nc_against_rs274 import TOOLS, Writer, cycle_program
-from toolpath_stiff.analysis.checks import extents, figures, machine_findings, radii_findings
+from toolpath_stiff.analysis.program_check import extents, figures, machine_findings, radii_findings
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine

@@ -334,7 +334,7 @@ def test_a_turn_that_moves_neither_tip_nor_axis_is_a_pause(control):
 
 def test_arcs_with_standing_axes_stay_arcs(control):
     program = parse_program("G0 A90\nX10 Y0\nG2 X10 Y20 I0 J10 F100\nG17 G3 X0 Y0 Z-5 R20\n", controller=control(AC))
-    plain = parse_program("G0 A90\nX10 Y0\nG2 X10 Y20 I0 J10 F100\nG17 G3 X0 Y0 Z-5 R20\n")
+    plain = parse_program("G0 X10 Y0\nG2 X10 Y20 I0 J10 F100\nG17 G3 X0 Y0 Z-5 R20\n")
     arcs, flat = (p.moves.take(p.moves.arc_sweep != 0.0) for p in (program, plain))
     assert len(arcs) == 2 and (arcs.motion == ARC).all()
     np.testing.assert_allclose(arcs.arc_normal, [[0, -1, 0]] * 2, atol=1e-12)  # A 90: +Z of the machine is -Y there

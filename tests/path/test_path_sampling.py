@@ -206,6 +206,29 @@ def test_a_rigid_turn_keeps_lengths_times_and_weights(shift, turn, points):
     assert turned.t[-1] == pytest.approx(plain.t[-1], rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("move", "borders"),
+    [
+        ({"start": [0, 0, 0], "end": [0.02, 0, 0.02], "center": [0.02, 0, 0], "normal": [0, 1, 0]}, 1),
+        ({"start": [0, 0, 0], "end": [0, 0, 0], "center": [3e-4, 0, 0], "normal": [0, 1, 0], "sweep": 2 * np.pi}, 4),
+        ({"end": [0, 0, 0.02, 0, 0.3]}, 1),  # pitch by 0.3 rad
+        ({"end": [0, 0, 0.02, 0, 0.08]}, 0),
+        ({"start": [0.02, 0, 0], "end": [0, 0.02, 0], "sweep": np.pi / 2}, 0),
+    ],
+)
+@pytest.mark.parametrize("origin", [(0.0,) * 6, (0.1, 0.0, 0.8, 0.2, -0.3, 0.5)])
+def test_where_a_plunge_becomes_a_cut_the_cut_has_a_sample(move, borders, origin):
+    if "center" in move:
+        move.setdefault("sweep", np.pi / 2)
+    moves = make_moves([move])
+    samples = sample_moves(place(moves, origin), 1e-3, origin=origin)
+    axis = rotation_matrices(samples.abc)[:, :, 2]
+    lean = np.degrees(np.arccos(np.clip(np.abs(np.sum(axis * samples.tangent, axis=1)), 0.0, 1.0)))
+    assert np.count_nonzero((lean > 5.0) & (lean < 5.0 + 1e-8)) == borders
+    assert (np.diff(samples.s) > 0.0).all()
+    assert samples.weight.sum() == pytest.approx(move_lengths(moves)[0], rel=1e-12)
+
+
 def test_three_turns_of_120_degrees_are_none():
     third = (0.0, 0.0, 0.0, 0.0, 0.0, 2 * np.pi / 3)
     moves = make_moves(

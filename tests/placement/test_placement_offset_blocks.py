@@ -31,8 +31,8 @@ def keyed_in(name: str, block: str):
 def test_linuxcnc_block_places_as_the_origin_does(name):
     machine, program = load_machine("nist"), read_program(PROGRAMS / name)
     blocks = offset_blocks(program, PLACEMENT, decimals=6)
-    there = analyze(machine, keyed_in(name, blocks.linuxcnc), step=2e-3).summary()
-    wanted = analyze(machine, program, origin=PLACEMENT, step=2e-3).summary()
+    there = analyze(machine, keyed_in(name, blocks.linuxcnc), step=2e-3).to_dict()
+    wanted = analyze(machine, program, origin=PLACEMENT, step=2e-3).to_dict()
     for figure in FIGURES:  # six decimals of a millimetre; the summary itself is rounded
         assert there[figure] == pytest.approx(wanted[figure], rel=1e-6, abs=0.11)
 

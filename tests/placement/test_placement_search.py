@@ -23,9 +23,9 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, front_rows, thin
-from toolpath_stiff.placement.document import nothing_better_words
 from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures
 from toolpath_stiff.placement.paths import placed_path, representative_path, work_path
+from toolpath_stiff.placement.result import nothing_better_words
 from toolpath_stiff.placement.search import SearchRules, search_placements
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model

@@ -70,12 +70,22 @@ def common(verdict: str, **more: Any) -> dict[str, Any]:
             for b in group:
                 if a != b:
                     matrix[names.index(a)][names.index(b)] = value
-    return {
+    document = {
         "verdict": verdict,
         "text": "",
+        "question": "",
+        "best": None,
+        "portrait": None,
+        "not_excluded_text": "",
+        "next": [],
+        "notes": [],
+        "readings": 42,
+        "gates": {"simulated_squares": []},
         "baseline": {
             "mean_abs_error_percent": 4.8, "bias_percent": -0.3, "rms_percent": 6.1, "held_out_error_percent": 5.1,
             "held_out_rms_percent": 6.6, "noise_percent": 2.1, "probability": 0.0, "adequate": False,
+            "noise_floor_percent": 1.68,
+            "as_given": {"mean_abs_error_percent": 4.9, "held_out_error_percent": 4.9},
             "law": {"stiffness_1_N_per_m": 4.5e7, "stiffness_2_N_per_m": 3.1e7},
         },
         "candidates": [],
@@ -116,6 +126,10 @@ def common(verdict: str, **more: Any) -> dict[str, Any]:
         "data": ["campaign.csv"],
         "command": "tps diagnose campaign.csv",
     } | more  # fmt: skip
+    for judged in document["by_noise"].values():
+        judged.setdefault("noise_percent", 2.1)
+        judged.setdefault("probability", {})
+    return document
 
 
 def identified() -> dict[str, Any]:

@@ -100,11 +100,11 @@ def test_residuals_as_a_table_say_what_they_are():
 
 
 def test_terminal_steers_nothing_and_names_a_wild_reading():
-    text = terminal_text(compared("wild")[0].document)
+    text = terminal_text(compared("wild")[0])
     assert "readings far off" in text
     assert "+2" in text.split("readings far off")[1]
     data = replace(oblique(), setup=np.array(["\x1b[31mred"] * 9))
-    assert "\x1b" not in terminal_text(quick(data).document)
+    assert "\x1b" not in terminal_text(quick(data))
 
 
 def test_the_command_writes_everything_and_the_same_bytes_again(tmp_path, capsys):

@@ -14,18 +14,17 @@ from tests.browser import needs_browser, painted
 from tests.report import diagnose_documents as documents
 from tests.report.factory import short
 from tests.stiffness.cases import nist
+from toolpath_stiff.analysis.grid import map_stiffness
 from toolpath_stiff.analysis.loads import parse_load
-from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
-from toolpath_stiff.planning.document import MOST_LEVELS, group_of, height_groups
+from toolpath_stiff.planning.gap_map import MOST_LEVELS, group_of, height_groups
 from toolpath_stiff.planning.visits import Visits
 from toolpath_stiff.readings.measurements import read_measurements
-from toolpath_stiff.report import case_study, figure, machine, measuring
+from toolpath_stiff.report import case_study, figure, machine, plan
 from toolpath_stiff.report import map as map_report
 from toolpath_stiff.report.analysis.page import page
-from toolpath_stiff.report.analysis.summary import summary_with_options
 from toolpath_stiff.report.batch.index import batch_page
 from toolpath_stiff.report.compare import pictures as compare_pictures
 from toolpath_stiff.report.diagnose import pictures as diagnose_pictures
@@ -42,9 +41,7 @@ TOUCH = 1.5  # pixels that boxes may share: they are a little larger than the le
 def last(monkeypatch):
     """The figures that were drawn, last one last."""
     figures = []
-    for module in (
-        case_study, compare_pictures, diagnose_pictures, machine, map_report, measuring,
-    ):  # fmt: skip
+    for module in (case_study, compare_pictures, diagnose_pictures, machine, map_report, plan):
 
         def kept(*size, new=module.new_figure):
             figures.append(new(*size))
@@ -122,7 +119,7 @@ def test_the_machine_is_whole_and_its_axes_named(last, pose, monkeypatch):
 
 
 def test_slices_of_a_map_fill_their_rows_and_no_figure_lies_on_another(last, mapped):
-    map_report.map_picture(nist(), mapped)
+    map_report.map_picture(mapped)
     assert len({round(axes.get_position().x0, 3) for axes in last[-1].axes[:4]}) == 2
     assert_whole_and_apart(last[-1])
 
@@ -172,7 +169,7 @@ def visits_at(z):
 @pytest.mark.parametrize("heights", [[0.43, 0.78, 1.2, 1.49], [0.07, 0.43, 0.78, 1.13, 1.49, 1.2], [0.5]])
 def test_every_pose_is_in_the_panel_of_its_own_height(last, heights):
     visits = visits_at(np.array([*heights, heights[0]]))
-    measuring.plan_picture(visits, range(len(heights) + 1), ["vertical"] * (len(heights) + 1), None, "title", "text")
+    plan.plan_picture(visits, range(len(heights) + 1), ["vertical"] * (len(heights) + 1), None, "title", "text")
     found = {}
     for axes in last[-1].axes:
         z = float(re.match(r"z = ([\d.]+) mm", axes.get_title(loc="left")).group(1))
@@ -201,9 +198,9 @@ def test_many_heights_are_put_together_with_their_neighbours():
 def test_all_pages_have_one_style_sheet_with_a_dark_half(mapped):
     analysis = short()
     pages = {
-        "analysis": page(analysis, summary_with_options(analysis, None, None)),
+        "analysis": page(analysis),
         "batch": batch_page([]),
-        "map": map_page(nist(), mapped),
+        "map": map_page(mapped, "nist"),
         "diagnosis": diagnose_html(documents.identified(), {}),
     }
     shared = asset("page.css")
@@ -224,7 +221,7 @@ def test_surfaces_of_a_map_stand_above_their_planes(tmp_path):
     """Seen from the front a surface rises from its plane: the stiffest is higher on the screen than the softest."""
     one = map_stiffness(build_model(nist()), (-0.1, 0.1), (-0.1, 0.1), [0.8], parse_load("radial"), 9)
     front = "document.querySelector('[data-view=front]').click()"
-    rows = painted(map_page(nist(), one), tmp_path, front)["view"]
+    rows = painted(map_page(one, "nist"), tmp_path, front)["view"]
     ramp = [rows[colour] for colour in page_colours()["colours"] if colour in rows]  # softest first
     assert len(ramp) > 5
     assert ramp[-1] < ramp[0] - 50

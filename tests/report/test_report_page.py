@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -14,9 +15,8 @@ from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.nc.moves import ToolUse, Unsupported
 from toolpath_stiff.report.analysis import page as page_module
 from toolpath_stiff.report.analysis.page import NONE, OUT_OF_REACH, PLUNGE, page, page_rows
-from toolpath_stiff.report.analysis.summary import summary_with_options
 from toolpath_stiff.report.pages import json_for_script
-from toolpath_stiff.report.words import number
+from toolpath_stiff.units import number
 
 EVIL = "</script><script>alert(1)</script>"
 VOID = {"meta", "input", "br", "hr", "img", "link"}
@@ -58,7 +58,7 @@ class Page(HTMLParser):
 
 
 def render(analysis, required=None, other=None):
-    return page(analysis, summary_with_options(analysis, required, other), required=required, other=other)
+    return page(replace(analysis, required=required, on_other=other))
 
 
 def column(text, dtype):
@@ -125,7 +125,7 @@ def test_json_for_script_reads_back_and_holds_no_markup():
 
 
 def test_figures_on_the_page_are_those_of_the_summary(analysis, parsed):
-    summary = analysis.summary()
+    summary = analysis.to_dict()
     cells = parsed.all("td")
     for name in ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm"):
         assert number(summary[name]) in cells
@@ -149,7 +149,7 @@ def test_the_samples_on_the_page_are_those_of_the_analysis(analysis, parsed):
     assert np.array_equal(column(data["line"], "<u4"), samples.line)
     assert np.array_equal(column(data["kind"], "u1") & 7, samples.motion)
     assert np.allclose(column(data["s"], "<f4"), samples.s * 1e3, rtol=1e-6)  # float32 holds seven digits
-    lines = [place["line"] for place in analysis.summary()["weakest_places"]]
+    lines = [place["line"] for place in analysis.to_dict()["weakest_places"]]
     assert samples.line[data["weakest"]].tolist() == lines
 
 
@@ -195,12 +195,12 @@ def test_very_many_samples_are_thinned_aloud_and_keep_the_extremes(analysis, mon
     assert f"{number(len(rows))} of the {number(len(analysis.samples))} samples" in text
     weakest = Page(text).data["weakest"]
     assert [int(analysis.samples.line[rows[i]]) for i in weakest] == [
-        place["line"] for place in analysis.summary()["weakest_places"]
+        place["line"] for place in analysis.to_dict()["weakest_places"]
     ]
 
 
 def test_the_table_of_operations_is_that_of_the_summary(analysis, parsed):
-    summary, data = analysis.summary(), parsed.data
+    summary, data = analysis.to_dict(), parsed.data
     rows = [attrs["data-operation"] for name, attrs in parsed.elements if "data-operation" in attrs]
     assert rows == [str(i) for i in range(len(summary["per_operation"]))]
     assert len(rows) == 2
@@ -255,7 +255,7 @@ def test_the_page_knows_which_samples_are_set_aside_and_both_scales(analysis, pa
     assert Page(render(short())).data["scale_with_plunges"] is None
     (switch,) = [attrs for _, attrs in parsed.elements if attrs.get("id") == "plunges"]
     assert "checked" not in switch
-    shown = page(analysis, summary_with_options(analysis, None, None), show_plunges=True)
+    shown = page(analysis, show_plunges=True)
     (switch,) = [attrs for _, attrs in Page(shown).elements if attrs.get("id") == "plunges"]
     assert "checked" in switch
 

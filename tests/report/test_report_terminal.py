@@ -5,13 +5,15 @@ import copy
 import pytest
 
 from tests.report.factory import make_analysis, short, spiral
-from toolpath_stiff.report.analysis.summary import MOST_OPERATIONS, compare_summaries, comparison_table, terminal_table
-from toolpath_stiff.report.words import WIDTH, duration, number
+from toolpath_stiff.analysis.document import compare_summaries
+from toolpath_stiff.report.analysis.summary import MOST_OPERATIONS, comparison_table, terminal_table
+from toolpath_stiff.report.words import WIDTH, duration
+from toolpath_stiff.units import number
 
 
 @pytest.fixture(scope="module")
 def summary():
-    return spiral().summary()
+    return spiral().to_dict()
 
 
 def test_the_table_shows_the_figures_of_the_summary(summary):
@@ -46,13 +48,13 @@ def test_many_operations_are_counted_and_long_names_cut(summary):
 
 def test_warnings_are_told_in_full_and_no_line_is_too_long():
     warning = "the spindle stands still while the tool moves through the work " * 6
-    text = terminal_table(short(warnings=(warning,), name="n" * 300, source=["x" * 300] * 2).summary())
+    text = terminal_table(short(warnings=(warning,), name="n" * 300, source=["x" * 300] * 2).to_dict())
     assert max(map(len, text.splitlines())) <= WIDTH
     assert " ".join(text.split()).endswith(warning.strip())
 
 
 def test_a_program_cannot_steer_the_terminal():
-    text = terminal_table(short(name="a\x1b[2J\r.nc", source=["G1 (\x07\x1b]0;x\x07)"] * 2).summary())
+    text = terminal_table(short(name="a\x1b[2J\r.nc", source=["G1 (\x07\x1b]0;x\x07)"] * 2).to_dict())
     assert all(c.isprintable() or c == "\n" for c in text)
 
 
@@ -77,7 +79,7 @@ def test_half_as_stiff_is_minus_fifty_percent(summary):
 
 def test_out_of_reach_is_told():
     beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
-    assert "out of reach and left out" in terminal_table(beyond.summary())
+    assert "out of reach and left out" in terminal_table(beyond.to_dict())
 
 
 @pytest.mark.parametrize(("value", "text"), [(1234567.4, "1 234 567"), (-0.2, "0"), (None, "-"), (float("nan"), "-")])
@@ -95,7 +97,7 @@ def test_plunges_stand_beside_the_headline(summary):
     plunges = summary["plunges"]
     assert f"{number(plunges['length_mm'], 1)} mm in {plunges['moves']} move" in line
     assert f"mean {number(plunges['mean_N_per_mm'])} N/mm, min {number(plunges['min_N_per_mm'])}" in line
-    assert "plunges " not in terminal_table(short().summary())
+    assert "plunges " not in terminal_table(short().to_dict())
 
 
 def test_a_plunge_weaker_than_all_other_cuts_is_named(summary):
@@ -105,7 +107,7 @@ def test_a_plunge_weaker_than_all_other_cuts_is_named(summary):
 
 
 def test_what_only_plunges_is_said_to(summary):
-    down = make_analysis([{"end": (0.0, 0.0, -0.05)}]).summary()
+    down = make_analysis([{"end": (0.0, 0.0, -0.05)}]).to_dict()
     assert "this program only plunges" in " ".join(terminal_table(down).split())
     first, second = summary["per_operation"]
     text = terminal_table({**summary, "per_operation": [first, {**second, "headline": "plunges only"}]})
@@ -118,4 +120,4 @@ def test_two_machines_are_compared_by_their_plunges_too(summary):
     assert compared["plunges_difference_percent"] == -50.0 and set(compared["difference_percent"].values()) == {0.0}
     (row,) = [line for line in comparison_table(summary, half).splitlines() if line.startswith("plunges N/mm")]
     assert row.endswith("-50.0 %")
-    assert "plunges N/mm" not in comparison_table(short().summary(), short().summary())
+    assert "plunges N/mm" not in comparison_table(short().to_dict(), short().to_dict())

@@ -4,21 +4,22 @@ import csv
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.report.factory import make_analysis, short
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.report.analysis import page as page_module
-from toolpath_stiff.report.analysis.summary import files, names
+from toolpath_stiff.report.analysis import summary as summary_module
+from toolpath_stiff.report.analysis.summary import names
 from toolpath_stiff.results_folder import MANIFEST, write_folder
 
 PLOTS = {"samples.csv", "summary.json", "path.png", "profile.png", "report.html"}
 
 
 def write(analysis, folder, **options):
-    return write_folder(folder, files(analysis, **options), command="analyze")
+    return write_folder(folder, analysis.files(**options), command="analyze")
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +39,7 @@ def test_all_files_are_written_and_nothing_else(analysis, tmp_path):
 
 def test_the_same_analysis_writes_the_same_bytes(analysis, tmp_path):
     for name in ("a", "b"):
-        write(short(), tmp_path / name, required=5e7, other=analysis)
+        write(replace(short(), required=5e7, on_other=analysis), tmp_path / name)
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
 
 
@@ -53,11 +54,11 @@ def test_without_plots_matplotlib_is_not_imported(tmp_path):
 
 
 def test_summary_is_json_without_nan_and_equals_the_analysis(analysis, tmp_path):
-    write(analysis, tmp_path / "o", plots=False, required=1e9, other=analysis)
+    write(replace(analysis, required=1e9, on_other=analysis), tmp_path / "o", plots=False)
     text = (tmp_path / "o" / "summary.json").read_text()
     read = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
     compare, required = read.pop("compare"), read.pop("required")
-    assert read == analysis.summary()
+    assert read == analysis.to_dict()
     assert compare["mean_N_per_mm"] == read["mean_N_per_mm"]
     assert [entry["line"] for entry in required["below"]] != []
     assert required["required_N_per_mm"] == pytest.approx(1e6, rel=1e-12)  # 1e9 N/m; a division's rounding
@@ -97,7 +98,7 @@ def test_an_error_midway_leaves_everything_as_it_was(analysis, tmp_path, monkeyp
     def fail(*_args, **_kwargs):
         raise error
 
-    monkeypatch.setattr(page_module, "page_pieces", fail)
+    monkeypatch.setattr(summary_module, "page_pieces", fail)
     with pytest.raises(type(error)):
         write(analysis, out)
     assert tree(tmp_path) == before

@@ -14,8 +14,9 @@ from scipy.optimize import brentq
 
 from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist, random_poses
+from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.analysis.poses import evaluate, evaluate_poses
+from toolpath_stiff.analysis.poses import evaluate_poses
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices

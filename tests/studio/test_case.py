@@ -222,12 +222,12 @@ def test_what_no_effect_explains_is_drafted_and_competes(tmp_path):
     case.start_exercise(5, hidden="saddle_overhang")  # gives way along X as y squared: not in the catalogue
     drafted = case.draft()
     assert drafted.name == "missing"
-    assert case.state.effects == ("effects/missing.py",)
+    assert case.state.effects == ("effects/missing.toml",)
     assert [step.kind for step in case.history[-2:]] == ["draft", "effects"]
-    line, text = case.history[-2].command, (case.folder / "effects/missing.py").read_text()
+    line, text = case.history[-2].command, (case.folder / "effects/missing.toml").read_text()
     assert shlex.split(line)[:3] == ["tps", "effects", "draft"]
     assert text == drafted.text
-    assert "missing" in [effect.name for effect in tps.effects([case.path("effects/missing.py")]).effects]
+    assert "missing" in [effect.name for effect in tps.effects([case.path("effects/missing.toml")]).effects]
     case.undo()
     assert case.state.effects == ()
 
@@ -411,7 +411,7 @@ def test_a_relative_configuration_folder_does_not_count(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, 1e300, 10**400, "soft", None])
 def test_no_number_but_a_stiffness_is_required(case, value):
-    with pytest.raises(tps.InputError, match="required|--require "):
+    with pytest.raises(tps.InputError, match=r"required|--require "):
         case.require(value)
     assert tps.Case.open(case.folder).state.require == 0
 
@@ -454,3 +454,10 @@ def test_a_table_that_cannot_be_read_leaves_nothing(case, tmp_path):
         with pytest.raises(tps.InputError):
             case.read_programs(**reading)
     assert [one for one in sorted(case.folder.rglob("*")) if one not in files and one.is_file()] == []
+
+
+def test_a_folder_that_no_system_can_have_is_refused_in_one_line(tmp_path, capsys):
+    assert main(["studio", "--no-browser", "--case", str(tmp_path / ("n" * 300))]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("tps: error: cannot open the case ") and told.endswith(": File name too long\n")
+    assert not list(tmp_path.iterdir())

@@ -13,18 +13,10 @@ from tests.effects.cases import all_effects
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.inference import candidates
-from toolpath_stiff.inference.candidates import (
-    EXPECTED,
-    VISIBLE,
-    Candidate,
-    Component,
-    SizePrior,
-    Table,
-    candidates_of,
-    tabulate,
-)
+from toolpath_stiff.inference.candidates import Candidate, Component, Table, candidates_of, tabulate
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.size_priors import EXPECTED, VISIBLE, SizePrior
 from toolpath_stiff.stiffness.contract import Parameter
 
 EFFECTS = all_effects()

@@ -15,7 +15,7 @@ from toolpath_stiff.comparison.compare import Comparison, compare
 from toolpath_stiff.comparison.principles import load_path_shares
 from toolpath_stiff.comparison.residuals import directions, planes, radius, zones
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.fits import error_figures
+from toolpath_stiff.inference.errors import error_figures
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.readings.measurements import Measurements, read_measurements
 from toolpath_stiff.rig import case, exercise

@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 from tests.updating.cases import campaign, predictor_for, simple_noise
 from toolpath_stiff.comparison.structure import EXCESSES, Scattering, _Fit
 from toolpath_stiff.inference.covariances import Covariance, Groups, Widening, inverse_root
-from toolpath_stiff.inference.gates import discrepancy_forms
+from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.noise import Scatter
 
 FloatArray = NDArray[np.float64]

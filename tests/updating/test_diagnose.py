@@ -56,7 +56,7 @@ EFFECTS = [Saddle()]
 
 
 def found(verdict: str) -> dict[str, Any]:
-    return document(replace(diagnosed(*CASES[verdict]), command="tps diagnose measurements.csv"))
+    return document(replace(diagnosed(*CASES[verdict]), line="tps diagnose measurements.csv"))
 
 
 @pytest.mark.parametrize("verdict", CASES)
@@ -162,9 +162,9 @@ def test_the_same_data_and_seed_give_the_same_document(monkeypatch):
     data = campaign(*CASES["ambiguous"])[0]
     found("ambiguous")
     monkeypatch.setattr(cases, "JUDGEMENTS", {})  # judged again, not remembered
-    again = document(examined(nist(), data, command="tps diagnose measurements.csv"))
+    again = document(examined(nist(), data, line="tps diagnose measurements.csv"))
     assert json.dumps(again) == json.dumps(found("ambiguous"))
-    other = document(examined(nist(), data, seed=5, command="tps diagnose measurements.csv"))
+    other = document(examined(nist(), data, seed=5, line="tps diagnose measurements.csv"))
     assert other["gates"]["simulated_squares"] != again["gates"]["simulated_squares"]
     assert other["verdict"] == again["verdict"]
 
@@ -208,7 +208,7 @@ def test_a_users_own_effect_takes_part(tmp_path):
     file.write_text(SADDLE, encoding="utf-8")
     data, truth = campaign(*case)
     after = examined(nist(), data, effect_files=[file])
-    assert (after.verdict, after.plausible) == ("identified", ("saddle",))
+    assert (after.verdict, after.plausible) == ("identified", ["saddle"])
     fit = after.fits["saddle"]
     hidden = truth["effects"][0]["parameters"]["size"]  # m/N at y = 0.3 m
     assert abs(fit.sizes[0][0] - hidden) < 3.3 * fit.deviation(0)

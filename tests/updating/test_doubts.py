@@ -10,12 +10,14 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, examined, judged_once, predictor_for, simple_noise
 from toolpath_stiff.inference import candidates
-from toolpath_stiff.inference.doubts import alone, mended, noise_doubt, slips_that_show, suspect_entries, suspect_rows
+from toolpath_stiff.inference.discrepancies import discrepancy_forms
+from toolpath_stiff.inference.doubts import noise_doubt
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import from_repeats, repeat_groups
+from toolpath_stiff.inference.slips import alone, mended, slips_that_show, suspect_entries, suspect_rows
 from toolpath_stiff.rig.hidden import Nuisances
 
 DATA = campaign(78, "tilted", "none")[0]

@@ -1,4 +1,4 @@
-"""A drafted effect file: its text against the term that it was made of, on random poses, and what it declares."""
+"""A drafted effect file: read back, it is the term that it was made of; what it declares, and what it refuses."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ import numpy as np
 import pytest
 
 from tests.updating.cases import campaign, predictor_for
-from toolpath_stiff.drafting.draft import Description, Origin, draft_source, effect_names
+from toolpath_stiff.correction.draft import draft_text, effect_names
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.dictionary import dictionary_of
-from toolpath_stiff.portrait.terms import Factor, Term, effect_of
+from toolpath_stiff.portrait.portrait import Portrait, Sized
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.catalogue import effects_from_file
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.model import build_model, load_path
+from toolpath_stiff.stiffness.term_effect import effect_of
+from toolpath_stiff.stiffness.term_file import entry_of
+from toolpath_stiff.stiffness.terms import Factor, Term
 from toolpath_stiff.stiffness.trial import try_effect
 
-ORIGIN = Origin(
-    ("data.csv",), "24" * 32, 12, "nist", ("0123456789",) * 12, "tps effects draft data.csv", ("a", "b", "c")
-)
+MARKS = ("0123456789",) * 12
 LINE, RAMP = (("start", -0.11), ("end", 0.17)), (("start", 0.71), ("end", 1.13))
 ABOVE, BELOW = (("edge", 0.02), ("side", 1.0)), (("edge", 0.013), ("side", -1.0))
 FALLING = (("power", -1.0 / 3.0), ("reference", 500.0))
@@ -36,7 +38,7 @@ TERMS = [
     Term("table", "X", "x", "bump", "give", at=(("centre", -0.05), ("width", 0.08))),
     Term("table", "Z", "z", "periodic", "give", at=(("period", 0.1), ("crest", 0.82))),
     Term("table", "all", "load", "slope", "rocking", at=FALLING),
-    Term("table", "tangential", "x", "sign", "rocking", at=(("side", -1.0),)),
+    Term("table", "tangential", "x", "threshold", "rocking", at=ABOVE),
     Term("tool", "radial", "tilt", "slope", "give", at=(("start", 0.01), ("end", 0.2))),
     Term("tool", "axial", "tilt", "threshold", "give", at=ABOVE, column="X"),
     Term("platform", "all", "time", "slope", "give", at=(("start", 0.0), ("end", 1800.0))),
@@ -78,14 +80,18 @@ TERMS = [
 WORDS = "a long clause without an end, " * 5 + 'the "table" of C:\\new gives way """here"""'
 
 
-def written(tmp_path, *terms: Term) -> dict[str, Effect]:
-    """The effects of the file that is drafted from these terms."""
-    file = tmp_path / "missing.py"
-    text = draft_source(
-        "missing", Description(WORDS, terms, (WORDS,) * len(terms), ("9 nm/N",) * len(terms), (WORDS,)), ORIGIN
+def draft_of(*terms: Term) -> str:
+    """The text of the file that is drafted from these terms."""
+    sized = tuple(Sized(term.sized(1e-9), (0.0, 2e-9), 0.05) for term in terms)
+    return draft_text(
+        "missing", Portrait(sized, alike=sized[:1]), WORDS, f"Drawn from {WORDS}.", ("a", "b", "c"), MARKS
     )
-    assert max(map(len, text.splitlines())) <= 120
-    file.write_text(text, encoding="utf-8")
+
+
+def written(tmp_path, *terms: Term) -> dict[str, Effect]:
+    """The effects of that file."""
+    file = tmp_path / "missing.toml"
+    file.write_text(draft_of(*terms), encoding="utf-8")
     return effects_from_file(file)
 
 
@@ -104,7 +110,7 @@ def some_path():
 
 
 @pytest.mark.parametrize("term", TERMS, ids=lambda term: term.key)
-def test_text_and_term_give_the_same_numbers(term, some_path, tmp_path):
+def test_file_and_term_give_the_same_numbers(term, some_path, tmp_path):
     compare_with_term(term, some_path, tmp_path)
 
 
@@ -178,9 +184,67 @@ def test_several_terms_are_one_effect_but_readings_and_geometry_have_their_own(t
     assert names == ["missing", "missing_geometry", "missing_reading"]
     several = written(tmp_path / "..", *three)
     assert list(several) == names
-    assert all(effect.described_from == ORIGIN.marks for effect in several.values())
+    assert all(effect.described_from == MARKS for effect in several.values())
 
 
 def test_the_same_gives_the_same_bytes():
-    description = Description(WORDS, (TERMS[0],), (WORDS,), ("9 nm/N",))
-    assert draft_source("missing", description, ORIGIN) == draft_source("missing", description, ORIGIN)
+    assert draft_of(TERMS[0]) == draft_of(TERMS[0])
+
+
+def test_two_terms_add_what_each_adds(some_path, tmp_path):
+    pins = [term for term in TERMS if term.action in ("frame pin", "platform pin", "turning")]
+    (effect,) = written(tmp_path, *pins).values()
+    sizes = {p.name: p.typical[1] * p.si for p in effect.parameters}
+    for hook in ("strut_compliance", "parallel_stiffness"):
+        alone = [
+            getattr(effect_of(term), hook)(some_path, {"size": size})
+            for term, size in zip(pins, sizes.values(), strict=True)
+        ]
+        np.testing.assert_allclose(
+            getattr(effect, hook)(some_path, sizes), sum(part for part in alone if part is not None), rtol=1e-7
+        )
+
+
+def test_no_strut_loses_more_than_four_fifths_of_its_compliance(some_path):
+    softer = Term("struts", STRUT, "load", "slope", "strut factor", at=(("start", 0.0), ("end", 10.0)))
+    added = effect_of(softer).strut_compliance(some_path, {"size": -0.5})
+    left = 1.0 + added * some_path.machine.strut_law.stiffness(some_path.struts.lengths)
+    assert left.min() == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message"),
+    [
+        ('link = "table"', 'link = "tabel"', "link", "link = 'tabel'; expected one of instrument,"),
+        ('action = "give"', 'action = "turning"', "action", "expected of table: give, rocking"),
+        ('along = "Y"', 'along = "axial"', "along", "expected of give: X, Y, Z, horizontal"),
+        ('varies_with = "y"', 'varies_with = "strut force"', "varies_with", "expected one of constant, x, y"),
+        ('shape = "slope"', 'shape = "bend"', "shape", "expected one of slope, square"),
+        ("start_mm", "start_m", "constants", "expected of slope: start_mm, end_mm or power, reference_mm"),
+        ("-110.0", '"left"', "constants", "a number within"),
+        ("bounds_nm_per_N = [0.0, 500.0]", "bounds_nm_per_N = [9.0, 500.0]", "[[effect]]", "neutral"),
+        ("bounds_nm_per_N", "bounds_um_per_N", "bounds_um_per_N", "is not known"),
+        ('size = "table_y"', 'size = "table y"', "[[effect]]", "letters, digits and underscores"),
+        ('along = "Y"', 'along = "Y"\nwhere = 2', "where", "no `where` of give of table"),
+        ('name = "term"', 'name = "weak_strut"', 'name = "weak_strut"', "other effects are Python files"),
+        ('name = "missing"', 'name = "it is missing"', "name", "letters, digits and underscores"),
+        ("[drawn_from]", "[drawn_form]", "[drawn_form]", "drawn_form"),
+    ],
+)
+def test_an_edited_file_is_refused_with_its_line(old, new, line, message, tmp_path):
+    text, file = draft_of(TERMS[0]), tmp_path / "missing.toml"
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        effects_from_file(file)
+    assert message in str(caught.value)
+    assert caught.value.line is not None
+    assert file.read_text(encoding="utf-8").splitlines()[caught.value.line - 1].startswith(line)
+
+
+def test_constants_stand_in_the_units_of_the_shop():
+    assert entry_of(TERMS[0], "table_y", "the table gives way") == {
+        "name": "term", "size": "table_y", "meaning": "the table gives way", "link": "table", "action": "give",
+        "along": "Y", "varies_with": "y", "shape": "slope", "constants": {"start_mm": -110.0, "end_mm": 170.0},
+        "bounds_nm_per_N": [0.0, 500.0], "typical_nm_per_N": [1.0, 20.0],
+    }  # fmt: skip

@@ -20,8 +20,8 @@ from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.drawn import CONFIRMS, foretold
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.fits import held_out
 from toolpath_stiff.inference.judgement import judge
+from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.readings.measurements import reading_marks

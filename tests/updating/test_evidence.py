@@ -30,6 +30,7 @@ from tests.updating.cases import (
 from toolpath_stiff.inference.candidates import Table, candidates_of, tabulate
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Problem
 from toolpath_stiff.inference.hypotheses import probabilities, score_families, score_family
+from toolpath_stiff.inference.quadrature import score_single
 from toolpath_stiff.stiffness.catalogue import find_effect
 
 FloatArray = NDArray[np.float64]
@@ -129,7 +130,7 @@ def test_evidence_of_one_parameter_against_brute_force(joint, seed):
     observed = logs_by_hand(0.05, -0.05, joint) + scatter(seed)
     problem = by_hand(observed)
     table = table_of(problem, "joint_compliance")
-    score = problem.score_single(table, problem.score_base())
+    score = score_single(problem, table, problem.score_base())
     logs = problem.prior(table, 0).log_sizes[1.0]
     sizes = np.exp(np.linspace(logs[0], logs[-1], 160))
     each = np.array([brute_force(observed, np.full(COUNT, 0.5 * size)) for size in sizes])
@@ -166,7 +167,7 @@ def test_an_effect_more_never_fits_worse(seed, size):
     noise = scatter(seed) + size * np.random.default_rng(seed + 1).normal(size=COUNT)
     problem = by_hand(logs_by_hand() + noise)
     base = problem.score_base()
-    found = problem.score_single(table_of(problem, "joint_compliance"), base)
+    found = score_single(problem, table_of(problem, "joint_compliance"), base)
 
     def posterior(score) -> float:
         return score.log_likelihood - 0.5 * float(score.law @ score.law) / LAW_PRIOR**2
@@ -199,7 +200,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
         law = rng.normal(0.0, LAW_PRIOR, 2)
         for size, into in ((30e-9, inside), (8e-9, small)):
             problem = by_hand(logs_by_hand(*law, joint=size) + scatter(1000 + seed))
-            interval = problem.score_single(one_table(), problem.score_base()).interval
+            interval = score_single(problem, one_table(), problem.score_base()).interval
             assert interval is not None
             into.append(interval[0] <= size <= interval[1])
     assert 0.89 <= np.mean(inside) < 1.0  # all of 200 inside: once in 28,000 times
@@ -215,16 +216,16 @@ def one_table() -> Table:
 def test_a_wild_reading_hardly_moves_the_fit():
     observed = logs_by_hand(joint=30e-9) + scatter(7)
     calm = by_hand(observed, outliers=0.02)
-    before = calm.score_single(one_table(), calm.score_base())
+    before = score_single(calm, one_table(), calm.score_base())
     assert before.scatter.wild == ()
     observed[11] += 0.5
     after, naive = by_hand(observed, outliers=0.02), by_hand(observed)
-    robust = after.score_single(one_table(), after.score_base())
+    robust = score_single(after, one_table(), after.score_base())
     assert robust.scatter.wild == (11,)
     deviation = float(np.sqrt(robust.covariance[2, 2]))
     assert abs(robust.sizes[0][0] - before.sizes[0][0]) < 2.5 * deviation
     # Who takes it at its word is carried away.
-    carried = naive.score_single(one_table(), naive.score_base())
+    carried = score_single(naive, one_table(), naive.score_base())
     assert carried.log_likelihood < robust.log_likelihood - 50.0
 
 
@@ -269,7 +270,7 @@ def test_a_choice_of_six_costs_ln_6():
     family = score_family(problem, effect, base)
     assert family is not None and family.best is not None
     assert len(family.tables) == 6
-    each = [problem.score_single(table, base).log_evidence for table in family.tables]
+    each = [score_single(problem, table, base).log_evidence for table in family.tables]
     assert family.log_evidence == pytest.approx(float(logsumexp(each)) - np.log(6.0), abs=1e-9)
     assert family.log_evidence < family.best.log_evidence
 

@@ -12,6 +12,7 @@ from scipy.stats import binom, chi2, kstest
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, correlated_covariance, make_problem, simple_noise
+from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.gates import (
     DRAWS,
@@ -20,7 +21,6 @@ from toolpath_stiff.inference.gates import (
     Simulator,
     Structure,
     absolute_gate,
-    discrepancy_forms,
     largest_gain,
     set_wild_aside,
 )

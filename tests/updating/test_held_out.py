@@ -14,7 +14,8 @@ from tests.updating.cases import campaign, make_problem, simple_noise
 from toolpath_stiff.inference.candidates import candidates_of
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import fit_effects, gain_in_standard_errors, held_out, products_without
+from toolpath_stiff.inference.fits import fit_effects
+from toolpath_stiff.inference.left_out import gain_in_standard_errors, held_out, products_without
 from toolpath_stiff.inference.noise import Scatter
 from toolpath_stiff.stiffness.catalogue import find_effect
 

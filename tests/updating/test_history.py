@@ -180,8 +180,8 @@ def test_bench_records_to_a_history_and_back(tmp_path, monkeypatch, capsys):
     assert data.day.max() == DAYS.max() - DAYS.min() and any("neutral pose" in note for note in data.notes)
     Path("tip.csv").write_text("x_mm,y_mm,z_mm,direction,force_N,stiffness_N_per_mm\n0,0,800,X,1000,40000\n")
     both = read_measurements(["tip.csv", "bench_measurements.csv"], nist())
-    found = compare(nist(), both, noise=0.05, draws=20).document
-    (again,) = found["history"]["struts"][2]["changes"]
+    found = compare(nist(), both, noise=0.05, draws=20)
+    (again,) = found.document["history"]["struts"][2]["changes"]
     assert again["text"] == change["text"] and change["text"] in text(found)
     with pytest.raises(InputError, match="no reading of the tip"):
         tps.compare("nist", "bench_measurements.csv")

@@ -11,11 +11,11 @@ from scipy.stats import norm
 from tests.conftest import seeds
 from tests.updating.cases import campaign, predictor_for
 from toolpath_stiff.diagnosis.document import parameters
-from toolpath_stiff.inference.candidates import likely_interval
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.hypotheses import averaged_interval, score_family
 from toolpath_stiff.inference.noise import noise_models
+from toolpath_stiff.inference.size_priors import likely_interval
 from toolpath_stiff.stiffness.catalogue import find_effect
 
 

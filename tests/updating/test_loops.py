@@ -16,9 +16,9 @@ from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.planning.document import plan_csv, plan_rows, rows_of
 from toolpath_stiff.planning.next_visit import TABLES, Tables, Taken, conditioned, next_visit, tables_of
-from toolpath_stiff.planning.plan import plan
+from toolpath_stiff.planning.result import plan
+from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.readings.measurements import measured_path, model_stiffness, read_measurements
 from toolpath_stiff.report.compare.page import text
 from toolpath_stiff.rig.case import again, draw_case
@@ -231,7 +231,7 @@ def test_what_the_tip_cannot_tell_an_indicator_names(joints):
     alone = diagnose(nist(), read_measurements(joints[0], nist()), plan_next=False)
     assert alone.verdict == "adequate" and "joint_compliance" in alone.plausible
     found = diagnose(nist(), read_measurements(list(joints), nist()), plan_next=False)
-    assert (found.verdict, found.plausible) == ("identified", ("joint_compliance",))
+    assert (found.verdict, found.plausible) == ("identified", ["joint_compliance"])
     written = document(found)
     # Errors are those of the tip's readings; the loops stand beside them.
     assert written["readings"] == 42 == len(found.before)
@@ -241,7 +241,8 @@ def test_what_the_tip_cannot_tell_an_indicator_names(joints):
 
 def test_compare_shows_loops_in_a_section_of_their_own(joints):
     data = read_measurements(list(joints), nist())
-    found = compare(nist(), data, draws=200).document
+    comparison = compare(nist(), data, draws=200)
+    found = comparison.document
     alone = compare(nist(), read_measurements(joints[0], nist()), draws=200).document
     assert found["baseline"] == alone["baseline"] and alone["loops"] == {"by_loop": [], "readings": []}
     across = {one["loop"]: one for one in found["loops"]["by_loop"]}
@@ -249,7 +250,7 @@ def test_compare_shows_loops_in_a_section_of_their_own(joints):
     one = found["loops"]["readings"][0]
     assert one["read_nm_per_N"] == pytest.approx(1e9 * data.compliance[42], rel=1e-6)
     assert one["off_nm_per_N"] == pytest.approx(one["read_nm_per_N"] - one["model_nm_per_N"], abs=1e-6)
-    assert "indicators beside the tip" in text(found)
+    assert "indicators beside the tip" in text(comparison)
 
 
 def test_update_counts_errors_over_the_tip_as_compare_does(joints):
@@ -267,17 +268,17 @@ def test_update_counts_errors_over_the_tip_as_compare_does(joints):
 
 def test_a_plan_sets_an_indicator_where_the_tip_tells_less():
     found = plan(nist(), between=("joint_compliance", "none"), n=3, noise=0.02, indicators=True)
-    loops = {found.plan.visits.across(visit) for visit in found.plan.chosen}
+    loops = {found.choice.visits.across(visit) for visit in found.choice.chosen}
     # A size that is known to half of itself keeps any gap near two.
-    assert loops == {"joint 1"} and found.plan.pairs[0].gap > 2.0
-    rows = rows_of(found)
+    assert loops == {"joint 1"} and found.choice.pairs[0].separation_sigma > 2.0
+    rows = found.rows
     assert {row["loop"] for row in rows} == {"", "joint 1"}
     assert [row["direction"] for row in rows if row["clamp"] == 1 and row["loop"]] == [
         row["direction"] for row in rows if row["clamp"] == 1 and not row["loop"]
     ]
     without = plan(nist(), between=("joint_compliance", "none"), n=3, noise=0.02)
-    assert not any(without.plan.visits.across(visit) for visit in without.plan.chosen)
-    assert without.plan.pairs[0].gap < 0.7 * found.plan.pairs[0].gap
+    assert not any(without.choice.visits.across(visit) for visit in without.choice.chosen)
+    assert without.choice.pairs[0].separation_sigma < 0.7 * found.choice.pairs[0].separation_sigma
 
 
 # -- one pose after another --------------------------------------------------------------------------------------------
@@ -289,7 +290,7 @@ def step_by_step(tmp_path_factory):
     folder = tmp_path_factory.mktemp("next")
     found = plan(nist(), between=("spindle_compliance", "table_compliance", "none"), n=2, noise=0.02)
     (folder / TABLES).write_bytes(tables_of(found))
-    (folder / "plan.csv").write_text(plan_csv(rows_of(found)))
+    (folder / "plan.csv").write_text(plan_csv(found.rows))
     return found, folder
 
 
@@ -297,8 +298,8 @@ def test_readings_change_rivals_as_bayes_rule_says(step_by_step):
     """Against the dense formula: each rival's readings are normal with its own covariance."""
     found, folder = step_by_step
     tables = Tables.read(folder)
-    rows = np.concatenate([tables.visits.rows(v) for v in found.plan.chosen])
-    clamp = np.repeat(["1", "2"], [len(tables.visits.rows(v)) for v in found.plan.chosen])
+    rows = np.concatenate([tables.visits.rows(v) for v in found.choice.chosen])
+    clamp = np.repeat(["1", "2"], [len(tables.visits.rows(v)) for v in found.choice.chosen])
     truth = tables.forecasts[0]
     rng = np.random.default_rng(3)
     logs = truth.mean[rows] + 0.02 * rng.standard_normal(len(rows))

@@ -27,7 +27,7 @@ from toolpath_stiff.diagnosis import words as verdict_words
 from toolpath_stiff.diagnosis.document import document as diagnosis_document
 from toolpath_stiff.diagnosis.words import next_steps, verdict_text, why, words
 from toolpath_stiff.hints import Asked, parted
-from toolpath_stiff.inference.fits import raised_text, scatter_text
+from toolpath_stiff.inference.errors import raised_text, scatter_text
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.planning.rivals import errors_so_far, rivals_of
@@ -61,7 +61,7 @@ def compared(data: Measurements) -> Comparison:
 @cache
 def told(verdict: str) -> dict[str, Any]:
     """The document of a diagnosis."""
-    return diagnosis_document(replace(diagnosed(*CASES[verdict]), command="tps diagnose a.csv"))
+    return diagnosis_document(replace(diagnosed(*CASES[verdict]), line="tps diagnose a.csv"))
 
 
 def updated(data: Measurements, *names: str, **options: Any) -> dict[str, Any]:
@@ -95,7 +95,7 @@ def test_every_text_prints_these_two_errors():
     story = f"as given {found['baseline']['as_given'][MEAN]:.2f} %, strut law refitted {found['baseline'][MEAN]:.2f} %"
     last = f", with {diagnosis.best} {found['candidates'][0][MEAN]:.2f} %"
     texts = [
-        (compare_report.text(comparison.document), ""),
+        (compare_report.text(comparison), ""),
         (compare_html(comparison, dict.fromkeys(COMPARE_QUESTIONS, b"")), ""),
         (diagnose_report.text(found), last),
         (diagnose_html(found, {}), last),
@@ -170,7 +170,7 @@ def test_minus_is_softer_than_modelled_everywhere(factor, sign):
     signs += [np.mean([float(row["as_given_deviation_percent"]) for row in rows])]
     assert (np.sign(signs) == sign).all()
     side = "softer" if sign < 0 else "stiffer"
-    text = compare_report.text(found.document)
+    text = compare_report.text(found)
     assert f"{side} than modelled on balance" in text
     assert "too soft" not in text and "too stiff" not in text
 
@@ -179,7 +179,7 @@ def test_pages_say_which_sign_they_have():
     rule = "(measured - modelled) / modelled, minus: softer than modelled"
     found = compared(table_1())
     assert rule in compare_html(found, dict.fromkeys(COMPARE_QUESTIONS, b""))
-    assert rule in compare_report.text(found.document)
+    assert rule in compare_report.text(found)
     assert rule in diagnose_html(told("identified"), {"before_after.png": b""})
 
 

@@ -19,12 +19,12 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.planning.document import plan_document
 from toolpath_stiff.planning.gaps import ReadingNoise, expected_outcome, pair_shares
-from toolpath_stiff.planning.plan import Plan, plan_measurements, random_visits
+from toolpath_stiff.planning.plan import RivalPlan, plan_measurements, plan_text, random_visits
+from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.rivals import Forecast, Rival, forecast_all, joint_columns
 from toolpath_stiff.planning.visits import Costs, Matters, Menu, possible_visits
-from toolpath_stiff.report.measuring import text
+from toolpath_stiff.report.plan import text
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.nominal import reachable as rig_reachable
 
@@ -34,12 +34,12 @@ def menu(**changes) -> Menu:
 
 
 @cache
-def plan_for(truth: str, other: str, n: int = 6, noise=READING_SD, **changes) -> Plan:
+def plan_for(truth: str, other: str, n: int = 6, noise=READING_SD, **changes) -> RivalPlan:
     return plan_measurements(nist(), rivals(truth, other), noise, n, menu=menu(**changes))
 
 
 def best_gap(truth: str, other: str, **changes) -> float:
-    return plan_for(truth, other, 1, **changes).pairs[0].best_visit_gap
+    return plan_for(truth, other, 1, **changes).pairs[0].best_single_pose_sigma
 
 
 # -- the gap -----------------------------------------------------------------------------------------------------------
@@ -101,10 +101,10 @@ def test_a_difference_that_refitting_closes_is_no_gap():
     loose = np.eye(2) * 0.2**2
     pair = [Rival("one", (0.0, 0.0), (), loose), Rival("two", (0.1, 0.1), (), loose)]
     found = plan_measurements(nist(), pair, 1e-9, 6, menu=menu(), strut_spread=0.0)
-    assert found.pairs[0].gap <= np.hypot(0.1, 0.1) / (np.sqrt(2.0) * 0.2) * 1.01
+    assert found.pairs[0].separation_sigma <= np.hypot(0.1, 0.1) / (np.sqrt(2.0) * 0.2) * 1.01
     assert any("nobody measures better" in note for note in found.notes)
     known = [replace(r, covariance=None) for r in pair]
-    assert plan_measurements(nist(), known, 0.02, 6, menu=menu()).pairs[0].gap > 3.0
+    assert plan_measurements(nist(), known, 0.02, 6, menu=menu()).pairs[0].separation_sigma > 3.0
 
 
 @pytest.mark.parametrize("gap", [0.3, 1.0, 2.0])
@@ -154,7 +154,7 @@ def test_spindle_against_table_needs_tilt():
     upright = best_gap("spindle_compliance", "table_compliance", max_tilt=0.0)
     assert upright < 0.05
     found = plan_for("spindle_compliance", "table_compliance")
-    assert found.pairs[0].gap > 3.0
+    assert found.pairs[0].separation_sigma > 3.0
     assert all(found.visits.tilt(v) > np.radians(10.0) for v in found.chosen)
 
 
@@ -190,23 +190,22 @@ def test_riser_against_table_is_split_by_the_same_pose_without_the_riser():
 def test_a_constant_joint_compliance_is_never_told_from_the_struts_own(other):
     found = plan_for("joint_compliance", other)
     (pair,) = found.pairs
-    assert pair.gap < 1.0 and not pair.separable and not found.separable
-    assert "strut end" in pair.indicators["joints"]
+    assert pair.separation_sigma < 1.0 and not pair.separable and not found.separable
+    assert "strut end" in pair.indicator_across["joints"]
     assert found.after.truth < 0.8 and found.after.settled < 0.2
-    assert any("indicator" in line for line in plan_document(found)["text"])
+    assert any("indicator" in line for line in plan_text(found))
 
 
 def test_a_plan_that_gains_nothing_says_so_first() -> None:
     """Joints against the struts' own softness: a chance of about a half, before and after."""
     found = plan_for("joint_compliance", "none")
-    document = plan_document(found)
     first = "nothing worth measuring at the tip; an indicator across a joint would tell joint_compliance from none"
-    assert not document["worth_measuring"] and document["text"][0].startswith(first)
-    assert not any("is expected to rise" in line for line in document["text"])
-    whole = {**document, "kind": "rivals", "visits": []}
-    assert text(whole).startswith(first)
-    worth = plan_document(plan_for("spindle_compliance", "table_compliance"))
-    assert worth["worth_measuring"] and "is expected to rise" in worth["text"][0]
+    assert not found.gains and plan_text(found)[0].startswith(first)
+    assert not any("is expected to rise" in line for line in plan_text(found))
+    whole = Plan(nist(), None, found, Menu(), Costs(), 0.02, "", {}, (), (), 0)
+    assert text(whole).startswith(first) and not whole.to_dict()["worth_measuring"]
+    worth = plan_for("spindle_compliance", "table_compliance")
+    assert worth.gains and "is expected to rise" in plan_text(worth)[0]
 
 
 def test_a_plan_beats_visits_drawn_at_random():
@@ -239,7 +238,7 @@ def test_poses_are_tilted_no_further_and_lie_no_wider_than_allowed():
 def test_places_are_different_and_the_same_seed_gives_the_same_plan():
     first = plan_for("frame_compliance", "joint_moment_stiffness")
     again = plan_for.__wrapped__("frame_compliance", "joint_moment_stiffness")
-    assert first.chosen == again.chosen and plan_document(first) == plan_document(again)
+    assert first.chosen == again.chosen and plan_text(first) == plan_text(again) and first.pairs == again.pairs
     places = {(v.pose[k].tobytes(), v.extension[k], v.setup[k]) for v in [first.visits] for k in first.chosen}
     assert len(places) == len(first.chosen) == 6
 

@@ -18,8 +18,8 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.planning.campaign import Campaign, first_campaign
-from toolpath_stiff.planning.document import plan_csv, plan_rows
 from toolpath_stiff.planning.plan import plan_measurements
+from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.visits import Menu
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import exercise as rig

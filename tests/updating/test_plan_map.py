@@ -7,10 +7,10 @@ import pytest
 
 from tests.stiffness.cases import nist
 from tests.updating.planning import rivals, table_1_design
-from toolpath_stiff.planning.document import gap_map, top_pair
+from toolpath_stiff.planning.gap_map import gap_map, top_pair
 from toolpath_stiff.planning.plan import plan_measurements
 from toolpath_stiff.planning.visits import Menu
-from toolpath_stiff.report.measuring import plan_picture
+from toolpath_stiff.report.plan import plan_picture
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,8 @@ from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.correction.document import document
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.document import document as diagnosis_document
-from toolpath_stiff.inference.judgement import question
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.file import load_machine
 
 ASKED = "Are these readings of this machine?"
@@ -64,7 +64,7 @@ def test_few_readings_and_readings_that_should_be_alike_are_not_asked_about():
 def test_the_verdict_is_unexplained_and_the_question_is_put():
     some = np.r_[0:9, 21:30]
     found = examined(nist(), SHUFFLED.select(some), noise=0.10)
-    assert (found.verdict, found.plausible) == ("unexplained", ())
+    assert (found.verdict, found.plausible) == ("unexplained", [])
     written = diagnosis_document(found)
     assert written["question"].startswith(ASKED) and written["text"].startswith(ASKED)
     assert not any("tps update" in line for line in written["next"])

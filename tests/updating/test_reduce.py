@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.readings.loop_figures import reduce_loop
 from toolpath_stiff.readings.measurements import read_measurements
-from toolpath_stiff.readings.raw import reduce_loop
 from toolpath_stiff.readings.raw_records import COLUMNS, read_raw
 from toolpath_stiff.tables import parse_table
 

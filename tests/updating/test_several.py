@@ -9,10 +9,12 @@ from scipy.optimize import lsq_linear
 from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, make_problem, predictor_for, simple_noise
-from toolpath_stiff.inference.candidates import LIKELY, candidates_of
+from toolpath_stiff.inference.candidates import candidates_of
 from toolpath_stiff.inference.fits import fit_effects
-from toolpath_stiff.inference.hypotheses import MATTERS, Family, not_excluded, tables_of
+from toolpath_stiff.inference.hypotheses import Family, tables_of
 from toolpath_stiff.inference.several import LinearSearch, search_pairs, search_triples
+from toolpath_stiff.inference.size_priors import LIKELY
+from toolpath_stiff.inference.unexcluded import MATTERS, not_excluded
 from toolpath_stiff.stiffness.catalogue import find_effect
 
 NAMES = ("weak_strut", "table_compliance", "spindle_compliance", "frame_compliance", "thermal_drift", "gauge_scale")

@@ -17,8 +17,9 @@ from tests.conftest import seeds
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
 from toolpath_stiff.diagnosis.diagnose import common_verdict
+from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate
 from toolpath_stiff.inference.judgement import (
     FALSE_ALARM,
     NONE,
@@ -134,7 +135,7 @@ def test_residuals_of_the_other_sign_mean_something_else():
     problem = judged(7, "paper", "weak_strut", STRONG).problem
     mirrored = np.exp(2.0 * problem.predictor.log_stiffness() - problem.observed)
     found = examined(nist(), replace(data, stiffness=mirrored, sd=data.sd * mirrored / data.stiffness))
-    assert not (found.verdict == "identified" and found.plausible == ("weak_strut",))
+    assert not (found.verdict == "identified" and found.plausible == ["weak_strut"])
 
 
 @pytest.mark.parametrize("pair", ["weak_strut,spindle_compliance", "weak_strut,gauge_scale"])

@@ -2,13 +2,13 @@
 
 from typing import TYPE_CHECKING
 
+from toolpath_stiff.analysis.evaluation import Evaluation, evaluate
 from toolpath_stiff.analysis.loads import LOADS, Load, parse_load
-from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis.results import Analysis, analyze
 
-__all__ = ["LOADS", "Analysis", "Load", "PoseStiffness", "analyze", "evaluate", "parse_load"]
+__all__ = ["LOADS", "Analysis", "Evaluation", "Load", "analyze", "evaluate", "parse_load"]
 
 
 def __getattr__(name: str) -> object:

@@ -17,10 +17,9 @@ from functools import partial
 
 import numpy as np
 
-from toolpath_stiff import defaults
+from toolpath_stiff import defaults, rotations
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.rotations import rotation_matrices
 
 # Poses (n,) of all and, unless all directions are meant, unit vectors (k, 3) to stay across: to directions (k, 3).
 Softest = Callable[[BoolArray, FloatArray | None], FloatArray]
@@ -202,10 +201,7 @@ def along_tool_axis(tangent: FloatArray, abc: FloatArray) -> BoolArray:
     along = np.empty(len(tangent))
     for start in range(0, len(tangent), BLOCK):
         rows = slice(start, start + BLOCK)
-        if abc[rows, :2].any():
-            along[rows] = np.einsum("ni,ni->n", tangent[rows], rotation_matrices(abc[rows])[:, :, 2])
-        else:  # upright
-            along[rows] = tangent[rows, 2]
+        along[rows] = rotations.along_tool_axis(tangent[rows], abc[rows])
     return np.asarray(np.abs(along) >= np.cos(defaults.PLUNGE_ANGLE))
 
 

@@ -2,68 +2,91 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.loads import RULES, Load, parse_load
-from toolpath_stiff.analysis.poses import PoseStiffness, Progress, evaluate
+from toolpath_stiff.analysis.document import (
+    compare_summaries,
+    idle_on,
+    required_stiffness_missed,
+    summarise,
+    without_nan,
+    words_turn_the_platform,
+)
+from toolpath_stiff.analysis.evaluation import Evaluation, Progress, evaluate
+from toolpath_stiff.analysis.loads import Load, parse_load
 from toolpath_stiff.analysis.statistics import (
     EvaluatedPath,
-    ParameterBand,
-    band_figures,
-    describe_sample,
-    parameter_band,
-    path_length,
-    per_operation,
-    per_tool,
-    samples_frame,
-    share,
+    sample_columns,
 )
-from toolpath_stiff.arrays import IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError, UnreachableError
+from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
+from toolpath_stiff.nc.moves import Moves, Program
 from toolpath_stiff.path import Samples, place, sample_moves
+from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.model import (
     StiffnessModel,
-    acting_effects,
     build_model,
     condition_warnings,
-    conditions_stated,
-    effects_stated,
 )
-from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Analysis(EvaluatedPath):
-    """A program evaluated on a machine: the evaluated path, and what it was asked.
+@dataclass(frozen=True, repr=False, eq=False)
+class Analysis(EvaluatedPath, FolderResult):
+    r"""Stiffness along the path of a program, under a load at every sample of a cut.
 
     Attributes
     ----------
-    model
-        The machine with its effects.
-    origin, origin_source
-        Where program zero sits (m, rad) and who said so: "option", "program" or "default".
-    step
-        Distance of the samples in m.
-    warnings
-        What deserves a look, plain sentences, the program's own included.
+    required
+        Stiffness that every cut must have, N/m; None: none.
+    on_other
+        The same on the machine compared with; None without one.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> found = tps.analyze("nist", slot, origin_mm_deg=(0, 0, 800), require_N_per_mm=54000)
+    >>> [round(one) for one in (found.mean_N_per_mm, found.min_N_per_mm, found.range_N_per_mm)]
+    [54353, 53875, 948]
+    >>> found.weakest["line"], found.weakest["text"]
+    (4, 'G1 X40')
+    >>> [(line, round(stiffness)) for line, stiffness in found.below_required]
+    [(4, 53875)]
+    >>> found.complete, found.warnings, len(found.assumptions) > 0
+    (True, [], True)
+    >>> found.deviation_N_per_mm is None  # the figures of this machine are stated without standard deviations
+    True
+    >>> len(found.to_frame()), len(found.to_dict()["weakest_places"])
+    (53, 1)
+    >>> [type(picture()).__name__ for picture in (found.plot, found.plot_profile)]
+    ['Figure', 'Figure']
     """
 
-    model: StiffnessModel
-    origin: Pose
-    origin_source: str
-    step: float
-    warnings: tuple[str, ...]
+    command: ClassVar[str] = "analyze"
+    shown_by: ClassVar[str] = "analysis.summary"
+
+    required: float | None = None
+    on_other: Analysis | None = None
+    inputs: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> EvaluatedPath:
+        """The samples and what was found at each, as arrays in SI."""
+        return self
 
     @property
     def moves(self) -> Moves:
@@ -71,22 +94,94 @@ class Analysis(EvaluatedPath):
         return place(self.program.moves, self.origin)
 
     @property
-    def machine(self) -> Machine:
-        """The machine, geometry effects included."""
-        return self.model.machine
+    def assumptions(self) -> list[str]:
+        """What was assumed or recovered rather than published or given, plain sentences."""
+        return list(self.to_dict()["assumptions"])
 
-    @cached_property
-    def parameter_band(self) -> ParameterBand | None:
-        """What the uncertainty of the machine's fitted parameters does to the stiffness; None if none is known."""
-        return parameter_band(self, self.model)
+    @property
+    def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
+        """Mean stiffness over the length of the cuts, plunges along the tool axis left out; nan without any."""
+        return _number(self.figures["mean_N_per_mm"])
+
+    @property
+    def min_N_per_mm(self) -> float:  # noqa: N802
+        """The smallest stiffness of these cuts."""
+        return _number(self.figures["min_N_per_mm"])
+
+    @property
+    def range_N_per_mm(self) -> float:  # noqa: N802
+        """The largest less the smallest."""
+        return _number(self.figures["range_N_per_mm"])
+
+    @property
+    def weakest(self) -> dict[str, Any]:
+        """Where the smallest stiffness is: line, position, direction."""
+        return dict(self.figures["weakest"])
+
+    @property
+    def complete(self) -> bool:
+        """Whether every sample of a cut is within reach."""
+        return not self.out_of_reach.any()
+
+    @property
+    def below_required(self) -> list[tuple[int, float]]:
+        """(line, smallest stiffness in N/mm) of cuts below what was required, weakest first."""
+        return [] if self.required is None else required_stiffness_missed(self, self.required)
+
+    @property
+    def deviation_N_per_mm(self) -> FloatArray | None:  # noqa: N802
+        """(n,) standard deviation of each sample's stiffness from the fitted parameters; None where none is stated."""
+        return None if self.parameter_band is None else n_per_mm_from_n_per_m(self.parameter_band.deviation)
 
     def to_frame(self) -> pd.DataFrame:
         """The samples as a pandas DataFrame, columns as in `samples.csv` (mm, degrees, N/mm)."""
-        return samples_frame(self)
+        import pandas as pd
 
-    def summary(self) -> dict[str, object]:
-        """The figures of `summary.json`."""
-        return summarise(self)
+        return pd.DataFrame(sample_columns(self))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document of `summary.json`."""
+        return self._document
+
+    @cached_property
+    def _document(self) -> dict[str, Any]:
+        summary = summarise(self)
+        if self.required is not None:
+            summary["required"] = {
+                "required_N_per_mm": n_per_mm_from_n_per_m(self.required),
+                "below": [{"line": line, "min_N_per_mm": lowest} for line, lowest in self.below_required],
+            }
+        if self.on_other is not None:
+            other = self.on_other.to_dict()
+            summary["compare"] = compare_summaries(summary, other)
+            summary["warnings"] = [*self.warnings, *idle_on(other)]
+        finite: dict[str, Any] = without_nan(summary)
+        return finite
+
+    def _short(self) -> str:
+        mean, low = (self.view.number(self.to_dict()[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))
+        return f"{self.program.name} on {self.machine.name}, mean {mean} N/mm, min {low} N/mm"
+
+    def plot(self, *, show_plunges: bool = False) -> Figure:
+        """The path in three views, coloured by stiffness; with `show_plunges` these set axes and colours too."""
+        figure: Figure = self.view.path_picture.figure(self, show_plunges=show_plunges)
+        return figure
+
+    def plot_profile(self, *, show_plunges: bool = False) -> Figure:
+        """Stiffness along the path."""
+        figure: Figure = self.view.profile_picture.figure(self, show_plunges=show_plunges)
+        return figure
+
+    def files(
+        self, *, plots: bool = True, table: str = "csv", show_plunges: bool = False
+    ) -> Mapping[str, Callable[[], Content]]:
+        """The files of `tps analyze`; samples as "csv" or "parquet"."""
+        files: Mapping[str, Callable[[], Content]] = self.view.files(self, plots, table, show_plunges)
+        return files
+
+
+def _number(figure: float | None) -> float:
+    return float("nan") if figure is None else figure
 
 
 def analyze(
@@ -130,10 +225,10 @@ def analyze(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.machine.file import load_machine
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc")
-    >>> round(analyze(load_machine("nist"), slot, origin=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0)).summary()["mean_N_per_mm"])
+    >>> round(analyze(load_machine("nist"), slot, origin=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0)).mean_N_per_mm)
     54353
     """
     model = machine if isinstance(machine, StiffnessModel) else build_model(machine)
@@ -144,7 +239,7 @@ def analyze(
         model, samples.position, samples.abc, samples.tangent, samples.tool_length, direction, force, progress
     )
     tool_given = not np.isnan(samples.tool_length[samples.cutting]).any()
-    warnings = (*program.warnings, *condition_warnings(model, tool_given), *_warnings(samples, at))
+    warnings = [*program.warnings, *condition_warnings(model, tool_given), *_warnings(samples, at)]
     analysis = Analysis(
         program=program, model=model, origin=place_at, origin_source=source, load=direction, force=force, step=step,
         samples=samples, at=at, warnings=warnings,
@@ -170,7 +265,7 @@ def _effective_origin(machine: Machine, program: Program, origin: Pose | None) -
     return chosen, source
 
 
-def _warnings(samples: Samples, at: PoseStiffness) -> list[str]:
+def _warnings(samples: Samples, at: Evaluation) -> list[str]:
     """What the evaluation itself has to say."""
     found = []
     rapids = ~samples.cutting & ~at.reachable
@@ -219,7 +314,7 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     hint = f"place the work elsewhere with {both_names('--origin')}, or keep the reachable part with --partial"
     if partial:
         hint = f"place the work elsewhere with {both_names('--origin')}"
-    if _words_turn_the_platform(analysis.program):
+    if words_turn_the_platform(analysis.program):
         hint += "; if the program was posted for another machine, name it with [kinematics] in a controller file"
     raise UnreachableError(
         f"{int(bad.sum())} of {int(samples.cutting.sum())} cutting samples are out of reach, first "
@@ -228,116 +323,3 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
         file=analysis.program.name,
         line=int(samples.line[first]),
     )
-
-
-def _words_turn_the_platform(program: Program) -> bool:
-    """Whether rotary words were taken for the platform's own angles."""
-    own = not program.kinematics and program.dialect != CUTTER_LOCATION
-    return own and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
-
-
-def assumptions(analysis: Analysis) -> list[str]:
-    """Everything that was assumed or recovered rather than published or given; plain sentences."""
-    machine = analysis.machine
-    found = list(analysis.program.assumptions)
-    if _words_turn_the_platform(analysis.program):
-        found.append(
-            "A, B, C of the program are roll, pitch, yaw of the platform (see [kinematics] of controller files)"
-        )
-    x, y, z, *angles = analysis.origin
-    where = f"X{mm_from_m(x):g} Y{mm_from_m(y):g} Z{mm_from_m(z):g}" + (
-        " A{:g} B{:g} C{:g}".format(*(deg_from_rad(v) for v in angles)) if any(angles) else ""
-    )
-    if analysis.origin_source == "default":
-        found.append(
-            f"program zero (G54) sits at {where} in machine coordinates, the machine's default; "
-            f"{both_names('--origin')} puts it elsewhere"
-        )
-    for quantity, origin in machine.origins.items():
-        if origin != "published":
-            remark = machine.remarks.get(quantity)
-            found.append(f"machine {machine.name}: {quantity} {origin}" + (f": {remark}" if remark else ""))
-    feed = mm_per_min_from_m_per_s(machine.rapid_feed)
-    found.append(f"rapid moves take {feed:g} mm/min (time only)")
-    found.append(f"load {analysis.load}: {RULES[analysis.load.kind]}")
-    found += conditions_stated(analysis.model)
-    acting = acting_effects(analysis.model)
-    load_dependent = any(active.effect.load_dependent for active in acting)
-    secant = "; the stiffness is the secant one at this load" if load_dependent else ""
-    found.append(f"a force of {analysis.force:g} N for deflections{secant}")
-    law = machine.strut_law
-    found.append(
-        "the stiffness of a strut is the same at every length"
-        if law.constant
-        else f"the strut law is extrapolated outside {mm_from_m(min(law.length_1, law.length_2)):.1f} to "
-        f"{mm_from_m(max(law.length_1, law.length_2)):.1f} mm of strut length"
-    )
-    if analysis.parameter_band is not None:
-        found.append(
-            "the band of the stiffness holds the uncertainty of the fitted parameters alone, propagated linearly: "
-            f"{', '.join(analysis.parameter_band.names)}"
-        )
-    if not acting:
-        found.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
-    return found
-
-
-def summarise(analysis: Analysis) -> dict[str, Any]:
-    """The figures of `summary.json`, in the shop's units."""
-    samples = analysis.samples
-    places = analysis.weakest
-    cutting = samples.cutting & analysis.at.reachable
-    x, y, z, a, b, c = analysis.origin
-    nearest = int(np.argmin(np.where(cutting, analysis.at.margin, np.inf)))
-    band = None if analysis.parameter_band is None else band_figures(analysis, analysis.parameter_band)
-    return {
-        "program": analysis.program.name,
-        "interpreter": analysis.program.interpreter,
-        "kinematics": analysis.program.kinematics,
-        "machine": analysis.machine.name,
-        "load": str(analysis.load),
-        "force_N": analysis.force,
-        "step_mm": mm_from_m(analysis.step),
-        "origin_mm_deg": [mm_from_m(x), mm_from_m(y), mm_from_m(z), *(deg_from_rad(v) for v in (a, b, c))],
-        "origin_source": analysis.origin_source,
-        "samples": len(samples),
-        "cutting_length_mm": mm_from_m(path_length(samples, rapid=False)),
-        "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
-        "time_s": float(samples.t[-1]) if len(samples) else 0.0,
-        **analysis.figures,
-        **({} if band is None else {"parameter_uncertainty": band}),
-        "weakest_places": [describe_sample(analysis, row) for row in places],
-        "per_tool": per_tool(analysis),
-        "per_operation": per_operation(analysis),
-        "min_margin": float(analysis.at.margin[nearest]),
-        "min_margin_limit": analysis.at.reach.describe(nearest),
-        "min_margin_line": int(samples.line[nearest]),
-        "out_of_reach_samples": int(analysis.out_of_reach.sum()),
-        "extrapolated_share": share(analysis.at.extrapolated, cutting),
-        **effects_stated(analysis.model),
-        "unsupported": [
-            {"line": u.line, "column": u.column, "word": u.word, "reason": u.reason}
-            for u in analysis.program.unsupported
-        ],
-        "assumptions": assumptions(analysis),
-        "warnings": list(analysis.warnings),
-        "version": defaults.VERSION,
-    }
-
-
-def required_stiffness_missed(analysis: Analysis, required: float) -> list[tuple[int, float]]:
-    """(line, smallest stiffness in N/mm) of cutting moves that are not known to have `required` N/m, weakest first.
-
-    What has no stiffness does not have the required one: nan, before all others, for lines that are out of reach in
-    part (`partial`), and for all cutting lines where no sample counts at all.
-    """
-    samples, counted = analysis.samples, analysis.counted
-    asked = samples.cutting & ((samples.weight > 0.0) | (not counted.any()))
-    stiffness = np.where(counted, analysis.at.stiffness, np.nan)[asked]
-    lines, index = np.unique(samples.line[asked], return_inverse=True)
-    lowest = np.full(len(lines), np.inf)
-    with np.errstate(invalid="ignore"):
-        np.minimum.at(lowest, index, stiffness)
-    missed = np.flatnonzero(~(lowest >= required))
-    order = missed[np.argsort(np.nan_to_num(lowest[missed], nan=-np.inf), kind="stable")]
-    return [(int(lines[i]), n_per_mm_from_n_per_m(float(lowest[i]))) for i in order]

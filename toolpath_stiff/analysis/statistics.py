@@ -11,25 +11,22 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from toolpath_stiff import defaults
+from toolpath_stiff.analysis.evaluation import Evaluation, evaluate
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, follows_motion, headline_of, headline_words
-from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import RAPID, Program
 from toolpath_stiff.nc.operations import Operations, operations
 from toolpath_stiff.path import PATH_COLUMNS, Samples, path_columns
 from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
-
-if TYPE_CHECKING:
-    import pandas as pd
-
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
 # Of `samples.csv`, Parquet and the DataFrame, with their decimals.
@@ -48,7 +45,7 @@ FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Dat
 STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class EvaluatedPath:
     """A program's samples and what the machine does at each: what statistics and tables are made from.
 
@@ -62,13 +59,36 @@ class EvaluatedPath:
         The path in machine coordinates.
     at
         Stiffness, struts, reach at every sample.
+    model
+        The machine with its effects.
+    origin, origin_source
+        Where program zero sits (m, rad) and who said so: "option", "program" or "default".
+    step
+        Largest distance of two samples in m.
+    warnings
+        What deserves a look, plain sentences, the program's own included.
     """
 
     program: Program
     load: Load
     force: float
     samples: Samples
-    at: PoseStiffness
+    at: Evaluation
+    model: StiffnessModel
+    origin: Pose
+    origin_source: str
+    step: float
+    warnings: list[str]
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, geometry effects included."""
+        return self.model.machine
+
+    @cached_property
+    def parameter_band(self) -> ParameterBand | None:
+        """What the uncertainty of the machine's fitted parameters does to the stiffness; None if none is known."""
+        return parameter_band(self, self.model)
 
     @cached_property
     def counted(self) -> BoolArray:
@@ -101,7 +121,7 @@ class EvaluatedPath:
         return class_figures(self, np.arange(len(self.samples)))
 
     @cached_property
-    def weakest(self) -> list[int]:
+    def weakest_rows(self) -> list[int]:
         """The rows of `weakest_places`."""
         return weakest_places(self)
 
@@ -120,11 +140,6 @@ class EvaluatedPath:
         if not about.any():
             about, weight = self.samples.cutting & self.at.reachable, np.ones(len(weight))
         return self.at.stiffness[about], weight[about]
-
-    @property
-    def deflection(self) -> FloatArray:
-        """(n,) m, the tip's deflection along the load under `force`."""
-        return np.asarray(self.force / self.at.stiffness)
 
     @property
     def out_of_reach(self) -> BoolArray:
@@ -468,13 +483,6 @@ def _cut(path: EvaluatedPath, rows: slice) -> TextArray:
     """(n,) "across" or "plunge", whatever the load; "" on rapids and where the tip does not move."""
     moving = (path.samples.motion[rows] != RAPID) & path.samples.tangent[rows].any(axis=1)
     return np.where(moving, np.where(path.along_axis[rows], "plunge", "across"), "")
-
-
-def samples_frame(path: EvaluatedPath) -> pd.DataFrame:
-    """The samples as a DataFrame, full precision."""
-    import pandas as pd
-
-    return pd.DataFrame(sample_columns(path))
 
 
 def samples_csv(path: EvaluatedPath) -> Iterator[bytes]:

@@ -80,7 +80,7 @@ class Preview:
         """
         import numpy as np
 
-        from toolpath_stiff.inference.fits import deviation_percent, error_figures
+        from toolpath_stiff.inference.errors import deviation_percent, error_figures
         from toolpath_stiff.units import n_per_mm_from_n_per_m
 
         fit = self._hand.fit(_entries(effects or {}), strut_law, None if near is None else self._fit_near(near))

@@ -2,75 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.api.inputs import Program, Step, pose_si, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.options import checked
-from toolpath_stiff.results import FolderResult
 from toolpath_stiff.units import m_from_mm
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from toolpath_stiff.placement.case_study import CaseStudy as Study
-    from toolpath_stiff.placement.case_study import Region
-
-
-class CaseStudy(FolderResult):
-    r"""One tool path in several regions: the paper's conclusions checked one by one, and where they stop holding.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> study = tps.case_study("nist", slot, {"low": (0, 0, 500), "high": (0, 0, 900)}, step_mm=10)
-    >>> study.to_frame()[["region", "z_mm"]].values.tolist()
-    [['low', 500.0], ['high', 900.0]]
-    """
-
-    command: ClassVar[str] = "case-study"
-
-    def __init__(self, study: Study, inputs: tuple[str, ...]) -> None:
-        self.study, self.inputs = study, inputs
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self.study.summary
-
-    def to_frame(self) -> pd.DataFrame:
-        """The regions, one a row."""
-        import pandas as pd
-
-        return pd.DataFrame(self.study.summary["regions"])
-
-    def plot(self) -> Figure:
-        """The path in its regions, coloured by stiffness."""
-        from toolpath_stiff.report.case_study import regions_picture
-
-        return regions_picture.figure(self.study)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.placement.case_study import study_text
-
-        return study_text(self.study)
-
-    def _short(self) -> str:
-        held = [one["holds"] for one in self.study.summary["conclusions"] if one["holds"] is not None]
-        on = f"{self.study.summary['program']} on " if self.study.is_own else ""
-        verb = "conclusion of the paper holds" if len(held) == 1 else "conclusions of the paper hold"
-        return f"{on}{self.study.summary['machine']}, {sum(held)} of {len(held)} {verb}"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content of each file that `save` writes."""
-        from toolpath_stiff.report.case_study import files
-
-        return files(self.study, plots=plots)
+    from toolpath_stiff.placement.case_study import CaseStudy, Region
 
 
 @checked
@@ -120,8 +63,7 @@ def case_study(
     step = m_from_mm(step_mm)
     read = None if part is None else lambda origin: part.moves(origin, default)
     where, files = _regions(regions)
-    study = run_case_study(model, step, read, where)
-    return CaseStudy(study, (*(part.inputs if part else ()), *files, *on.inputs))
+    return run_case_study(model, step, read, where, (*(part.inputs if part else ()), *files, *on.inputs))
 
 
 def _regions(

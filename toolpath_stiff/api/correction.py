@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from toolpath_stiff.api.diagnosis import Data, Diagnosis, NoisePercent, Question, Seed, StrutSpread
+from toolpath_stiff.api.diagnosis import Data, NoisePercent, Question, Seed, StrutSpread
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import options
 from toolpath_stiff.options import Option, checked, distinct_numbers, finite_number, names
-from toolpath_stiff.results import FolderResult, Progress, Result, machine_by_name, one_of, teller
+from toolpath_stiff.results import FolderResult, Progress, machine_by_name, one_of, teller
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
@@ -21,153 +22,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.correction.update import Correction
-    from toolpath_stiff.planning.plan import Proposal
-    from toolpath_stiff.readings.raw import Reduction as Reduced
+    from toolpath_stiff.diagnosis.result import Diagnosis
+    from toolpath_stiff.planning.result import Plan
 
 COSTS = ("reading", "pose", "tool", "setup", "indicator")
-
-
-class Reduction(Result):
-    """Raw records of force and displacement as measured stiffnesses, and what each loop says of play and friction.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> rows = ["x_mm,y_mm,z_mm,direction,jog_um,force_N,displacement_um"]
-    >>> rows += [f"0,0,800,X,{jog},{40 * jog},{0.2 * jog}" for jog in (0, 200, -200, 0)]
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder, "raw.csv")
-    ...     _ = file.write_text(chr(10).join(rows))
-    ...     found = tps.reduce(file)
-    ...     names = [one.name for one in found.save(pathlib.Path(folder, "measurements.csv"), plots=False)]
-    >>> names == [one.name for one in found.files("measurements.csv", plots=False)]
-    True
-    >>> found.to_dict()["loops"][0]["stiffness_N_per_mm"], found.notes
-    (50000.0, [])
-    >>> type(found.plot()).__name__
-    'Figure'
-    """
-
-    command: ClassVar[str] = "reduce"
-
-    def __init__(self, reduced: Reduced, raw: Sequence[str]) -> None:
-        self.reduced, self.raw = reduced, tuple(raw)
-
-    @property
-    def notes(self) -> list[str]:
-        """What was assumed in reading the table."""
-        return list(self.reduced.notes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """One entry a loop, under "loops"; struts measured alone over their dates, under "history"."""
-        from toolpath_stiff.readings.raw import document
-
-        return {"loops": document(self.reduced), "history": dict(self.reduced.history)}
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a loop."""
-        import pandas as pd
-
-        return pd.DataFrame(self.to_dict()["loops"])
-
-    def plot(self) -> Figure:
-        """Force against deflection of each loop; without records the struts over their dates."""
-        from toolpath_stiff.report.history import dated, history_png
-        from toolpath_stiff.report.measuring import loops_png, recorded
-
-        loops, figures = recorded(self.reduced)
-        if loops:
-            return loops_png.figure(loops, figures, self._title)
-        if not dated(self.reduced.history):
-            raise InputError("nothing to draw: neither records nor several dates")
-        return history_png.figure(self.reduced.history)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.history import history_text
-        from toolpath_stiff.report.measuring import loops_text
-
-        pairs = zip(self.to_dict()["loops"], self.reduced.loops, strict=True)
-        recorded = [entry for entry, loop in pairs if len(loop.force)]
-        if not recorded:  # a table of stiffnesses has nothing to say of its rows that they do not say themselves
-            return "\n".join(history_text(self.reduced.history, undated=True)).lstrip("\n")
-        return "\n".join([loops_text(recorded), *history_text(self.reduced.history)])
-
-    @property
-    def _title(self) -> str:
-        """The first file, and how many others there are."""
-        name, others = Path(self.raw[0]).name, len(self.raw) - 1
-        return f"{name} and {others} more" if others else name
-
-    def _short(self) -> str:
-        from toolpath_stiff.report.words import counted
-
-        return f"{self._title}, {counted(len(self.reduced.loops), 'loop')}"
-
-    def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
-        """The measurement file; beside it the picture of the loops, and of dated struts that over their dates."""
-        from toolpath_stiff.report.measuring import loop_files
-
-        return loop_files(self.reduced, Path(file), self._title, plots=plots)
-
-    def save(self, file: str | Path, *, plots: bool = True) -> list[Path]:
-        """Write the measurement file and, beside it, the picture of the loops."""
-        from toolpath_stiff.files import write_atomically
-
-        return [write_atomically(name, content) for name, content in self.files(file, plots=plots).items()]
-
-
-def reduce(
-    *raw: str | Path,
-    date_order: Annotated[str | None, Option("--date-order", "ORDER")] = None,
-    units: Annotated[str | None, Option("--units", "UNITS")] = None,
-    compression_positive: Annotated[bool, Option("--compression-positive")] = False,
-) -> Reduction:
-    """Raw records of force and displacement to measured stiffnesses: the secant of each loop (the paper's equation 12).
-
-    Parameters
-    ----------
-    raw
-        Files and folders of them: text, JSON, or FILE.xlsx[#SHEET]. Of struts on a bench also tables of their
-        stiffnesses.
-    date_order
-        "dmy" or "mdy", where dates as 04/03/2021 can be read in two ways; None: as the other dates of the set show.
-    units
-        Of headings that state none: "N,um" of force and displacement, "N/um" of a stiffness.
-    compression_positive
-        Whether the forces of struts on a bench count compression positive, where no head says so.
-
-    Raises
-    ------
-    InputError, InputErrors
-        No file, or one that cannot be read or lacks columns; every record and every loop that gives no stiffness.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> rows = ["x_mm,y_mm,z_mm,direction,jog_um,force_N,displacement_um"]
-    >>> rows += [f"0,0,800,X,{jog},{40 * jog},{0.2 * jog}" for jog in (0, 200, -200, 0)]
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder, "raw.csv")
-    ...     _ = file.write_text(chr(10).join(rows))
-    ...     found = tps.reduce(file)
-    >>> found.to_frame()["stiffness_N_per_mm"].tolist()
-    [50000.0]
-    """
-    from toolpath_stiff.readings.dates import order_of
-    from toolpath_stiff.readings.raw import reduce as reduce_records
-    from toolpath_stiff.readings.raw import units_of
-
-    if not raw:
-        raise InputError("no raw records", expected="a file or several")
-    found = reduce_records(
-        *raw,
-        date_order=order_of(date_order),
-        units=units_of(units) if units else {},
-        compression=compression_positive,
-    )
-    return Reduction(found, [str(one) for one in raw])
 
 
 class Update(FolderResult):
@@ -298,6 +156,7 @@ def update(
     force: Annotated[bool, Option("--force")] = False,
     objective: Annotated[str, Option("--objective", choices=("likelihood", "mean-error"))] = "likelihood",
     machine_file: str | Path = "machine.toml",
+    columns: Mapped = None,
     noise_percent: NoisePercent = None,
     strut_spread_percent: StrutSpread = 1.0,
     seed: Seed = 0,
@@ -324,6 +183,8 @@ def update(
         Mean-error: the strut law alone, as the paper fitted it.
     machine_file
         Name that the new machine file is to have, for the record.
+    columns
+        As of `compare`.
     noise_percent, strut_spread_percent, seed
         As of `compare`.
     progress
@@ -343,7 +204,7 @@ def update(
     """
     from toolpath_stiff.correction.update import update as update_machine
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     found = update_machine(
         asked.model,
         asked.readings,
@@ -362,58 +223,6 @@ def update(
     return Update(found, asked)
 
 
-class Plan(FolderResult):
-    """What to measure next, or first, and what that is expected to show.
-
-    Attributes
-    ----------
-    proposal
-        Visits, rivals and costs, with arrays in SI.
-    """
-
-    command: ClassVar[str] = "plan"
-
-    def __init__(self, proposal: Proposal, asked: Question, line: str) -> None:
-        from toolpath_stiff.planning.document import document
-
-        self.proposal, self.inputs = proposal, asked.inputs
-        self._document = document(proposal, line)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of plan.json."""
-        return dict(self._document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a reading, as in `plan.csv`: a measurement file with the stiffness left empty."""
-        import pandas as pd
-
-        from toolpath_stiff.planning.document import rows_of
-
-        return pd.DataFrame(rows_of(self.proposal))
-
-    def plot(self) -> Figure:
-        """The visits in the workspace."""
-        from toolpath_stiff.report.measuring import picture_arguments, plan_picture
-
-        return plan_picture.figure(*picture_arguments(self.proposal))
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.measuring import text
-
-        return text(self._document)
-
-    def _short(self) -> str:
-        from toolpath_stiff.report.words import counted
-
-        return f"{self._document['kind']}, {counted(len(self._document['visits']), 'clamping')}"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps plan`."""
-        from toolpath_stiff.report.measuring import files
-
-        return files(self.proposal, self._document, plots=plots)
-
-
 @machine_by_name
 @checked
 def plan(
@@ -430,6 +239,7 @@ def plan(
     setups: Annotated[Sequence[str] | None, Option("--setups", "NAME,...", read=names)] = None,
     indicators: Annotated[bool, Option("--indicators")] = False,
     minutes: Annotated[Mapping[str, float] | None, Option("--cost", "WHAT=MINUTES", read=_cost, count="append")] = None,
+    columns: Mapped = None,
     noise_percent: NoisePercent = None,
     strut_spread_percent: StrutSpread = 1.0,
     seed: Seed = 0,
@@ -462,6 +272,8 @@ def plan(
     minutes
         What work costs: of a "reading" (1), a "pose" (15), another "tool" (10), another "setup" (45), a second
         "indicator" (10).
+    columns
+        As of `compare`.
     noise_percent, strut_spread_percent, seed
         As of `compare`.
     diagnosis
@@ -483,10 +295,10 @@ def plan(
     >>> list(found.files(plots=False))
     ['plan.csv', 'plan.json', 'plan_tables.npz']
     """
-    from toolpath_stiff.planning.plan import plan as plan_visits
+    from toolpath_stiff.planning.result import plan as plan_visits
     from toolpath_stiff.planning.visits import Costs
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     costs = _costs(minutes or {})
     own = _own_words(
         between=between or None,
@@ -501,7 +313,7 @@ def plan(
         seed=seed or None,
     )
     own += ["--indicators"] if indicators else []
-    found = plan_visits(
+    return plan_visits(
         asked.model,
         None if asked.data is None else asked.readings,
         between=tuple(between),
@@ -514,11 +326,12 @@ def plan(
         setups=setups,
         indicators=indicators,
         costs=Costs(**costs),
-        judgement=None if diagnosis is None else diagnosis.diagnosed.main,
-        files=asked.files,
+        judgement=None if diagnosis is None else diagnosis.main,
+        names=asked.files,
+        line=asked.asked.command("plan", *own),
+        inputs=asked.inputs,
         **asked.common,
     )
-    return Plan(found, asked, asked.asked.command("plan", *own))
 
 
 def _cost(text: str) -> tuple[str, float]:

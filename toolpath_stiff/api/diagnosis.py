@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 from toolpath_stiff.api.inputs import Origin, Program, origin_si, origin_word, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import Asked, options
 from toolpath_stiff.options import Option, checked, numbers
-from toolpath_stiff.results import FolderResult, Progress, machine_by_name, teller
+from toolpath_stiff.results import Progress, machine_by_name, teller
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
-    from toolpath_stiff.comparison.compare import Comparison as Compared
-    from toolpath_stiff.diagnosis.diagnose import Diagnosis as Diagnosed
+    from toolpath_stiff.comparison.compare import Comparison
+    from toolpath_stiff.diagnosis.result import Diagnosis
     from toolpath_stiff.machine.model import Machine as MachineModel
     from toolpath_stiff.nc.moves import Program as NcProgram
     from toolpath_stiff.readings.measurements import Measurements as Readings
@@ -40,6 +40,8 @@ class Measurements:
     ----------
     files
         Their names: CSV, "FILE.xlsx#SHEET", or "nist-table1", the paper's Table 1.
+    columns
+        Which columns they call otherwise, as --columns has it; None: as FILE.columns.toml beside a file says.
 
     Examples
     --------
@@ -49,13 +51,20 @@ class Measurements:
     42
     """
 
-    def __init__(self, files: Sequence[str]) -> None:
-        self.files = tuple(files)
+    def __init__(self, files: Sequence[str], columns: Mapped = None) -> None:
+        self.files, self.columns = tuple(files), columns_text(columns)
         self._last: tuple[MachineModel, Readings] | None = None
 
     @classmethod
-    def read(cls, *files: str | Path) -> Measurements:
+    def read(cls, *files: str | Path, columns: Mapped = None) -> Measurements:
         """Measurement files, several as one set of readings.
+
+        Parameters
+        ----------
+        files
+            CSV, "FILE.xlsx#SHEET", or "nist-table1".
+        columns
+            Which columns the files call otherwise: "stiffness=stiff_mean:N/um, date=day:DD.MM.YYYY", or such a dict.
 
         Raises
         ------
@@ -68,7 +77,7 @@ class Measurements:
         >>> tps.Measurements.read("nist-table1")
         <Measurements nist-table1>
         """
-        found = cls([str(file) for file in files])
+        found = cls([str(file) for file in files], columns)
         found.on(Machine.load())
         return found
 
@@ -88,7 +97,7 @@ class Measurements:
 
         model = machine.model.given or machine.model.machine
         if self._last is None or self._last[0] is not model:
-            self._last = (model, read_measurements(self.files, model))
+            self._last = (model, read_measurements(self.files, model, columns=self.columns))
         return self._last[1]
 
     def to_frame(self, machine: Machine | str | Path = MACHINE) -> pd.DataFrame:
@@ -138,11 +147,18 @@ def _is_nan(value: object) -> bool:
 Data = Measurements | str | Path | Sequence[str | Path]
 
 
-def measurements_from(data: Data) -> Measurements:
-    """Measurements; of a file's name or several, those in the files."""
+def columns_text(columns: Mapped) -> str | None:
+    """A mapping of columns as --columns has it."""
+    if columns is None or isinstance(columns, str):
+        return columns
+    return ", ".join(f"{ours}={theirs}" for ours, theirs in columns.items())
+
+
+def measurements_from(data: Data, columns: Mapped = None) -> Measurements:
+    """Measurements; of a file's name or several, those in the files, whose columns are called as `columns` says."""
     if isinstance(data, Measurements):
         return data
-    return Measurements([str(data)] if isinstance(data, str | Path) else [str(one) for one in data])
+    return Measurements([str(data)] if isinstance(data, str | Path) else [str(file) for file in data], columns)
 
 
 class Question:
@@ -155,15 +171,17 @@ class Question:
         noise_percent: Noise,
         strut_spread_percent: float,
         seed: int,
+        columns: Mapped = None,
     ) -> None:
         self.on = machine_from(machine)
         self.model = self.on.model.given or self.on.model.machine
-        self.data = None if data is None else measurements_from(data)
+        self.data = None if data is None else measurements_from(data, columns)
         self.noise = _noise(noise_percent)
         self.strut_spread = strut_spread_percent / 100.0
         self.seed = seed
         self.files = self.data.files if self.data else ()
-        self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread)
+        columns = self.data.columns if self.data else None
+        self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread, columns)
         self.inputs = (*self.files, *self.on.inputs)
 
     @property
@@ -217,69 +235,13 @@ def _noise(percent: Noise) -> Noise:
     return shares[0] if len(shares) == 1 else (shares[0], shares[1])
 
 
-class Comparison(FolderResult):
-    """How far the model is from measurements, where, and how much of it is more than scatter.
-
-    Attributes
-    ----------
-    compared
-        Residuals and scatter as arrays in SI.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.compare("nist", "nist-table1", noise_percent=5)
-    >>> round(found.to_dict()["baseline"]["mean_abs_error_percent"], 2)
-    9.62
-    >>> found.to_frame()[["direction", "measured_N_per_mm", "modelled_N_per_mm"]].shape
-    (42, 3)
-    >>> list(found.files(plots=False)), type(found.plot()).__name__
-    (['compare.json', 'residuals.csv'], 'Figure')
-    """
-
-    command: ClassVar[str] = "compare"
-
-    def __init__(self, compared: Compared, inputs: tuple[str, ...]) -> None:
-        self.compared, self.inputs = compared, inputs
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of compare.json."""
-        return dict(self.compared.document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a reading, as in `residuals.csv`: measured, modelled, deviation, and what it may vary with."""
-        from toolpath_stiff.report.compare.page import residuals_csv
-
-        return _table(residuals_csv(self.compared))
-
-    def plot(self) -> Figure:
-        """Measured against modelled."""
-        from toolpath_stiff.report.compare.pictures import measured_modelled_png
-
-        return measured_modelled_png.figure(self.compared)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.compare.page import text
-
-        return "\n".join([text(self.compared.document), *self.compared.document["next"]])
-
-    def _short(self) -> str:
-        found = self.compared.document["baseline"]["mean_abs_error_percent"]
-        return f"{self.compared.document['machine']}, mean error {found:.2f} %"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps compare`."""
-        from toolpath_stiff.report.compare.page import files
-
-        return files(self.compared, plots=plots)
-
-
 @machine_by_name
 @checked
 def compare(
     machine: Machine | str | Path,
     data: Data,
     *,
+    columns: Mapped = None,
     noise_percent: NoisePercent = None,
     strut_spread_percent: StrutSpread = 1.0,
     seed: Seed = 0,
@@ -291,6 +253,8 @@ def compare(
     ----------
     machine, data
         The machine; measurements, or the files that hold them.
+    columns
+        Which columns the files call otherwise: "stiffness=stiff_mean:N/um", or such a dict.
     noise_percent
         Standard deviation of one reading, re-clamping included; or of the reading alone and of a clamping. Unless
         given, from repeats, else from the column sd_N_per_mm, else a low and a high guess.
@@ -314,73 +278,10 @@ def compare(
     """
     from toolpath_stiff.comparison.compare import compare as compare_readings
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     teller(progress)("comparing")
-    return Comparison(compare_readings(asked.model, asked.readings, asked=asked.asked, **asked.common), asked.inputs)
-
-
-class Diagnosis(FolderResult):
-    """Which physical effect the model lacks, if any.
-
-    Attributes
-    ----------
-    diagnosed
-        Hypotheses, fits, probabilities, with arrays in SI.
-    """
-
-    command: ClassVar[str] = "diagnose"
-
-    def __init__(self, diagnosed: Diagnosed, inputs: tuple[str, ...]) -> None:
-        from toolpath_stiff.diagnosis.document import document
-
-        self.diagnosed, self.inputs = diagnosed, inputs
-        self._document = document(diagnosed)
-
-    @property
-    def verdict(self) -> str:
-        """adequate, identified, described, ambiguous or unexplained."""
-        return self.diagnosed.verdict
-
-    @property
-    def plausible(self) -> list[str]:
-        """Effects that may be what is missing, the most likely first."""
-        return list(self.diagnosed.plausible)
-
-    @property
-    def best(self) -> str | None:
-        """The explanation that fits best among those left standing."""
-        return self.diagnosed.best
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of diagnose.json."""
-        return dict(self._document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The candidates, one a row: probability, errors, why not."""
-        import pandas as pd
-
-        return pd.DataFrame(self._document["candidates"])
-
-    def plot(self) -> Figure:
-        """The error as given, with the strut law refitted, and with each candidate."""
-        from toolpath_stiff.report.diagnose.pictures import ladder_png
-
-        return ladder_png.figure(self._document)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.explanations import text
-
-        return text(self._document)
-
-    def _short(self) -> str:
-        names = ", ".join(self.plausible)
-        return f"{self.verdict}: {names}" if names else self.verdict
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps diagnose`."""
-        from toolpath_stiff.report.diagnose.page import files
-
-        return files(self.diagnosed, self._document, plots=plots)
+    comparison = compare_readings(asked.model, asked.readings, asked=asked.asked, **asked.common)
+    return replace(comparison, inputs=asked.inputs)
 
 
 @machine_by_name
@@ -389,6 +290,7 @@ def diagnose(
     machine: Machine | str | Path,
     data: Data,
     *,
+    columns: Mapped = None,
     noise_percent: NoisePercent = None,
     strut_spread_percent: StrutSpread = 1.0,
     seed: Seed = 0,
@@ -402,6 +304,8 @@ def diagnose(
     ----------
     machine, data
         The machine, whose effect files take part; measurements, or the files that hold them.
+    columns
+        As of `compare`.
     noise_percent, strut_spread_percent, seed
         As of `compare`.
     program, origin_mm_deg
@@ -428,7 +332,7 @@ def diagnose(
     """
     from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     part = None if program is None else program_from(program)
     origin = origin_si(origin_mm_deg)
     conditions = asked.on.running(part).conditions
@@ -440,20 +344,20 @@ def diagnose(
         temperature=asked.on.temperature_C,
         seed=seed or None,
     )
-    found = diagnose_readings(
+    return diagnose_readings(
         asked.model,
         asked.readings,
         program=lambda: _case_study() if part is None else part.moves(origin, default),
         origin=origin,
         setup=conditions.setup,
         temperature=conditions.temperature,
-        files=asked.files,
-        command=asked.asked.command("diagnose", *own, *(part.words if part else ())),
+        names=asked.files,
+        line=asked.asked.command("diagnose", *own, *(part.words if part else ())),
         asked=asked.asked,
+        inputs=(*asked.inputs, *(part.inputs if part else ())),
         progress=teller(progress),
         **asked.common,
     )
-    return Diagnosis(found, (*asked.inputs, *(part.inputs if part else ())))
 
 
 def _case_study() -> NcProgram:
@@ -461,12 +365,3 @@ def _case_study() -> NcProgram:
     from toolpath_stiff.placement.case_study import case_study_program
 
     return case_study_program()
-
-
-def _table(csv: str) -> pd.DataFrame:
-    """CSV text as a DataFrame."""
-    import io
-
-    import pandas as pd
-
-    return pd.read_csv(io.StringIO(csv))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.diagnosis import Data, Diagnosis, NoisePercent, Question, Seed, StrutSpread
+from toolpath_stiff.api.diagnosis import Data, NoisePercent, Question, Seed, StrutSpread
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
@@ -14,66 +14,10 @@ from toolpath_stiff.options import checked
 from toolpath_stiff.results import Progress, Result, machine_by_name, teller
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from toolpath_stiff.drafting.draft import Draft
-    from toolpath_stiff.stiffness.contract import Effect
-    from toolpath_stiff.stiffness.trial import Trial
-
-
-class EffectCatalogue(Result):
-    """Effects, in the order of the load path.
-
-    Attributes
-    ----------
-    effects
-        The effects themselves.
-    broken
-        Plug-ins that do not load -> why.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> catalogue = tps.effects()
-    >>> catalogue["weak_strut"].link, catalogue.broken
-    ('struts', {})
-    >>> catalogue.to_frame().columns.tolist()
-    ['link', 'name', 'title', 'equation', 'source', 'load_dependent']
-    >>> len(catalogue.to_dict()["effects"]) == len(catalogue.effects)
-    True
-    """
-
-    command: ClassVar[str] = "effects"
-
-    def __init__(self, effects: Sequence[Effect], broken: Mapping[str, str]) -> None:
-        self.effects, self.broken = list(effects), dict(broken)
-
-    def __getitem__(self, name: str) -> Effect:
-        """An effect by its name."""
-        return next(effect for effect in self.effects if effect.name == name)
-
-    def to_dict(self) -> dict[str, Any]:
-        """What each effect declares, in its own units."""
-        from toolpath_stiff.report.machine import describe_effect
-
-        return {"effects": [describe_effect(effect) for effect in self.effects], "broken": self.broken}
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row an effect: link of the load path, name, title, equation, source."""
-        import pandas as pd
-
-        columns = ["link", "name", "title", "equation", "source", "load_dependent"]
-        return pd.DataFrame(self.to_dict()["effects"])[columns]
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.machine import effects_table
-
-        return effects_table(self.effects, self.broken)
-
-    def _short(self) -> str:
-        from toolpath_stiff.report.words import counted
-
-        return counted(len(self.effects), "effect")
+    from toolpath_stiff.correction.draft import Draft
+    from toolpath_stiff.diagnosis.result import Diagnosis
+    from toolpath_stiff.stiffness.catalogue import EffectCatalogue
+    from toolpath_stiff.stiffness.trial import EffectCheck
 
 
 def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
@@ -90,59 +34,9 @@ def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
     >>> tps.effects()["weak_strut"].title
     'one strut is weak'
     """
-    from toolpath_stiff.stiffness.catalogue import installed_effects, known_effects
+    from toolpath_stiff.stiffness.catalogue import EffectCatalogue, installed_effects, known_effects
 
     return EffectCatalogue(list(known_effects(list(map(str, files))).values()), installed_effects()[1])
-
-
-class EffectCheck(Result):
-    """Effects of a file tried against the contract: shapes, symmetry, units, neutral value, speed.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py"))
-    ...     found = tps.check_effects(file)
-    >>> found.passed, found.to_dict()["effects"][0]["effect"]
-    (True, 'my_screw')
-    >>> found.to_frame()[["effect", "passed"]].values.tolist()[0]
-    ['my_screw', True]
-    """
-
-    command: ClassVar[str] = "effects"
-
-    def __init__(self, file: str, machine: str, trials: Sequence[Trial]) -> None:
-        self.file, self.machine, self.trials = file, machine, list(trials)
-
-    @property
-    def passed(self) -> bool:
-        """Whether every effect keeps the contract."""
-        return all(trial.passed for trial in self.trials)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Each check of each effect."""
-        rows = [
-            {"effect": t.effect.name, "passed": t.passed, "checks": [vars(outcome) for outcome in t.outcomes]}
-            for t in self.trials
-        ]
-        return {"file": self.file, "machine": self.machine, "passed": self.passed, "effects": rows}
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a check."""
-        import pandas as pd
-
-        rows = [{"effect": t["effect"], **check} for t in self.to_dict()["effects"] for check in t["checks"]]
-        return pd.DataFrame(rows)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.machine import trials_text
-
-        return trials_text(self.trials, self.machine)
-
-    def _short(self) -> str:
-        return f"{self.file}, {'good' if self.passed else 'FAILS'}"
 
 
 def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> EffectCheck:
@@ -163,7 +57,7 @@ def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> E
     True
     """
     from toolpath_stiff.stiffness.catalogue import effects_from_file, known_effects
-    from toolpath_stiff.stiffness.trial import try_effect
+    from toolpath_stiff.stiffness.trial import EffectCheck, try_effect
 
     on = machine_from(machine)
     model = on.model.given or on.model.machine
@@ -290,7 +184,7 @@ def effect_template(name: str) -> EffectFile:
 def draft_effect(
     machine: Machine | str | Path,
     data: Data,
-    file: str | Path = "missing.py",
+    file: str | Path = "missing.toml",
     *,
     noise_percent: NoisePercent = None,
     strut_spread_percent: StrutSpread = 1.0,
@@ -322,33 +216,34 @@ def draft_effect(
     >>> found.to_dict()["effect"] is None, found.text  # `found.save(FILE)` raises InputError then
     (True, '')
     """
+    from toolpath_stiff.correction.draft import draft
     from toolpath_stiff.diagnosis.diagnose import diagnose
-    from toolpath_stiff.drafting.draft import draft
     from toolpath_stiff.stiffness.catalogue import known_effects
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
-    name = effect_name(file)
+    name = effect_name(file, ".toml")
     if name in known_effects(asked.on.effect_files):
         raise InputError(f"effect {name} exists already", hint="give the draft another file name")
     found = diagnose(
         asked.model,
         asked.readings,
         plan_next=False,
-        files=asked.files,
-        command=asked.asked.command("diagnose", *options(seed=seed or None)),
+        names=asked.files,
+        line=asked.asked.command("diagnose", *options(seed=seed or None)),
         asked=asked.asked,
+        inputs=asked.inputs,
         progress=teller(progress),
         **asked.common,
     )
     drafted = draft(found, str(file))
-    return EffectDraft(name, drafted, Diagnosis(found, asked.inputs), next_of_draft(asked.asked, str(file)))
+    return EffectDraft(name, drafted, found, next_of_draft(asked.asked, str(file)))
 
 
-def effect_name(file: str | Path) -> str:
+def effect_name(file: str | Path, ending: str = ".py") -> str:
     """The name of the effect that a file is to hold: the file's own, without the ending."""
     path = Path(file)
-    if path.suffix != ".py" or not path.stem.isidentifier():
-        raise InputError(f"{str(file)!r} cannot hold an effect", expected="a name such as my_screw.py")
+    if path.suffix != ending or not path.stem.isidentifier():
+        raise InputError(f"{str(file)!r} cannot hold an effect", expected=f"a name such as my_screw{ending}")
     return path.stem
 
 

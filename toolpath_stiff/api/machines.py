@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.analysis.checks import MachineCheck as Findings
+    from toolpath_stiff.analysis.machine_check import MachineCheck
     from toolpath_stiff.arrays import FloatArray
     from toolpath_stiff.machine.kinematics import Struts
     from toolpath_stiff.machine.limits import Reach
@@ -476,95 +476,6 @@ def machine_from(machine: Machine | str | Path) -> Machine:
     return machine if isinstance(machine, Machine) else Machine.load(machine)
 
 
-class MachineCheck(Result):
-    """Whether a machine file is plausible.
-
-    Attributes
-    ----------
-    found
-        What cannot be right, what is doubtful, the machine at its neutral pose and default origin.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.Machine.load("nist").check()
-    >>> found.good, found.to_dict()["wrong"], found.warnings, len(found.to_frame())
-    (True, [], [], 0)
-    >>> type(found.plot()).__name__
-    'Figure'
-    """
-
-    command: ClassVar[str] = "machine"
-
-    def __init__(self, machine: Machine, model: StiffnessModel, found: Findings) -> None:
-        self.machine, self.model, self.found = machine, model, found
-
-    @property
-    def good(self) -> bool:
-        """Whether nothing is wrong."""
-        return self.found.good
-
-    @property
-    def warnings(self) -> list[str]:
-        """Effects that do not act on a program as the file stands."""
-        from toolpath_stiff.stiffness.model import condition_warnings
-
-        return condition_warnings(self.model)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        from toolpath_stiff.stiffness.model import effects_stated
-
-        return {
-            "file": self.machine.asked,
-            "machine": self.machine.name,
-            "good": self.good,
-            "wrong": list(self.found.wrong),
-            "doubtful": list(self.found.doubtful),
-            **effects_stated(self.model),
-            "warnings": self.warnings,
-        }
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a finding: severity (wrong, doubtful, warning), text."""
-        import pandas as pd
-
-        kinds = (("wrong", self.found.wrong), ("doubtful", self.found.doubtful), ("warning", self.warnings))
-        rows = [(severity, text) for severity, texts in kinds for text in texts]
-        return pd.DataFrame(rows, columns=["severity", "text"])
-
-    def plot(self) -> Figure:
-        """The machine at its neutral pose from three sides, doubtful joints marked."""
-        from toolpath_stiff.report.machine import machine_views
-
-        return machine_views.figure(*self._views())
-
-    def picture(self) -> bytes:
-        """The same as a PNG."""
-        from toolpath_stiff.report.machine import machine_views
-
-        return machine_views(*self._views())
-
-    def _views(self) -> tuple[Any, ...]:
-
-        import numpy as np
-
-        from toolpath_stiff.machine.kinematics import solve_struts_at
-
-        machine = self.model.machine
-        pose = np.array(machine.limits.neutral_pose)
-        marked = tuple((stray.body, stray.joint) for stray in self.found.symmetry.strays)
-        return machine, pose, solve_struts_at(machine, pose), marked
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.machine import check_text
-
-        return check_text(self.machine.asked, self.model, self.found)
-
-    def _short(self) -> str:
-        return f"{self.machine.name}, {len(self.found.wrong)} wrong, {len(self.found.doubtful)} doubtful"
-
-
 def check_machine(machine: Machine | str | Path) -> MachineCheck:
     """Look for slips in a machine's figures: units, signs, mirrored joints; what its effects wait for.
 
@@ -579,11 +490,10 @@ def check_machine(machine: Machine | str | Path) -> MachineCheck:
     >>> tps.Machine.load("nist").check().good
     True
     """
-    from toolpath_stiff.analysis.checks import check_machine as look
+    from toolpath_stiff.analysis.machine_check import check_machine as look
 
     on = machine_from(machine)
-    model = on.running()
-    return MachineCheck(on, model, look(model))
+    return look(on.running(), on.asked)
 
 
 class MachineFile(Result):

@@ -15,6 +15,8 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from pebble import ProcessExpired
+
 from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Program, Step
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import (
@@ -30,8 +32,8 @@ from toolpath_stiff.api.programs import (
 from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.options import checked
-from toolpath_stiff.processes import ProcessDied, ProcessPool
-from toolpath_stiff.report.batch.index import files, names, text
+from toolpath_stiff.processes import ProcessPool, death
+from toolpath_stiff.report.batch.index import files, names
 from toolpath_stiff.report.batch.programs import (
     Found,
     Listed,
@@ -40,6 +42,7 @@ from toolpath_stiff.report.batch.programs import (
     figures_of,
     find_programs,
     report_folders,
+    terminal_summary,
 )
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, Result
@@ -118,7 +121,7 @@ class ManyAnalyses(Result):
         return pd.DataFrame(columns_of(self.outcomes))
 
     def __str__(self) -> str:
-        return text(self.outcomes)
+        return terminal_summary(self.outcomes)
 
     def _short(self) -> str:
         return f"{counted(len(self.outcomes), 'program')}, {len(self.failed) or 'none'} failed"
@@ -455,8 +458,8 @@ def _answer(task: Task, future: Future[Outcome]) -> Outcome:
     error = future.exception()
     if error is None:
         return future.result()
-    if isinstance(error, ProcessDied):
-        return _failed(task, str(error))
+    if isinstance(error, ProcessExpired):
+        return _failed(task, death(error))
     if _worker_died(future):
         tried, last = error.args[2] + 1, error.args[1].address
         return _failed(task, f"{tried} workers died of it, the last at {last} (out of memory? their logs may say)")

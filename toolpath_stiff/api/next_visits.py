@@ -4,69 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING
 
-from toolpath_stiff.results import Result
+from toolpath_stiff.column_names import Mapped
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from toolpath_stiff.planning.next_visit import NextVisit as Found
+    from toolpath_stiff.planning.next_visit import NextVisit
 
 
-class NextVisit(Result):
-    """Where a plan stands, and the visit to make next.
-
-    Attributes
-    ----------
-    probability
-        Explanation -> probability, the likeliest first.
-    settled
-        Whether one of them has 95 %.
-    """
-
-    command: ClassVar[str] = "plan"
-
-    def __init__(self, found: Found, folder: str) -> None:
-        from toolpath_stiff.planning.next_document import next_document
-
-        self.folder = folder
-        self._document = next_document(found)
-        self.probability = {one["name"]: one["probability"] for one in self._document["rivals"]}
-        self.settled = found.settled
-
-    def to_dict(self) -> dict[str, Any]:
-        """Probabilities, the next visit and its rows."""
-        return dict(self._document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a reading of the next visit, the stiffness left empty; none where there is no next visit."""
-        import pandas as pd
-
-        return pd.DataFrame(self._document["rows"])
-
-    def save(self) -> list[Path]:
-        """Write the next visit's rows, a measurement file to fill in, as next_1.csv (2, 3...) into the plan's folder.
-
-        A file that is there already stays: it is the same visit, perhaps filled in.
-        """
-        from toolpath_stiff.files import write_atomically
-        from toolpath_stiff.planning.document import plan_csv
-
-        rows = self._document["rows"]
-        file = Path(self.folder) / f"next_{rows[0]['clamp']}.csv" if rows else None
-        return [] if file is None or file.exists() else [write_atomically(file, plan_csv(rows))]
-
-    def __str__(self) -> str:
-        return "\n".join([*self._document["text"], *(f"note: {note}" for note in self._document["notes"])])
-
-    def _short(self) -> str:
-        from toolpath_stiff.report.words import counted
-
-        return f"{counted(self._document['readings'], 'reading')}, {'settled' if self.settled else 'open'}"
-
-
-def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ()) -> NextVisit:
+def next_visit(
+    folder: str | Path, data: Sequence[str | Path] | str | Path = (), *, columns: Mapped = None
+) -> NextVisit:
     """Which pose of a plan to go to next, after the readings so far.
 
     Parameters
@@ -76,6 +24,8 @@ def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ())
     data
         Measurement files with the plan's readings taken so far, rows still empty among them; unless given, the
         folder's own plan.csv and next_1.csv, next_2.csv ... Readings from before the plan are in it already.
+    columns
+        Which columns the files call otherwise: "stiffness=stiff_mean:N/um", or such a dict.
 
     Raises
     ------
@@ -101,4 +51,4 @@ def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ())
     from toolpath_stiff.planning.next_visit import next_visit as choose_next
 
     files = (data,) if isinstance(data, str | Path) else tuple(data)
-    return NextVisit(choose_next(folder, tuple(map(str, files))), str(folder))
+    return choose_next(folder, tuple(map(str, files)), columns)

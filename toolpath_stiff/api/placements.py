@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -23,23 +23,20 @@ from toolpath_stiff.api.inputs import (
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.options import Option, checked, low_high, numbers
-from toolpath_stiff.results import FolderResult, Progress, Result, counter
+from toolpath_stiff.results import Progress, Result, counter
 from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
     from toolpath_stiff.analysis.loads import Load
     from toolpath_stiff.machine.model import Machine as MachineModel
     from toolpath_stiff.nc.moves import Program as ReadProgram
     from toolpath_stiff.placement.climb import Bounds
     from toolpath_stiff.placement.paths import WorkPath
-    from toolpath_stiff.placement.placing import Placed, Rewriting
+    from toolpath_stiff.placement.result import Placement
     from toolpath_stiff.placement.search import SearchRules
+    from toolpath_stiff.placement.task import Rewriting
     from toolpath_stiff.stiffness.model import StiffnessModel
 
 FARTHEST_TURN_DEG = 720.0
@@ -61,106 +58,6 @@ class KeepOut:
     name: str
     low_mm: tuple[float, float, float]
     high_mm: tuple[float, float, float]
-
-
-class Placement(FolderResult):
-    r"""A program at the placement that was chosen for it, and the others of the front.
-
-    Attributes
-    ----------
-    placed
-        The search, the analyses before and at the chosen placement, in SI.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> found = tps.place("nist", slot, x_mm=0, y_mm=0, z_mm=800, rotate_deg=0, step_mm=10, points=2, write="new.nc")
-    >>> found
-    <Placement: slot.nc, X0 Y0 Z800 A0 B0 C0 of 1 placements>
-    >>> found.origin_mm_deg, found.worse, found.warnings
-    ((0.0, 0.0, 800.0, 0.0, 0.0, 0.0), [], [])
-    >>> found.refusal, found.program_bytes.decode().splitlines()[1]
-    ('', 'G0 X0 Y0 Z5')
-    >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
-    (1, ['placements.csv', 'placement.json'], 'balanced')
-    >>> type(found.plot()).__name__
-    'Figure'
-    """
-
-    command: ClassVar[str] = "place"
-
-    def __init__(self, placed: Placed, inputs: tuple[str, ...]) -> None:
-        self.placed, self.inputs = placed, inputs
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self.placed.summary
-
-    @property
-    def origin_mm_deg(self) -> tuple[float, ...]:
-        """The chosen placement: what `analyze` takes as `origin_mm_deg`."""
-        return self._at(self.placed.summary["chosen"])
-
-    @property
-    def worse(self) -> list[dict[str, Any]]:
-        """What is worse there than at the present placement, and by how much."""
-        return list(self.placed.summary["worse"])
-
-    @property
-    def warnings(self) -> list[str]:
-        """What deserves a look, what gets worse first."""
-        return list(self.placed.summary["warnings"])
-
-    @property
-    def program_bytes(self) -> bytes:
-        """The program written for the placement; it was asked for with `write`.
-
-        Raises `InputError` where it cannot be written there; the rest of the result stands.
-        """
-        if self.refusal:
-            raise InputError(self.refusal)
-        if self.placed.rewritten is None:
-            raise InputError("the program was not written for the placement", hint="ask for it with write=FILE")
-        return self.placed.rewritten
-
-    @property
-    def refusal(self) -> str:
-        """Why the program could not be written for the placement, "" unless that is so."""
-        return str((self.placed.summary["written"] or {}).get("refused", ""))
-
-    @staticmethod
-    def _at(row: Mapping[str, Any]) -> tuple[float, ...]:
-        from toolpath_stiff.placement.document import PLACEMENT
-
-        return tuple(float(row[name]) for name in PLACEMENT)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The front, one placement a row, as in `placements.csv`."""
-        import pandas as pd
-
-        return pd.DataFrame(self.placed.summary["front"])
-
-    def plot(self) -> Figure:
-        """The front: mean against range, the chosen and the present placement marked."""
-        from toolpath_stiff.report.place.pictures import front_picture
-
-        return front_picture.figure(self.placed.summary)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.place.page import text
-
-        return text(self.placed.summary)
-
-    def _short(self) -> str:
-        words = [f"{axis}{value:.6g}" for axis, value in zip("XYZABC", self.origin_mm_deg, strict=True)]
-        return f"{self.placed.program.name}, {' '.join(words)} of {len(self.placed.summary['front'])} placements"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content of each file that `save` writes."""
-        from toolpath_stiff.report.place.page import files
-
-        return files(self.placed, plots=plots)
 
 
 @checked
@@ -252,7 +149,8 @@ def place(
     []
     """
     from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.placement.placing import Task, place_again, place_program
+    from toolpath_stiff.placement.placing import place_again, place_program
+    from toolpath_stiff.placement.task import Task
 
     on, part = machine_from(machine), program_from(program)
     if write is None and (decimals is not None or linearise_mm is not None):
@@ -279,7 +177,7 @@ def place(
         placed = place_program(task, counter(progress, f"{part.name}: search"))
     else:
         placed = place_again(task, _earlier(earlier), pick)
-    return Placement(placed, (*part.inputs, *on.inputs))
+    return replace(placed, inputs=(*part.inputs, *on.inputs))
 
 
 def _rules(
@@ -328,7 +226,7 @@ def _checked_box(box: KeepOut) -> KeepOut:
 
 
 def _rewriting(part: Program, file: str, decimals: int | None, linearise_mm: float | None) -> Rewriting:
-    from toolpath_stiff.placement.placing import Rewriting
+    from toolpath_stiff.placement.task import Rewriting
 
     chord = None
     if linearise_mm is not None:
@@ -339,6 +237,7 @@ def _rewriting(part: Program, file: str, decimals: int | None, linearise_mm: flo
 def _earlier(earlier: Placement | str | Path | Mapping[str, Any] | None) -> dict[str, Any]:
     """The document of an earlier search."""
     from toolpath_stiff.files import read_text
+    from toolpath_stiff.placement.result import Placement
 
     if isinstance(earlier, Placement):
         return earlier.to_dict()

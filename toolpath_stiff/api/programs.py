@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, partial
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -11,10 +12,9 @@ from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Program, Ste
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.options import Option, checked
-from toolpath_stiff.results import FolderResult, Progress, Result, counter
+from toolpath_stiff.results import Progress, Result, counter
 from toolpath_stiff.units import (
     m_from_mm,
     m_per_s_from_mm_per_min,
@@ -23,9 +23,9 @@ from toolpath_stiff.units import (
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
-    from toolpath_stiff.analysis import Analysis as PathAnalysis
+    from toolpath_stiff.analysis import Analysis
+    from toolpath_stiff.analysis.program_check import ProgramCheck
     from toolpath_stiff.path import Samples
 
 RequiredStiffness = Annotated[
@@ -50,171 +50,13 @@ JOBS = Option(
     help="Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each "
     "available CPU.",
 )
-Table = Annotated[str, Option("--format", choices=("csv", "parquet"), help="Format of the samples.")]
-ShowPlunges = Annotated[
-    bool,
-    Option(
-        "--show-plunges",
-        help="Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).",
-    ),
-]
-
-
-class Analysis(FolderResult):
-    r"""Stiffness along the path of a program, under a load at every sample of a cut.
-
-    Attributes
-    ----------
-    path
-        The samples and what was found at each, as arrays in SI.
-    on_other
-        The same on the machine compared with; None without one.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> found = tps.analyze("nist", slot, origin_mm_deg=(0, 0, 800), require_N_per_mm=54000)
-    >>> [round(one) for one in (found.mean_N_per_mm, found.min_N_per_mm, found.range_N_per_mm)]
-    [54353, 53875, 948]
-    >>> found.weakest["line"], found.weakest["text"]
-    (4, 'G1 X40')
-    >>> [(line, round(stiffness)) for line, stiffness in found.below_required]
-    [(4, 53875)]
-    >>> found.complete, found.warnings, len(found.assumptions) > 0
-    (True, [], True)
-    >>> found.deviation_N_per_mm is None  # the figures of this machine are stated without standard deviations
-    True
-    >>> len(found.to_frame()), len(found.to_dict()["weakest_places"])
-    (53, 1)
-    >>> [type(picture()).__name__ for picture in (found.plot, found.plot_profile)]
-    ['Figure', 'Figure']
-    """
-
-    command: ClassVar[str] = "analyze"
-
-    def __init__(
-        self,
-        path: PathAnalysis,
-        *,
-        on_other: PathAnalysis | None = None,
-        required: float | None = None,
-        inputs: tuple[str, ...] = (),
-    ) -> None:
-        self.path, self.on_other, self._required, self.inputs = path, on_other, required, inputs
-
-    @cached_property
-    def _document(self) -> dict[str, Any]:
-        from toolpath_stiff.report.analysis.summary import summary_with_options
-
-        return summary_with_options(self.path, self._required, self.on_other)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self._document
-
-    @property
-    def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
-        """Mean stiffness over the length of the cuts, plunges along the tool axis left out."""
-        return self._figure("mean_N_per_mm")
-
-    @property
-    def min_N_per_mm(self) -> float:  # noqa: N802
-        """The smallest stiffness of these cuts."""
-        return self._figure("min_N_per_mm")
-
-    @property
-    def range_N_per_mm(self) -> float:  # noqa: N802
-        """The largest less the smallest."""
-        return self._figure("range_N_per_mm")
-
-    def _figure(self, name: str) -> float:
-        """A figure of the document; nan where no sample counts (rotary axes alone)."""
-        found = self._document[name]
-        return float("nan") if found is None else float(found)
-
-    @property
-    def weakest(self) -> dict[str, Any]:
-        """Where the smallest stiffness is: line, position, direction."""
-        return dict(self._document["weakest"])
-
-    @property
-    def warnings(self) -> list[str]:
-        """What deserves a look."""
-        return list(self._document["warnings"])
-
-    @property
-    def assumptions(self) -> list[str]:
-        """What was assumed or recovered rather than published or given."""
-        return list(self._document["assumptions"])
-
-    @property
-    def complete(self) -> bool:
-        """Whether every sample of a cut is within reach."""
-        return not self._document["out_of_reach_samples"]
-
-    @property
-    def below_required(self) -> list[tuple[int, float]]:
-        """(line, smallest stiffness in N/mm) of cuts below what was required, weakest first."""
-        from toolpath_stiff.analysis.results import required_stiffness_missed
-
-        return [] if self._required is None else required_stiffness_missed(self.path, self._required)
-
-    @property
-    def deviation_N_per_mm(self) -> Any:  # noqa: N802
-        """(n,) standard deviation of each sample's stiffness from the fitted parameters; None where none is stated."""
-        from toolpath_stiff.units import n_per_mm_from_n_per_m
-
-        band = self.path.parameter_band
-        return None if band is None else n_per_mm_from_n_per_m(band.deviation)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.analysis.summary import text
-
-        other = None if self.on_other is None else self.on_other.summary()
-        return text(self._document, self.path.program.source, other)
-
-    def _short(self) -> str:
-        from toolpath_stiff.report.words import number
-
-        found = self._document
-        mean, low = (number(found[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))
-        return f"{found['program']} on {found['machine']}, mean {mean} N/mm, min {low} N/mm"
-
-    def to_frame(self) -> pd.DataFrame:
-        """The samples, columns as in `samples.csv`."""
-        return self.path.to_frame()
-
-    def plot(self, *, show_plunges: bool = False) -> Figure:
-        """The path in three views, coloured by stiffness; with `show_plunges` these set axes and colours too."""
-        from toolpath_stiff.report.analysis.path import path_picture
-
-        return path_picture.figure(self.path, show_plunges=show_plunges)
-
-    def plot_profile(self, *, show_plunges: bool = False) -> Figure:
-        """Stiffness along the path."""
-        from toolpath_stiff.report.profile import profile_picture
-
-        return profile_picture.figure(
-            self.path, other=self.on_other, required=self._required, show_plunges=show_plunges
-        )
-
-    @checked
-    def files(
-        self, *, plots: bool = True, table: Table = "csv", show_plunges: ShowPlunges = False
-    ) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps analyze`; samples as "csv" or "parquet"."""
-        from toolpath_stiff.report.analysis.summary import files
-
-        return files(
-            self.path,
-            plots=plots,
-            table=table,  # type: ignore[arg-type]
-            required=self._required,
-            other=self.on_other,
-            show_plunges=show_plunges,
-            summary=self._document,
-        )
+FORMAT = Option("--format", choices=("csv", "parquet"), help="Format of the samples.")
+SHOW_PLUNGES = Option(
+    "--show-plunges",
+    help="Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).",
+)
+Table = Annotated[str, FORMAT]
+ShowPlunges = Annotated[bool, SHOW_PLUNGES]
 
 
 @checked
@@ -280,14 +122,13 @@ def analyze(
         second = compare_with if isinstance(compare_with, Machine) else first.like(compare_with)
     options, required = path_options(origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm)
 
-    def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> PathAnalysis:
+    def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> Analysis:
         model = one.running(part, [other] if other else [])
         read = part.moves(options["origin"], model.machine.default_origin)
         return analyze(model, read, progress=told, **options)
 
-    path = on(first, second, counter(progress, f"{part.name}: samples"))
-    return Analysis(
-        path,
+    return replace(
+        on(first, second, counter(progress, f"{part.name}: samples")),
         on_other=None if second is None else on(second, first, None),
         required=required,
         inputs=(*part.inputs, *first.inputs, *(second.inputs if second else ())),
@@ -427,74 +268,6 @@ def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, 
     return SampledPath(read.name, samples, read.warnings, left)
 
 
-class ProgramCheck(Result):
-    r"""What a program uses, what is not understood, extents, times, and what a machine says to it.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
-    >>> found
-    <ProgramCheck: slot.nc, 1 error>
-    >>> found.errors == [one for one in found.findings if one["severity"] == "error"]
-    True
-    >>> found.to_frame()["line"].tolist(), found.to_dict()["complete"]
-    ([3], False)
-    """
-
-    command: ClassVar[str] = "check"
-
-    def __init__(self, document: dict[str, Any]) -> None:
-        self._document = document
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self._document
-
-    @property
-    def findings(self) -> list[dict[str, Any]]:
-        """What was found: line, column, subject, text, severity."""
-        return list(self._document["findings"])
-
-    @property
-    def errors(self) -> list[dict[str, Any]]:
-        """The findings that keep the program from running as it stands."""
-        from toolpath_stiff.nc.checking import ERROR
-
-        return [one for one in self.findings if one["severity"] == ERROR]
-
-    def to_frame(self) -> pd.DataFrame:
-        """The findings, one a row."""
-        import pandas as pd
-
-        return pd.DataFrame(self.findings, columns=["line", "column", "code", "text", "severity", "count"])
-
-    def save(self, file: str | Path) -> Path:
-        r"""Write the JSON document to a file, whole or not at all.
-
-        Examples
-        --------
-        >>> import pathlib, tempfile
-        >>> import toolpath_stiff as tps
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     tps.check(tps.Program.from_text("G21\nM2")).save(pathlib.Path(folder) / "check.json").name
-        'check.json'
-        """
-        from toolpath_stiff.files import write_atomically
-
-        return write_atomically(file, self.to_json())
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.check import text
-
-        return text(self._document)
-
-    def _short(self) -> str:
-        from toolpath_stiff.report.words import counted
-
-        return f"{self._document['program']}, {counted(len(self.errors), 'error') if self.errors else 'no errors'}"
-
-
 @checked
 def check(
     program: Program | str | Path,
@@ -531,7 +304,7 @@ def check(
     >>> [(one["line"], one["severity"]) for one in found.errors]
     [(3, 'error')]
     """
-    from toolpath_stiff.analysis.checks import check_program
+    from toolpath_stiff.analysis.program_check import check_program
 
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
@@ -540,15 +313,13 @@ def check(
     speed = None
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
-    return ProgramCheck(
-        check_program(
-            part.lines,
-            part.name,
-            machine=None if on is None else on.model.machine,
-            origin=origin_si(origin_mm_deg),
-            step=m_from_mm(step_mm),
-            strut_speed=speed,
-            controller=part.controller,
-            **part.options,
-        )
+    return check_program(
+        part.lines,
+        part.name,
+        machine=None if on is None else on.model.machine,
+        origin=origin_si(origin_mm_deg),
+        step=m_from_mm(step_mm),
+        strut_speed=speed,
+        controller=part.controller,
+        **part.options,
     )

@@ -22,6 +22,7 @@ from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.case.contents import reading_arguments
+from toolpath_stiff.case.exercise import BlindExercise
 from toolpath_stiff.case.files import (
     copied,
     drop,
@@ -33,12 +34,11 @@ from toolpath_stiff.case.files import (
     without_lines,
     write_files,
 )
-from toolpath_stiff.case.findings import Findings
 from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES, read_case
 from toolpath_stiff.defaults import MACHINE
-from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.files import read_bytes
-from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.errors import FileError, InputError, TpsError
+from toolpath_stiff.files import read_bytes, reason
+from toolpath_stiff.hints import command_line
 from toolpath_stiff.options import arguments_of
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 from toolpath_stiff.results import Progress
 
 
-class Case(Findings):
+class Case(BlindExercise):
     r"""A folder that holds a machine, measurements, a program, and every step that was done with them.
 
     Attributes
@@ -108,7 +108,11 @@ class Case(Findings):
         (<Machine genhexkins: 6 struts, no effects>, 1)
         """
         place = Path(folder)
-        if (place / CASE_FILE).is_file():
+        try:
+            there = (place / CASE_FILE).is_file()
+        except OSError as error:  # a name that is too long, a circle of links
+            raise FileError(f"cannot open the case {str(folder)!r}: {reason(error)}") from None
+        if there:
             found = cls(place, *read_case(place / CASE_FILE))
             found.check_files()
         else:
@@ -121,8 +125,6 @@ class Case(Findings):
     def __repr__(self) -> str:
         off = f", without {', '.join(self.not_agreed)}: not agreed to" if self.not_agreed else ""
         return f"<Case {self.folder.name}: {self._done} steps{off}>"
-
-    # -- what one does ------------------------------------------------------------------------------------------------
 
     def set_machine(self, machine: str | Path) -> None:
         """Use another machine: a name or a file, of which the case keeps a copy.
@@ -470,80 +472,8 @@ class Case(Findings):
         found, command = self.draft_in(result, progress)
         self.record("draft", found._short(), command=command, python="case.draft()", result=result)
         if found.text:
-            self.add_effects(self.folder / result / f"{found.name}.py")
+            self.add_effects(self.folder / result / f"{found.name}.toml")
         return found
-
-    # -- a blind exercise ---------------------------------------------------------------------------------------------
-
-    def start_exercise(self, seed: int, hidden: str | None = None, layout: str = "tilted") -> None:
-        """Begin a blind exercise: a simulated machine that hides something, and what was measured on it.
-
-        `hidden` and `layout` as of `tps rig new`.
-        """
-        from toolpath_stiff.rig.exercise import new_exercise
-
-        folder = free_name(self.folder, "exercise")
-        new_exercise(self.folder / folder, seed, layout, hidden)
-        machine, data = free_name(self.folder, "machines/machine.toml"), free_name(self.folder, "data/measurements.csv")
-        write_files(
-            self.folder,
-            {
-                machine: (self.folder / folder / "machine.toml").read_bytes(),
-                data: (self.folder / folder / "measurements.csv").read_bytes(),
-            },
-        )
-        change = {"machine": machine, "data": (data,), "aside": (), "on": {}, "exercise": folder}
-        other = {"hidden": hidden, "layout": layout if layout != "tilted" else None}
-        words = "".join(f", {name}={value!r}" for name, value in other.items() if value)
-        self.record(
-            "exercise",
-            f"blind exercise, seed {seed}",
-            change=change,
-            files=[machine, data],
-            command=command_line("rig", "new", *options(seed=seed, out=folder, **other)),
-            python=f"case.start_exercise({seed}{words})",
-        )
-
-    def measure(self, plan_file: str | Path) -> None:
-        """Measure the exercise's machine at the poses of a plan; the readings are added."""
-        from toolpath_stiff.report.words import counted
-        from toolpath_stiff.rig.exercise import measure_again
-
-        name = free_name(self.folder, "data/measured.csv")
-        visit = 1 + sum(step.kind == "measure" for step in self.history)
-        (self.folder / "data").mkdir(exist_ok=True)
-        count = measure_again(self.folder / self._exercise(), str(plan_file), str(self.folder / name), visit)
-        line = command_line("rig", "measure", self._exercise(), *options(at=plan_file, out=name, visit=visit))
-        self.record(
-            "measure",
-            f"{counted(count, 'reading')} measured",
-            change={"data": (*self.state.data, name)},
-            files=[name],
-            command=line,
-            python=f"case.measure({str(plan_file)!r})",
-        )
-
-    def claim(self, effects: str) -> dict[str, Any]:
-        """Open the seal of the exercise and score a claim: names of effects with commas, "none" or "outside"."""
-        from toolpath_stiff.results import json_text
-        from toolpath_stiff.rig.exercise import reveal
-
-        found = reveal(self.folder / self._exercise(), effects)
-        result = self.next_result("reveal")
-        write_files(self.folder, {f"{result}/reveal.json": json_text(found)})
-        self.record(
-            "reveal",
-            f"claimed {effects}: {found['verdict']}",
-            result=result,
-            command=command_line("rig", "reveal", self._exercise(), *options(claim=effects)),
-            python=f"case.claim({effects!r})",
-        )
-        return found
-
-    def _exercise(self) -> str:
-        if not self.state.exercise:
-            raise InputError("no exercise was started in this case", hint="start one with start_exercise(seed)")
-        return self.state.exercise
 
     def _check_effect(self, name: str, values: Mapping[str, Any], on: bool) -> None:
         from toolpath_stiff.machine.model import EffectEntry

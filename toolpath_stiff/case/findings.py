@@ -14,12 +14,14 @@ from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.results import FolderResult, Progress
 
 if TYPE_CHECKING:
-    from toolpath_stiff.api.correction import Plan, Update
-    from toolpath_stiff.api.diagnosis import Comparison, Diagnosis
+    from toolpath_stiff.analysis import Analysis
+    from toolpath_stiff.api.correction import Update
     from toolpath_stiff.api.effects import EffectDraft
-    from toolpath_stiff.api.placements import Placement
-    from toolpath_stiff.api.programs import Analysis
     from toolpath_stiff.case.steps import Step
+    from toolpath_stiff.comparison.compare import Comparison
+    from toolpath_stiff.diagnosis.result import Diagnosis
+    from toolpath_stiff.placement.result import Placement
+    from toolpath_stiff.planning.result import Plan
 
 
 Found = TypeVar("Found", bound=FolderResult)
@@ -54,7 +56,7 @@ class Findings(Contents):
         """What `draft` finds, kept in a folder of the case without a step; and its command."""
         from toolpath_stiff.api.effects import draft_effect
 
-        file = f"{result}/{self._free_effect('missing')}.py"
+        file = f"{result}/{self._free_effect('missing')}.toml"
         found = draft_effect(self.machine, self.data, file, progress=progress)
         (self.folder / result).mkdir(parents=True, exist_ok=True)
         if found.text:

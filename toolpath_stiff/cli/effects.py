@@ -6,6 +6,7 @@ import sys
 from argparse import Namespace
 
 from toolpath_stiff.api import effects
+from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.cli.measurements import measured
 from toolpath_stiff.cli.outputs import check_new, check_written, keep
@@ -20,7 +21,7 @@ examples:
   tps effects list
   tps effects show platform_flexibility
   tps effects new my_screw.py            a working effect to change into yours
-  tps effects draft measurements.csv -o missing.py   what a diagnosis leaves unexplained, as an effect to edit
+  tps effects draft measurements.csv -o missing.toml  what a diagnosis leaves unexplained, as an effect to edit
   tps effects check my_screw.py          shapes, symmetry, units, neutral value, speed; exit code 1 if it fails
   tps effects list --effects my_screw.py
 
@@ -37,7 +38,7 @@ def list_effects(args: Namespace) -> int:
 
 def show_effect(args: Namespace) -> int:
     """Equation, parameters, units, bounds, typical values and their source."""
-    from toolpath_stiff.report.machine import describe_effect, effect_details
+    from toolpath_stiff.report.effects import describe_effect, effect_details
     from toolpath_stiff.results import json_text
     from toolpath_stiff.stiffness.catalogue import find_effect
 
@@ -93,8 +94,9 @@ COMMANDS = {
         draft_effect,
         DATA,
         Machine.load,
+        Measurements.read,
         effects.draft_effect,
-        own("-o --output FILE.py", "file to write", default="missing.py"),
+        own("-o --output FILE.toml", "file to write", default="missing.toml"),
         REPLACE,
         JSON,
     ),

@@ -19,7 +19,7 @@ from toolpath_stiff.files import write_atomically
 
 def measured(args: Namespace) -> tuple[Machine, Measurements]:
     """The machine with its effect files, and the measurements."""
-    return Machine.load(**given(args, Machine.load)), Measurements(args.data)
+    return Machine.load(**given(args, Machine.load)), Measurements(args.data, args.columns)
 
 
 def reduce(args: Namespace) -> int:
@@ -29,32 +29,32 @@ def reduce(args: Namespace) -> int:
       x_mm,y_mm,z_mm,direction     where and along what (X, Y, Z; or dx,dy,dz), optionally a_deg,b_deg,c_deg
       jog_um                       how far the machine was told to move from zero
       force_N,displacement_um      gauge and indicator, positive the way the jog counts
-      date                         2024-03-31, 31.03.2024, 31 Mar 2024, 2024-03, 2024 ...; each date is a loop of its
-      own
+      date                         2024-03-31, 2024-03-31T14:05, 2024-03, 2024; each date is a loop of its own
       point,setup,clamp,repeat,loop,tool_extension_mm,time_min,temperature_C   optional, carried along
-    of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um, length_mm if known; no pose and no
-    jog;
-                                   or strut, date, stiffness_N_per_mm of struts that were reduced elsewhere
-    Another unit in a heading (force_kN, Displacement [mm]) is converted; further columns are not used. In a file of one
-    strut, strut and date may stand above the heading (strut: 3) or in the file's name (strut3_2021-09-16.csv). Struts
-    or dates side by side (F1,d1,F2,d2,...), a row of struts above the quantities, one sheet a strut, blocks one below
-    the other, JSON and LabVIEW's .lvm are read as well.
+    of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um; length_mm, serial if known; no pose,
+                                   no jog; or strut, date, stiffness_N_per_mm of struts that were reduced elsewhere
+    Other names, units and forms of dates are said by a mapping, also kept as RAW.columns.toml (force = "Kraft:kN"):
+      tps reduce RAW --columns "strut=hp, date=day_ms:ms, stiffness=stiff_mean:N/um"
+      tps reduce RAW --columns "strut==3, date=Datum:DD.MM.YYYY, force=Kraft:kN, displacement=Weg:mm"
 
     Records in the order taken, jogging 0, +200, -200, 0 um as ASME B5.54 and the paper do; those of one point,
     direction, set-up, clamping and repeat are one loop. Its stiffness is the secant between the extremes (the paper's
     equation 12); on a bench, force over displacement between the extremes of the force, tension and stretch positive.
     Struts measured on several dates: which of them changed, and when.
     """
+    from toolpath_stiff.readings.raw import reduce as reduced
     from toolpath_stiff.results import json_text
-    from toolpath_stiff.tables import split_name
+    from toolpath_stiff.workbooks import split_name
 
-    reduction = correction.reduce(*args.raw, **given(args, correction.reduce))
+    reduction = reduced(*args.raw, columns=args.columns, compression_positive=args.compression_positive)
     first = Path(split_name(args.raw[0])[0])
     name = first.stem if first.is_file() else first.resolve().name
     out = Path(args.out or f"{name or 'raw'}_measurements.csv")
     files = reduction.files(out, plots=not args.no_plots)
     keep(check_made(args, files), quiet=args.json)
     written = [str(write_atomically(name, content)) for name, content in files.items()]
+    for line in reduction.read_as:
+        print(f"tps: {line}", file=sys.stderr)
     for note in reduction.notes:
         print(f"tps: note: {note}", file=sys.stderr)
     if args.json:
@@ -162,7 +162,7 @@ def plan(args: Namespace) -> int:
     """
     if args.next is not None:
         return _next(args)
-    from toolpath_stiff.report.measuring import names
+    from toolpath_stiff.report.plan import names
 
     target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
     machine, data = measured(args)
@@ -174,7 +174,7 @@ def _next(args: Namespace) -> int:
     """The next visit of a plan: say where, write its rows."""
     from toolpath_stiff.api.next_visits import next_visit
 
-    visit = next_visit(args.next, args.data)
+    visit = next_visit(args.next, args.data, columns=args.columns)
     written = visit.save()
     if args.json:
         sys.stdout.write(visit.to_json())
@@ -187,7 +187,8 @@ COMMANDS = {
     "reduce": Command(
         reduce,
         own("RAW", "raw records: files, FILE.xlsx[#SHEET], folders of files", count="+"),
-        correction.reduce,
+        Measurements.read,
+        own("--compression-positive", "forces of struts on a bench count compression positive"),
         own("--out FILE", "file to write (default: <first RAW>_measurements.csv); loops go beside it"),
         REPLACE,
         NO_PLOTS,

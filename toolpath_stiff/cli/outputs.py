@@ -31,7 +31,7 @@ DESTINATIONS = ("out", "output", "write")
 
 def inputs_of(args: Namespace) -> Iterator[str]:
     """Every argument that may name a file to read; of a workbook's sheet, the workbook."""
-    from toolpath_stiff.tables import split_name
+    from toolpath_stiff.workbooks import split_name
 
     for name, value in vars(args).items():
         if name not in DESTINATIONS:
@@ -178,7 +178,7 @@ def destination(args: Namespace, command: str, sources: Sequence[str], suffix: s
 
 def _default_folder(sources: Sequence[str], suffix: str) -> Path:
     """`reports/NAME`; where that holds results of another file of the name, the folder above stands before it."""
-    from toolpath_stiff.tables import split_name
+    from toolpath_stiff.workbooks import split_name
 
     name = joined_names(sources)
     default = folder = Path(f"reports/{name}{suffix}")
@@ -192,7 +192,7 @@ def _default_folder(sources: Sequence[str], suffix: str) -> Path:
 
 def joined_names(sources: Sequence[str]) -> str:
     """Files by their names without folder, ending and sheet: `first+second`."""
-    from toolpath_stiff.tables import split_name
+    from toolpath_stiff.workbooks import split_name
 
     names = [Path(split_name(source)[0]).stem for source in sources]
     joined = "+".join(names)

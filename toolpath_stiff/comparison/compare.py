@@ -6,9 +6,11 @@ counted and which sign they have: `baseline`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +23,25 @@ from toolpath_stiff.comparison.residuals import Label, Variable, labels, pattern
 from toolpath_stiff.comparison.structure import Scattering, find_structure
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import Content
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.inference.candidates import Candidate, Component
 from toolpath_stiff.inference.covariances import Covariance, Groups
-from toolpath_stiff.inference.doubts import suspect_entries, suspect_rows
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import Baseline, fit_effects
 from toolpath_stiff.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.slips import suspect_entries, suspect_rows
 from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.readings.history import NOTHING, HistoryDocument
 from toolpath_stiff.readings.measurements import Measurements, model_stiffness
+from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import read_parameters
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 
@@ -44,9 +52,11 @@ FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
 TELLS_LAW = 0.01  # smallest over largest singular value from which data tell the law's two constants apart
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """A comparison of n readings of the tip with a model; those of other loops are in the document.
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(FolderResult):
+    """How far the model is from n readings of the tip, where, and how much of it is more than scatter.
+
+    Readings of other loops are in the document only.
 
     Attributes
     ----------
@@ -69,7 +79,23 @@ class Comparison:
         Compliance by link.
     document
         Content of compare.json.
+    inputs
+        Files that were read.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> comparison = tps.compare("nist", "nist-table1", noise_percent=5)
+    >>> round(comparison.to_dict()["baseline"]["mean_abs_error_percent"], 2)
+    9.62
+    >>> comparison.to_frame()[["direction", "measured_N_per_mm", "modelled_N_per_mm"]].shape
+    (42, 3)
+    >>> list(comparison.files(plots=False)), type(comparison.plot()).__name__
+    (['compare.json', 'residuals.csv'], 'Figure')
     """
+
+    command: ClassVar[str] = "compare"
+    shown_by: ClassVar[str] = "compare.page"
 
     predictor: Predictor
     data: Measurements
@@ -84,6 +110,30 @@ class Comparison:
     names: tuple[Label, ...]
     shares: LinkShares
     document: ComparisonDocument
+    inputs: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of compare.json."""
+        return dict(self.document)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a reading, as in `residuals.csv`: measured, modelled, deviation, and what it may vary with."""
+        import pandas as pd
+
+        return pd.read_csv(StringIO(self.view.residuals_csv(self)))
+
+    def plot(self) -> Figure:
+        """Measured against modelled."""
+        figure: Figure = self.view.measured_modelled_png.figure(self)
+        return figure
+
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """The files of `tps compare`."""
+        files: Mapping[str, Content] = self.view.files(self, plots=plots)
+        return files
+
+    def _short(self) -> str:
+        return f"{self.document['machine']}, mean error {self.document['baseline']['mean_abs_error_percent']:.2f} %"
 
     def variance(self, weights: FloatArray) -> float:
         """Of a combination of residuals with weights (n,), by noise and by what it leaves unexplained."""
@@ -130,7 +180,7 @@ def compare(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.readings.measurements import read_measurements
     >>> nist = load_machine("nist")
     >>> found = compare(nist, read_measurements("nist-table1", nist), noise=0.05, draws=200)

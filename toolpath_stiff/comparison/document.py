@@ -22,12 +22,12 @@ from toolpath_stiff.comparison.structure import (
     Scattering,
     far_off,
 )
-from toolpath_stiff.inference.doubts import SuspectEntry
+from toolpath_stiff.inference.errors import ErrorFigures, deviation_percent, error_figures, errors_text
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import ErrorFigures, deviation_percent, error_figures, errors_text
-from toolpath_stiff.inference.judgement import question
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.inference.question import question
+from toolpath_stiff.inference.slips import SuspectEntry
 from toolpath_stiff.readings.history import HistoryDocument
 from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.units import certain, mm_from_m, n_per_um_from_n_per_m

@@ -12,15 +12,11 @@ from toolpath_stiff.correction.ladder import NEEDED, Step, Support, Update
 from toolpath_stiff.correction.strut_law import StrutLawSearch
 from toolpath_stiff.correction.update import Correction
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.document import HeldErrors, RoundedErrors, interval, rounded_errors
+from toolpath_stiff.diagnosis.document import held_errors, interval, rounded_errors
+from toolpath_stiff.documents import Document
+from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent, errors_text
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.fits import (
-    LAW_REFITTED,
-    deviation_percent,
-    error_falls,
-    errors_text,
-    gain_in_standard_errors,
-)
+from toolpath_stiff.inference.left_out import error_falls, gain_in_standard_errors
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.contract import joined
@@ -35,27 +31,6 @@ class LawEntry(TypedDict):
     length_mm: float | None
     stiffness: float | None
     sd: float | None
-
-
-class DirectionErrors(HeldErrors):
-    """Errors along one direction."""
-
-    readings: int
-
-
-class StepEntry(HeldErrors):
-    """A rung of the ladder."""
-
-    name: str
-    effects: list[str]
-    findings: list[str]
-    held_out_rms_percent: float | None
-    by_direction: dict[str, DirectionErrors]
-    strut_law_N_per_um: list[LawEntry]  # noqa: N815  as in the file
-    parameters: dict[str, dict[str, Any]]
-    outliers: int
-    held_out_gain_in_se: NotRequired[float | None]
-    held_out_se_percent: NotRequired[float | None]
 
 
 class SupportEntry(TypedDict):
@@ -103,9 +78,9 @@ class UpdateDocument(TypedDict):
     text: str
     question: str
     objective: str
-    baseline: StepEntry
-    strut_law_refitted: RoundedErrors
-    steps: list[StepEntry]
+    baseline: Document
+    strut_law_refitted: Document
+    steps: list[Document]
     support: list[SupportEntry]
     described: list[str]  # effects whose form was read off these readings, and that no others have confirmed
     rejected: list[SupportEntry]
@@ -237,20 +212,16 @@ def _left_out(update: Update) -> str:
     return f" ({held:.2f} % at left-out points)" if np.isfinite(held) else ""
 
 
-def _step(update: Update, k: int) -> StepEntry:
+def _step(update: Update, k: int) -> Document:
     step = update.steps[k]
     held = step.held
     along = directions(update.data.of_tip)
-    errors = rounded_errors(step.residual)
-    found: StepEntry = {
+    found: dict[str, Any] = {
         "name": step.name,
         "effects": list(step.fit.names),
-        "mean_abs_error_percent": errors["mean_abs_error_percent"],
-        "bias_percent": errors["bias_percent"],
-        "rms_percent": errors["rms_percent"],
+        **rounded_errors(step.residual),
         "findings": list(step.fit.findings),
-        "held_out_error_percent": json_number(100.0 * held.mean_error),
-        "held_out_rms_percent": json_number(100.0 * held.rms),
+        **held_errors(held),
         "by_direction": {
             name: {
                 "readings": int((along == name).sum()),

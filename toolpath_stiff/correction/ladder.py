@@ -33,24 +33,15 @@ from toolpath_stiff.diagnosis.diagnose import FEWEST
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, testable_effects
 from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
+from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import (
-    AS_GIVEN,
-    LAW_REFITTED,
-    Baseline,
-    HeldOut,
-    add_effect,
-    base_fit,
-    error_falls,
-    gain_in_standard_errors,
-    held_out,
-    of_readings,
-)
+from toolpath_stiff.inference.fits import Baseline, add_effect, base_fit
 from toolpath_stiff.inference.gates import Simulator, gain_threshold
 from toolpath_stiff.inference.hypotheses import Family, score_families, signatures, tables_of
-from toolpath_stiff.inference.judgement import question
+from toolpath_stiff.inference.left_out import HeldOut, error_falls, gain_in_standard_errors, held_out, of_readings
 from toolpath_stiff.inference.noise import Noise, noise_models
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.stiffness.contract import Effect

@@ -22,8 +22,8 @@ from toolpath_stiff.readings.measurements import NIST_TABLE_1
 from toolpath_stiff.stiffness.contract import SETUP
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.tables import split_name
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
+from toolpath_stiff.workbooks import split_name
 
 
 def data_hash(files: Sequence[str]) -> str:

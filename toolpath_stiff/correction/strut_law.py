@@ -20,11 +20,13 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.correction.ladder import Step, Update
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, HeldOut
-from toolpath_stiff.inference.judgement import question
+from toolpath_stiff.inference.fits import Baseline
+from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import NO_CHANGE, Predictor, at_both_ends, scaled_law
+from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.units import n_per_um_from_n_per_m

@@ -109,7 +109,7 @@ def update(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.readings.measurements import read_measurements
     >>> nist = load_machine("nist")
     >>> found = update(nist, read_measurements("nist-table1", nist), strut_law=True)

@@ -7,41 +7,41 @@ needs to judge it: fits with intervals, errors held out by point, what these dat
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
+from toolpath_stiff.diagnosis.result import NAMING, Diagnosis
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import testable_effects
-from toolpath_stiff.inference.doubts import (
-    SlipSize,
-    SuspectEntry,
+from toolpath_stiff.inference.confounding import confounding
+from toolpath_stiff.inference.detectable import detectable_sizes
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import Baseline, refine
+from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
+from toolpath_stiff.inference.left_out import held_out, of_readings
+from toolpath_stiff.inference.noise import JOINT_ERROR, noise_models
+from toolpath_stiff.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.inference.slips import (
     alone,
     mended,
     slips_that_show,
     suspect_entries,
     suspect_rows,
 )
-from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import Baseline, HeldOut, held_out, of_readings, refine
-from toolpath_stiff.inference.hypotheses import Confounding, Detectable, Unexcluded, confounding, detectable_sizes
-from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
-from toolpath_stiff.inference.noise import JOINT_ERROR, Noise, noise_models
-from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.document import nothing_gained, plan_rows
-from toolpath_stiff.planning.plan import plan_measurements
+from toolpath_stiff.planning.plan import nothing_gained, plan_measurements
 from toolpath_stiff.planning.rivals import rivals_of
+from toolpath_stiff.planning.rows import plan_rows
 from toolpath_stiff.planning.visits import Costs, Menu
 from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
 from toolpath_stiff.readings.measurements import Measurements
-from toolpath_stiff.stiffness.contract import Conditions, Effect
+from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
 if TYPE_CHECKING:
@@ -50,132 +50,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.units import Pose
 
 
-NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
-
-
 FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect and a few to spare
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """Which effect is missing, and what stands behind it.
-
-    Attributes
-    ----------
-    verdict, plausible
-        Common to all noise models; see `verdict`.
-    judgements
-        Name of the noise model -> judgement. The one that is written out in full is `main`.
-    main
-        The judgement of the measured or stated noise, else of the high guess.
-    data, machine, effects
-        What was diagnosed, with the effects that these data can test.
-    cannot_test
-        Effect -> missing columns; empty where nothing in these data depends on the effect.
-    as_given, base, fits
-        The machine file as it stands; its strut law refitted; effect or "a + b" -> final fit of all that were offered.
-    held_out_base, held_out
-        Errors at left-out points.
-    confounding, detectable
-        What these data cannot tell apart, and what they would have shown.
-    files, seed, command, asked
-        For the record, and for the commands that go on from here.
-    next_measurements, remarks
-        Where the verdict is `ambiguous`: rows of a plan that would tell the explanations apart; what it cannot do.
-        Where it is `described`: of a plan that would confirm it.
-    path
-        How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
-    portrait
-        What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
-    alike
-        What else would look the same as the effect that is named (`alike_of`); None where nothing would, or none is.
-    unexcluded
-        Effects that the readings neither show nor exclude beside the likeliest explanation, at a size that matters.
-    suspects
-        Rows that look mistyped; `data` no longer holds those that are clear.
-    slips
-        The smallest slips of a pose that these readings would show; none where rows were not looked at.
-    loops
-        Readings of indicators beside the tip against the likeliest explanation. Everything above with an entry a
-        reading is of those of the tip.
-    """
-
-    verdict: str
-    plausible: tuple[str, ...]
-    judgements: dict[str, Judgement]
-    main: Judgement
-    data: Measurements
-    machine: Machine
-    effects: tuple[Effect, ...]
-    cannot_test: dict[str, tuple[str, ...]]
-    as_given: Fit
-    base: Fit
-    fits: dict[str, Fit]
-    held_out_base: HeldOut
-    held_out: dict[str, HeldOut]
-    confounding: Confounding
-    detectable: tuple[Detectable, ...]
-    files: tuple[str, ...]
-    seed: int
-    command: str = ""
-    asked: Asked | None = None
-    next_measurements: tuple[dict[str, Any], ...] = ()
-    remarks: tuple[str, ...] = ()
-    path: dict[str, Any] | None = None
-    portrait: Portrait | None = None
-    alike: Alike | None = None
-    unexcluded: tuple[Unexcluded, ...] = ()
-    suspects: tuple[SuspectEntry, ...] = ()
-    slips: tuple[SlipSize, ...] = ()
-    loops: LoopsDocument = field(default_factory=lambda: cast("LoopsDocument", {"by_loop": [], "readings": []}))
-
-    @property
-    def noise(self) -> Noise:
-        """The noise model of `main`."""
-        return self.main.noise
-
-    @property
-    def predictor(self) -> Predictor:
-        """The model's answers to the data."""
-        return self.main.problem.predictor
-
-    @property
-    def explanations(self) -> tuple[str, ...]:
-        """Hypotheses left standing under any noise model, the most likely first: effects, `none`, "a + b".
-
-        One alone where one is the answer.
-        """
-        most = 1 if self.verdict in NAMING else None
-        return tuple(dict.fromkeys(name for one in self.judgements.values() for name in one.explanations[:most]))
-
-    @property
-    def before(self) -> FloatArray:
-        """(n,) ln measured - ln modelled of the machine file as given."""
-        return self.as_given.residual
-
-    @property
-    def best(self) -> str | None:
-        """Name of the best explanation by an effect or a pair; None where there is none."""
-        offered = [name for name in self.ranking() if name in self.fits and any(s.any() for s in self.fits[name].sizes)]
-        return offered[0] if offered else None
-
-    @property
-    def after(self) -> FloatArray:
-        """(n,) residual of the best explanation; with the strut law refitted where there is none, or none is needed."""
-        if self.best is None or self.verdict == "adequate":
-            return self.base.residual
-        return self.fits[self.best].residual
-
-    @property
-    def law(self) -> FloatArray:
-        """(2,) the strut law's logarithms with the best explanation."""
-        return self.base.law if self.best is None else self.fits[self.best].law
-
-    def ranking(self) -> list[str]:
-        """Explanations, most likely first: by probability, then by evidence."""
-        likely = sorted(self.main.probability.items(), key=lambda item: (-item[1], item[0]))
-        names = [name for name, weight in likely if weight > 0.0 and name in self.fits]
-        return names + [f.name for f in self.main.families if f.name not in names]
 
 
 def diagnose(
@@ -192,9 +67,10 @@ def diagnose(
     origin: Pose | None = None,
     setup: str | None = None,
     temperature: float | None = None,
-    files: Sequence[str] = (),
-    command: str = "",
+    names: Sequence[str] = (),
+    line: str = "",
     asked: Asked | None = None,
+    inputs: tuple[str, ...] = (),
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Find out which physical effect the model lacks, if any: everything that `tps diagnose` says.
@@ -218,8 +94,9 @@ def diagnose(
         on what this function returns; None: not at all.
     origin, setup, temperature
         Placement of that program (mm, degrees), set-up and degrees C under which it runs; None: the machine file's.
-    files, command, asked
-        Names of the measurement files and the command, for the record; what the commands that go on from here carry.
+    names, line, asked, inputs
+        Names of the measurement files and the command, for the record; what the commands that go on from here carry;
+        files that were read.
     progress
         Told what is being done.
 
@@ -230,7 +107,7 @@ def diagnose(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.readings.measurements import read_measurements
     >>> nist = load_machine("nist")
     >>> found = diagnose(nist, read_measurements("nist-table1", nist), noise=0.10, plan_next=False)
@@ -238,8 +115,10 @@ def diagnose(
     'ambiguous'
     """
     say = progress or (lambda text: None)
-    found = _examined(machine, data, noise, strut_spread, joint_error, effect_files, seed, tuple(files), say)
-    found = replace(found, command=command, asked=asked, portrait=portrait_of(found, say), alike=alike_of(found))
+    found = _examined(machine, data, noise, strut_spread, joint_error, effect_files, seed, tuple(names), say)
+    found = replace(
+        found, line=line, asked=asked, inputs=inputs, portrait=portrait_of(found, say), alike=alike_of(found)
+    )
     if found.verdict not in ("ambiguous", "described"):
         return found
     if plan_next:
@@ -264,7 +143,7 @@ def _examined(
     joint_error: float,
     effect_files: Sequence[str | Path],
     seed: int,
-    files: tuple[str, ...],
+    names: tuple[str, ...],
     say: Callable[[str], None],
 ) -> Diagnosis:
     """From readings to verdict under each noise model, then what stands behind the verdict that they share."""
@@ -305,14 +184,14 @@ def _examined(
     held = {name: held_out(fit, data.point) for name, fit in fits.items()}
     tip = data.tip
     return Diagnosis(
-        verdict, plausible, judgements, main, data.of_tip, machine, effects, cannot,
+        verdict, list(plausible), judgements, main, data.of_tip, machine, effects, cannot,
         of_readings(baseline.as_given, tip), of_readings(baseline.refitted, tip),
         {name: of_readings(fit, tip) for name, fit in fits.items()},
         held_out(baseline.refitted, data.point).of_readings(tip),
         {name: one.of_readings(tip) for name, one in held.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
-        files or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries),
+        names or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries),
         unexcluded=tuple(one for one in unexcluded(main) if one.effect.name not in plausible),
         slips=slips_that_show(main.problem, main.likeliest) if looked_at else (), loops=_loops(main, fits),
     )  # fmt: skip
@@ -436,8 +315,8 @@ def next_measurements(
     for row in rows:
         row["why"] = plan.why[int(row["clamp"]) - 1]
     remarks = [
-        f"{pair.first} and {pair.second}: tip stiffness cannot tell them apart; put an indicator "
-        + " or ".join(f"{place}" for place in dict.fromkeys(pair.indicators.values()))
+        f"{' and '.join(pair.effects)}: tip stiffness cannot tell them apart; put an indicator "
+        + " or ".join(f"{place}" for place in dict.fromkeys(pair.indicator_across.values()))
         for pair in plan.pairs
         if not pair.separable
     ]

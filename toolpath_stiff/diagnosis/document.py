@@ -1,14 +1,14 @@
-"""A diagnosis as a document: the content of diagnose.json, in shop units."""
+"""A diagnosis as a document: the content of diagnose.json, in shop units; None stands for what JSON cannot hold."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypedDict
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.diagnose import Diagnosis
 from toolpath_stiff.diagnosis.words import (
     assumptions,
     beside_text,
@@ -20,258 +20,39 @@ from toolpath_stiff.diagnosis.words import (
     why,
     would_tell,
 )
+from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import Component
-from toolpath_stiff.inference.doubts import SuspectEntry
-from toolpath_stiff.inference.drawn import DrawnEntry
+from toolpath_stiff.inference.confounding import CONFOUNDED
+from toolpath_stiff.inference.errors import error_figures
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.fits import error_figures, gain_in_standard_errors
-from toolpath_stiff.inference.hypotheses import CONFOUNDED, Detectable, Family, Unexcluded, averaged_interval
+from toolpath_stiff.inference.hypotheses import Family, averaged_interval
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
-from toolpath_stiff.portrait.document import PortraitEntry, SameEntry, alike_entry, portrait_entry
+from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
+from toolpath_stiff.portrait.document import alike_entry, portrait_entry
 from toolpath_stiff.stiffness.contract import joined
-from toolpath_stiff.units import certain, json_number, mm_from_m, n_per_um_from_n_per_m
+from toolpath_stiff.units import DIGITS, certain, json_number, mm_from_m, n_per_um_from_n_per_m
 
 if TYPE_CHECKING:
-    from toolpath_stiff.comparison.loop_readings import LoopsDocument
+    from toolpath_stiff.diagnosis.result import Diagnosis
 
 
 TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
 
 
-class RoundedErrors(TypedDict):
-    """Errors of a model over some readings, as the paper counts them; %, None where there is none."""
-
-    mean_abs_error_percent: float | None
-    bias_percent: float | None
-    rms_percent: float | None
-
-
-class HeldErrors(RoundedErrors):
-    """The same, and at left-out points."""
-
-    held_out_error_percent: float | None
-
-
-class LawEntry(TypedDict):
-    """The strut law at one length; None: at every length."""
-
-    length_mm: float | None
-    stiffness_N_per_um: float | None
-    machine_file_N_per_um: float | None
-    sd_percent: float | None
-
-
-class BaselineEntry(HeldErrors):
-    """The model without a further effect, its strut law refitted; and as given."""
-
-    held_out_rms_percent: float | None
-    noise_percent: float | None
-    noise_floor_percent: float | None
-    probability: float | None
-    probability_outside: float | None
-    adequate: bool
-    words: str
-    as_given: HeldErrors
-    law: list[LawEntry]
-
-
-class ParameterEntry(TypedDict):
-    """A fitted parameter in its own unit with its 95 % interval; None stands for an infinite value."""
-
-    value: float | None
-    unit: str
-    interval: list[float | None]
-
-
-class Explanation(TypedDict):
-    """How a hypothesis stands."""
-
-    probability: float | None
-    log_evidence: float | None
-    words: str
-    mean_abs_error_percent: float | None
-    finding: str
-    held_out_error_percent: float | None
-    held_out_rms_percent: float | None
-    held_out_gain_in_se: float | None
-    adequate: bool
-
-
-class CandidateEntry(Explanation):
-    """A single effect."""
-
-    effect: str
-    title: str
-    link: str
-    parameters: dict[str, ParameterEntry]
-    choice: dict[str, Any]
-    eligible: bool
-    remark: str
-
-
-class TestedEntry(CandidateEntry):
-    """A single effect that is there; the probability of its absolute test, None where that was not made."""
-
-    adequate_probability: float | None
-
-
-class _Common(TypedDict):
-    """What every candidate's entry begins with."""
-
-    effect: str
-    title: str
-    link: str
-    probability: float | None
-    log_evidence: float | None
-    words: str
-
-
-class PairEntry(Explanation):
-    """Two effects; parameters by effect, with what it acts on."""
-
-    effects: list[str]
-    parameters: dict[str, dict[str, Any]]
-    adequate_probability: float | None
-
-
-class NoiseEntry(TypedDict):
-    """The noise model that is written out."""
-
-    name: str
-    repeat_percent: float | None
-    clamping_percent: float | None
-    strut_spread_percent: float | None
-    joint_error_mm: float | None
-    origin: str
-
-
-class GatesEntry(TypedDict):
-    """The absolute test of the model without a further effect."""
-
-    baseline_probability: float | None
-    squares: float | None
-    squares_probability: float | None
-    simulated_squares: list[float | None]
-    structure_probability: float | None
-    structure: str
-    gain_probability: float | None
-    gain_threshold: float | None
-
-
-class InShort(TypedDict):
-    """A judgement under one noise model."""
-
-    verdict: str
-    plausible: list[str]
-    noise_percent: float | None
-    origin: str
-    probability: dict[str, float | None]
-    baseline_gate_probability: float | None
-    structure: str
-
-
-class DetectableEntry(TypedDict):
-    """The smallest size of a parameter that these data would have shown, in its own unit."""
-
-    effect: str
-    parameter: str
-    unit: str
-    size: float | None
-    rms_percent: float | None
-    detectable: bool
-
-
-class SlipSizeEntry(TypedDict):
-    """By how much a column of a clamping's readings must be off to stand out; None where that is not known."""
-
-    column: str
-    unit: str
-    size: float | None
-
-
-class ConfoundingEntry(TypedDict):
-    """Which effects these data cannot tell apart."""
-
-    effects: list[str]
-    matrix: list[list[float | None]]
-    sets: list[list[str]]
-    threshold: float
-
-
-class NotExcluded(TypedDict):
-    """An effect that may be there beside the likeliest explanation: up to which size, and what would tell."""
-
-    effect: str
-    title: str
-    parameter: str
-    unit: str
-    choice: dict[str, Any]
-    up_to: float | None
-    rms_percent: float | None
-    left_percent: float | None
-    probability: float | None
-    would_tell: str
-
-
-class CannotTest(TypedDict):
-    """An effect and the columns that the data lack for it."""
-
-    effect: str
-    missing: list[str]
-
-
-class DiagnosisDocument(TypedDict):
-    """The content of diagnose.json."""
-
-    verdict: str
-    text: str
-    question: str
-    draft_status: DrawnEntry | None
-    baseline: BaselineEntry
-    candidates: list[CandidateEntry]
-    pairs: list[PairEntry]
-    plausible: list[str]
-    explanations: list[str]
-    best: str | None
-    why: list[str]
-    cannot_test: list[CannotTest]
-    next_measurements: list[dict[str, Any]]
-    next: list[str]
-    by_noise: dict[str, InShort]
-    noise: NoiseEntry
-    gates: GatesEntry
-    detectable: list[DetectableEntry]
-    confounding: ConfoundingEntry
-    path: dict[str, Any] | None
-    portrait: PortraitEntry | None
-    looks_the_same: SameEntry | None
-    not_excluded: list[NotExcluded]
-    not_excluded_text: str
-    assumptions: list[str]
-    warnings: list[str]
-    notes: list[str]
-    suspect_rows: list[SuspectEntry]
-    detectable_slips: list[SlipSizeEntry]
-    seed: int
-    machine: str
-    effects: list[str]
-    data: list[str]
-    readings: int
-    loops: LoopsDocument
-    command: str
-
-
-def document(diagnosis: Diagnosis) -> DiagnosisDocument:
+def document(diagnosis: Diagnosis) -> dict[str, Any]:
     """Everything that `diagnose.json` holds."""
-    main = diagnosis.main
+    main, alike = diagnosis.main, diagnosis.alike
+    drawn = unconfirmed(diagnosis) or main.drawn
+    likely = main.probability
+    families = sorted(main.families, key=lambda f: (-likely.get(f.name, 0.0), -f.log_evidence, f.name))
     return {
         "verdict": diagnosis.verdict,
         "text": verdict_text(diagnosis),
         "question": main.question,
-        "draft_status": None if (drawn := unconfirmed(diagnosis) or main.drawn) is None else drawn.document,
+        "draft_status": None if drawn is None else drawn.document,
         "baseline": _baseline(diagnosis),
-        "candidates": _candidates(diagnosis),
+        "candidates": [_candidate(diagnosis, family) for family in families],
         "pairs": _pairs(diagnosis),
         "plausible": list(diagnosis.plausible),
         "explanations": list(diagnosis.explanations),
@@ -281,11 +62,28 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
             {"effect": name, "missing": list(columns)} for name, columns in sorted(diagnosis.cannot_test.items())
         ],
         "next_measurements": list(diagnosis.next_measurements),
-        "next": next_steps(diagnosis, diagnosis.asked or Asked(diagnosis.files)),
+        "next": next_steps(diagnosis, diagnosis.asked or Asked(diagnosis.names)),
         "by_noise": {name: _in_short(judgement) for name, judgement in diagnosis.judgements.items()},
-        "noise": _noise(main),
+        "noise": {
+            "name": main.noise.name,
+            "repeat_percent": _percent(main.noise.typical_repeat, 4),
+            "clamping_percent": _percent(main.noise.clamping, 4),
+            "strut_spread_percent": _percent(main.noise.strut_spread, 4),
+            "joint_error_mm": json_number(float(mm_from_m(main.noise.joint_error)), 4),
+            "origin": main.noise.origin,
+        },
         "gates": _gates(main),
-        "detectable": [_detectable(one) for one in diagnosis.detectable],
+        "detectable": [
+            {
+                "effect": smallest.effect,
+                "parameter": smallest.parameter.name,
+                "unit": smallest.parameter.unit,
+                "size": json_number(smallest.value / smallest.parameter.si) if smallest.seen else None,
+                "rms_percent": _percent(smallest.rms),
+                "detectable": smallest.seen,
+            }
+            for smallest in diagnosis.detectable
+        ],
         "confounding": {
             "effects": list(diagnosis.confounding.names),
             "matrix": [[json_number(x, 3) for x in row] for row in diagnosis.confounding.matrix.tolist()],
@@ -294,169 +92,159 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         },
         "path": diagnosis.path,
         "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
-        "looks_the_same": (
-            None if diagnosis.alike is None else alike_entry(diagnosis.explanations[0], diagnosis.alike)
-        ),
-        "not_excluded": [_not_excluded(one) for one in diagnosis.unexcluded],
+        "looks_the_same": None if alike is None else alike_entry(diagnosis.explanations[0], alike),
+        "not_excluded": [
+            {
+                "effect": hidden.effect.name,
+                "title": hidden.effect.title,
+                "parameter": hidden.parameter.name,
+                "unit": hidden.parameter.unit,
+                "choice": dict(hidden.candidate.choice),
+                "up_to": json_number(hidden.value / hidden.parameter.si, 2),
+                "rms_percent": _percent(hidden.rms, 2),
+                "left_percent": _percent(hidden.left, 2),
+                "probability": json_number(hidden.probability, 2),
+                "would_tell": would_tell(hidden),
+            }
+            for hidden in diagnosis.unexcluded
+        ],
         "not_excluded_text": beside_text(diagnosis.unexcluded),
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": [*diagnosis.data.notes, *doubts(diagnosis)],
         "suspect_rows": list(diagnosis.suspects),
         "detectable_slips": [
-            {"column": one.column, "unit": one.unit, "size": json_number(one.size, 2)} for one in diagnosis.slips
+            {"column": slip.column, "unit": slip.unit, "size": json_number(slip.size, 2)} for slip in diagnosis.slips
         ],
         "seed": diagnosis.seed,
         "machine": diagnosis.machine.name,
         "effects": diagnosis.predictor.effects_that_act,
-        "data": list(diagnosis.files),
+        "data": list(diagnosis.names),
         "readings": len(diagnosis.data),
         "loops": certain(diagnosis.loops),
-        "command": diagnosis.command,
+        "command": diagnosis.line,
     }
 
 
-def _not_excluded(one: Unexcluded) -> NotExcluded:
-    return {
-        "effect": one.effect.name,
-        "title": one.effect.title,
-        "parameter": one.parameter.name,
-        "unit": one.parameter.unit,
-        "choice": dict(one.candidate.choice),
-        "up_to": json_number(one.value / one.parameter.si, 2),
-        "rms_percent": json_number(100.0 * one.rms, 2),
-        "left_percent": json_number(100.0 * one.left, 2),
-        "probability": json_number(one.probability, 2),
-        "would_tell": would_tell(one),
-    }
+def _percent(share: float, digits: int = DIGITS) -> float | None:
+    return json_number(100.0 * share, digits)
 
 
-def _detectable(one: Detectable) -> DetectableEntry:
-    return {
-        "effect": one.effect,
-        "parameter": one.parameter.name,
-        "unit": one.parameter.unit,
-        "size": json_number(one.value / one.parameter.si) if one.seen else None,
-        "rms_percent": json_number(100.0 * one.rms),
-        "detectable": one.seen,
-    }
-
-
-def rounded_errors(residual: FloatArray) -> RoundedErrors:
+def rounded_errors(residual: FloatArray) -> dict[str, float | None]:
     """`error_figures` as a document has them."""
-    found = error_figures(residual)
+    figures = error_figures(residual)
     return {
-        "mean_abs_error_percent": json_number(found["mean_abs_error_percent"]),
-        "bias_percent": json_number(found["bias_percent"]),
-        "rms_percent": json_number(found["rms_percent"]),
+        "mean_abs_error_percent": json_number(figures["mean_abs_error_percent"]),
+        "bias_percent": json_number(figures["bias_percent"]),
+        "rms_percent": json_number(figures["rms_percent"]),
     }
 
 
-def _baseline(diagnosis: Diagnosis) -> BaselineEntry:
-    held = diagnosis.held_out_base
-    law = diagnosis.machine.strut_law
+def held_errors(held: HeldOut) -> dict[str, float | None]:
+    """Errors at left-out points."""
+    return {"held_out_error_percent": _percent(held.mean_error), "held_out_rms_percent": _percent(held.rms)}
+
+
+def _baseline(diagnosis: Diagnosis) -> Document:
+    law, probability = diagnosis.machine.strut_law, diagnosis.main.probability
     count = len(law.parameters)  # of a constant law one, which belongs to no length
     factors = np.exp(diagnosis.base.law[:count])
     deviations = np.sqrt(np.diag(diagnosis.base.covariance)[:count])
     ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))[:count]
     return {
         **rounded_errors(diagnosis.base.residual),
-        "held_out_error_percent": json_number(100.0 * held.mean_error),
-        "held_out_rms_percent": json_number(100.0 * held.rms),
-        "noise_percent": json_number(100.0 * diagnosis.noise.typical),
+        **held_errors(diagnosis.held_out_base),
+        "noise_percent": _percent(diagnosis.noise.typical),
         "noise_floor_percent": json_number(diagnosis.noise.floor_percent),
-        "probability": json_number(diagnosis.main.probability.get(NONE, 0.0)),
-        "probability_outside": json_number(diagnosis.main.probability.get(OUTSIDE, 0.0)),
+        "probability": json_number(probability.get(NONE, 0.0)),
+        "probability_outside": json_number(probability.get(OUTSIDE, 0.0)),
         "adequate": bool(diagnosis.main.base_gate.probability > FALSE_ALARM),
         "words": row_words(diagnosis, NONE),
         # Nothing is fitted: leaving points out changes nothing.
         "as_given": {
             **rounded_errors(diagnosis.as_given.residual),
-            "held_out_error_percent": json_number(100.0 * float(diagnosis.as_given.errors.mean())),
+            "held_out_error_percent": _percent(float(diagnosis.as_given.errors.mean())),
         },
         "law": [
             {
                 "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),
                 "stiffness_N_per_um": json_number(n_per_um_from_n_per_m(stiffness * factor)),
                 "machine_file_N_per_um": json_number(n_per_um_from_n_per_m(stiffness)),
-                "sd_percent": json_number(100.0 * deviation, 3),
+                "sd_percent": _percent(deviation, 3),
             }
             for (length, stiffness), factor, deviation in zip(ends, factors, deviations, strict=True)
         ],
     }
 
 
-def _candidates(diagnosis: Diagnosis) -> list[CandidateEntry]:
-    main = diagnosis.main
-    ranked = sorted(main.families, key=lambda f: (-main.probability.get(f.name, 0.0), -f.log_evidence, f.name))
-    return [_candidate(diagnosis, family) for family in ranked]
-
-
-def _candidate(diagnosis: Diagnosis, family: Family) -> CandidateEntry | TestedEntry:
-    main = diagnosis.main
-    fit = diagnosis.fits.get(family.name)
-    gate = main.gates.get(family.name)
-    base_passes = main.base_gate.probability > FALSE_ALARM
-    common: _Common = {
-        "effect": family.name,
-        "title": family.effect.title,
-        "link": family.effect.link,
-        "probability": json_number(main.probability.get(family.name, 0.0)),
-        "log_evidence": json_number(family.log_evidence - main.base.log_evidence),
-        "words": row_words(diagnosis, family.name),
+def _standing(diagnosis: Diagnosis, name: str, log_evidence: float) -> Document:
+    """How a hypothesis stands against the others."""
+    return {
+        "probability": json_number(diagnosis.main.probability.get(name, 0.0)),
+        "log_evidence": json_number(log_evidence - diagnosis.main.base.log_evidence),
+        "words": row_words(diagnosis, name),
     }
+
+
+def _errors(diagnosis: Diagnosis, fit: Fit, held: HeldOut) -> Document:
+    """Errors of a fit, and by how much those at left-out points fall."""
+    base = diagnosis.held_out_base
+    return {
+        "mean_abs_error_percent": _percent(float(fit.errors.mean())),
+        "finding": joined(fit.findings),
+        **held_errors(held),
+        "held_out_gain_in_se": 0.0 if held is base else json_number(gain_in_standard_errors(base, held), 3),
+    }
+
+
+def _candidate(diagnosis: Diagnosis, family: Family) -> Document:
+    """A single effect; where it fits best when it is absent, without sizes."""
+    fit, gate = diagnosis.fits.get(family.name), diagnosis.main.gates.get(family.name)
+    base_passes = diagnosis.main.base_gate.probability > FALSE_ALARM
+    effect = {"effect": family.name, "title": family.effect.title, "link": family.effect.link}
+    common = {**effect, **_standing(diagnosis, family.name, family.log_evidence)}
     if fit is None or not any(size.any() for size in fit.sizes):
         return {
             **common,
             "parameters": {},
             "choice": {},
-            "mean_abs_error_percent": json_number(100.0 * float(diagnosis.base.errors.mean())),
+            **_errors(diagnosis, diagnosis.base, diagnosis.held_out_base),
             "finding": "",
-            "held_out_error_percent": json_number(100.0 * diagnosis.held_out_base.mean_error),
-            "held_out_rms_percent": json_number(100.0 * diagnosis.held_out_base.rms),
-            "held_out_gain_in_se": 0.0,
             "adequate": base_passes,
             "eligible": False,
             "remark": "fits best when it is absent",
         }
-    held = diagnosis.held_out[family.name]
-    adequate = gate.probability > ADEQUATE if gate is not None else base_passes
     bounded = fit.at_upper_bound()
     remark = f"{', '.join(bounded)} at its bound" if bounded else ""
-    if not remark and gate is None and not base_passes:
-        remark = "not tested further"
     return {
         **common,
         "parameters": parameters(fit, family),
         "choice": dict(fit.candidates[0].choice),
-        "mean_abs_error_percent": json_number(100.0 * float(fit.errors.mean())),
-        "finding": joined(fit.findings),
-        "held_out_error_percent": json_number(100.0 * held.mean_error),
-        "held_out_rms_percent": json_number(100.0 * held.rms),
-        "held_out_gain_in_se": json_number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
-        "adequate": bool(adequate),
+        **_errors(diagnosis, fit, diagnosis.held_out[family.name]),
+        "adequate": bool(base_passes if gate is None else gate.probability > ADEQUATE),
         "adequate_probability": None if gate is None else json_number(gate.probability, 3),
         "eligible": not bounded,
-        "remark": remark,
+        "remark": remark or ("not tested further" if gate is None and not base_passes else ""),
     }
 
 
-def parameters(fit: Fit, family: Family | None = None) -> dict[str, ParameterEntry]:
+def parameters(fit: Fit, family: Family | None = None) -> Mapping[str, Document]:
     """Key -> value, unit, 95 % interval, of all effects of a fit; None stands for an infinite value."""
-    found: dict[str, ParameterEntry] = {}
-    index = 0
-    for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True):
-        for component, size in zip(candidate.components, sizes, strict=True):
-            low, high = interval(fit, index, component, float(size), family)
-            si = component.parameter.si
-            ends = sorted((component.value(low) / si, component.value(high) / si))
-            found[component.parameter.key] = {
-                "value": json_number(component.value(float(size)) / si),
-                "unit": component.parameter.unit,
-                "interval": [json_number(ends[0]), json_number(ends[1])],
-            }
-            index += 1
-    return found
+    fitted = [
+        (component, float(size))
+        for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True)
+        for component, size in zip(candidate.components, sizes, strict=True)
+    ]
+    entries = {}
+    for index, (component, size) in enumerate(fitted):
+        si = component.parameter.si
+        ends = sorted(component.value(end) / si for end in interval(fit, index, component, size, family))
+        entries[component.parameter.key] = {
+            "value": json_number(component.value(size) / si),
+            "unit": component.parameter.unit,
+            "interval": [json_number(end) for end in ends],
+        }
+    return entries
 
 
 def interval(
@@ -490,38 +278,30 @@ def interval(
     return max(0.0, low_bound), min(upper, high_bound)
 
 
-def _pairs(diagnosis: Diagnosis) -> list[PairEntry]:
-    found: list[PairEntry] = []
+def _pairs(diagnosis: Diagnosis) -> list[Document]:
+    """Pairs that were tested, the likeliest first; parameters by effect, with what it acts on."""
+    entries = []
     for pair in diagnosis.main.pairs:
         name = " + ".join(pair.names)
-        fit = diagnosis.fits.get(name)
-        gate = diagnosis.main.gates.get(name)
+        fit, gate = diagnosis.fits.get(name), diagnosis.main.gates.get(name)
         if fit is None or gate is None:
             continue
-        held = diagnosis.held_out[name]
-        found.append(
-            {
-                "effects": list(pair.names),
-                "probability": json_number(diagnosis.main.probability.get(name, 0.0)),
-                "log_evidence": json_number(pair.log_evidence - diagnosis.main.base.log_evidence),
-                "words": row_words(diagnosis, name),
-                "parameters": pair_parameters(fit),
-                "mean_abs_error_percent": json_number(100.0 * float(fit.errors.mean())),
-                "finding": joined(fit.findings),
-                "held_out_error_percent": json_number(100.0 * held.mean_error),
-                "held_out_rms_percent": json_number(100.0 * held.rms),
-                "held_out_gain_in_se": json_number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
-                "adequate": bool(gate.probability > ADEQUATE),
-                "adequate_probability": json_number(gate.probability, 3),
-            }
-        )
-    return sorted(found, key=lambda pair: (-(pair["probability"] or 0.0), -(pair["log_evidence"] or 0.0)))
+        entry = {
+            "effects": list(pair.names),
+            **_standing(diagnosis, name, pair.log_evidence),
+            "parameters": pair_parameters(fit),
+            **_errors(diagnosis, fit, diagnosis.held_out[name]),
+            "adequate": bool(gate.probability > ADEQUATE),
+            "adequate_probability": json_number(gate.probability, 3),
+        }
+        entries.append(entry)
+    return sorted(entries, key=lambda entry: (-(entry["probability"] or 0.0), -(entry["log_evidence"] or 0.0)))
 
 
-def pair_parameters(fit: Fit) -> dict[str, dict[str, Any]]:
+def pair_parameters(fit: Fit) -> dict[str, Document]:
     """Effect -> its parameters and choice."""
     flat = list(parameters(fit).items())
-    found: dict[str, dict[str, Any]] = {}
+    found: dict[str, Document] = {}
     start = 0
     for candidate in fit.candidates:
         count = len(candidate.components)
@@ -530,19 +310,8 @@ def pair_parameters(fit: Fit) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _noise(judgement: Judgement) -> NoiseEntry:
-    noise = judgement.noise
-    return {
-        "name": noise.name,
-        "repeat_percent": json_number(100.0 * noise.typical_repeat, 4),
-        "clamping_percent": json_number(100.0 * noise.clamping, 4),
-        "strut_spread_percent": json_number(100.0 * noise.strut_spread, 4),
-        "joint_error_mm": json_number(float(mm_from_m(noise.joint_error)), 4),
-        "origin": noise.origin,
-    }
-
-
-def _gates(judgement: Judgement) -> GatesEntry:
+def _gates(judgement: Judgement) -> Document:
+    """The absolute test of the model without a further effect."""
     gate = judgement.base_gate
     return {
         "baseline_probability": json_number(gate.probability, 3),
@@ -556,17 +325,15 @@ def _gates(judgement: Judgement) -> GatesEntry:
     }
 
 
-def _in_short(judgement: Judgement) -> InShort:
+def _in_short(judgement: Judgement) -> Document:
+    """A judgement under one noise model."""
+    likely = sorted(judgement.probability.items(), key=lambda item: (-item[1], item[0]))
     return {
         "verdict": judgement.verdict,
         "plausible": list(judgement.plausible),
-        "noise_percent": json_number(100.0 * judgement.noise.typical, 4),
+        "noise_percent": _percent(judgement.noise.typical, 4),
         "origin": judgement.noise.origin,
-        "probability": {
-            name: json_number(weight, 4)
-            for name, weight in sorted(judgement.probability.items(), key=lambda item: (-item[1], item[0]))
-            if weight > 1e-4
-        },
+        "probability": {name: json_number(weight, 4) for name, weight in likely if weight > 1e-4},
         "baseline_gate_probability": json_number(judgement.base_gate.probability, 3),
         "structure": judgement.base_gate.worst,
     }

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.diagnose import Diagnosis
 from toolpath_stiff.hints import Asked, both_names, command_line, hint, options
-from toolpath_stiff.inference.candidates import EXPECTED, choice_text
+from toolpath_stiff.inference.candidates import choice_text
+from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import Drawn, seen_readings
+from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR
-from toolpath_stiff.inference.fits import errors_text, raised_text, scatter_text
-from toolpath_stiff.inference.hypotheses import CONFOUNDED, MATTERS, Unexcluded
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
 from toolpath_stiff.inference.repeats import OUTLIERS
+from toolpath_stiff.inference.size_priors import EXPECTED
+from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.planning.plan import INDICATORS
 from toolpath_stiff.portrait.words import alike_text
 from toolpath_stiff.stiffness.contract import joined
 from toolpath_stiff.units import mm_from_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.diagnosis.result import Diagnosis
 
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
 
@@ -315,7 +320,7 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
     if diagnosis.verdict == "unexplained":
         found = [hint("look where the residuals lie", asked.command("compare"))]
         if diagnosis.portrait is not None and any(one.term.acts for one in diagnosis.portrait.terms):
-            file = asked.new_effect("missing")
+            file = asked.new_effect("missing", ".toml")
             found.append(
                 hint("write what it looks like as an effect to edit", asked.command("effects draft", "-o", file))
             )

@@ -24,7 +24,7 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.fits import held_out
+from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Scatter
 from toolpath_stiff.readings.measurements import Measurements, reading_marks
 from toolpath_stiff.stiffness.contract import Effect, joined

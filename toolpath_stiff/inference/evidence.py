@@ -16,19 +16,21 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import Candidate, Sight, SizePrior, Table, likely_interval, log_comparable
+from toolpath_stiff.inference.candidates import Candidate, Table
 from toolpath_stiff.inference.covariances import Precision
 from toolpath_stiff.inference.noise import Noise, NormalEquations, Scatter, covariance, gauss_newton, scaled_inverse
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.size_priors import Sight, SizePrior, log_comparable
 from toolpath_stiff.stiffness.model import ActiveEffect
 
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
 
 
-GRID = 24  # sizes a sign
-
-
-ZOOMS = 3
+def law_prior(unknowns: int) -> FloatArray:
+    """(q, q) information of the strut law's prior about q unknowns, of which the law's two are the first."""
+    prior = np.zeros((unknowns, unknowns))
+    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+    return prior
 
 
 MOST_ROUNDS = 3  # searches for wild readings
@@ -116,6 +118,11 @@ class Fit:
         return np.abs(np.expm1(-self.residual))
 
     @property
+    def projected(self) -> Precision:
+        """Inverse covariance of what the fit leaves, under the scatter that it found."""
+        return self.scatter.precision.beside(self.jacobian.T, law_prior(self.jacobian.shape[1]))
+
+    @property
     def log_likelihood(self) -> float:
         """Of the residuals, the price of wild readings included."""
         return float(self.scatter.log_likelihood(self.residual))
@@ -184,9 +191,7 @@ class Problem:
 
         `jacobian` (n, 2 + p) of ln k to the strut law and p sizes.
         """
-        prior = np.zeros((jacobian.shape[1],) * 2)
-        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
-        return self.scatter.precision.beside(jacobian.T, prior)
+        return self.scatter.precision.beside(jacobian.T, law_prior(jacobian.shape[1]))
 
     def prior(self, table: Table, j: int) -> SizePrior:
         """Prior of a component's size, worked out once."""
@@ -225,8 +230,6 @@ class Problem:
             law = law + np.clip(np.linalg.solve(information, gradient[..., None])[..., 0], -0.5, 0.5)
         return law, self.observed + np.log(self.compliance(law, delta)), information
 
-    # -- scores ----------------------------------------------------------------------------------------------------
-
     def score_base(self) -> Fit:
         """The model without any further effect."""
         scatter, law = self.scatter, np.zeros(2)
@@ -240,67 +243,8 @@ class Problem:
         return Fit(
             (), (), (), law, residual, self.law_jacobian(law, self.compliance(law, none[0])),
             np.asarray(np.linalg.inv(information[0]), dtype=float), scatter,
-            log_evidence=float(scatter.log_likelihood(residual)) + float(_law_terms(law[None], information)[0]),
+            log_evidence=float(scatter.log_likelihood(residual)) + float(law_terms(law[None], information)[0]),
         )  # fmt: skip
-
-    def score_single(self, table: Table, start: Fit) -> Fit:
-        """A candidate of one parameter: quadrature over its size."""
-        sizes = np.sort(
-            np.concatenate([s * np.geomspace(np.exp(k[0][0]), table.reach(s), GRID) for s, k in table.knots.items()])
-        )
-        prior = self.prior(table, 0)
-        scatter, law, delta = self.scatter, start.law, table.delta(sizes[:, None])
-        for last in range(MOST_ROUNDS, -1, -1):
-            scan = self._refined(table, self._scan(delta, sizes, scatter.precision, law), scatter.precision)
-            peak = int(np.argmax(scan.profile))
-            residual, law = scan.residuals[peak], scan.laws[peak]
-            again = self.scatter.with_wild(residual, scatter)
-            if not last or again is scatter:
-                break
-            scatter = again
-        log_integral = prior.integrate(scan.sizes, scan.profile)
-        interval = likely_interval(scan.sizes, scan.profile)
-        best = (np.array([scan.sizes[peak]]),)
-        jacobian = self._jacobian((table,), best, law)
-        information = scatter.precision.times(jacobian.T) @ jacobian
-        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
-        constant = -0.5 * scatter.covariance.log_determinant - len(scatter.wild) * scatter.price
-        return Fit(
-            (table.candidate,), best, (0,), law, residual, jacobian,
-            np.asarray(np.linalg.pinv(information), dtype=float), scatter,
-            tables=(table,), log_evidence=log_integral + constant, interval=interval,
-        )  # fmt: skip
-
-    def _scan(
-        self, delta: FloatArray, sizes: FloatArray, precision: Precision, law: FloatArray, steps: int = 3
-    ) -> _Scan:
-        """At sizes (g,), which add compliances (g, n)."""
-        laws, residuals, information = self.fit_law(delta, precision, law, steps)
-        return _Scan(sizes, -0.5 * precision.squares(residuals) + _law_terms(laws, information), laws, residuals)
-
-    def _refined(self, table: Table, scan: _Scan, precision: Precision) -> _Scan:
-        """With more sizes about the peak: zooms, then five standard deviations to each side."""
-        for _ in range(ZOOMS):
-            peak = int(np.argmax(scan.profile))
-            low, high = scan.sizes[max(peak - 1, 0)], scan.sizes[min(peak + 1, len(scan.sizes) - 1)]
-            low, high = (max(low, 0.0), high) if scan.sizes[peak] > 0.0 else (low, min(high, 0.0))
-            more = np.linspace(low, high, 8)[1:-1]
-            more = more[(more != 0.0) & (more != scan.sizes[peak])]
-            scan = scan.merged(self._scan(table.delta(more[:, None]), more, precision, scan.laws[peak], steps=2))
-        peak = int(np.argmax(scan.profile))
-        size, sd = float(scan.sizes[peak]), scan.width()
-        more = size + sd * np.linspace(-4.5, 4.5, 14)
-        more = more[(more * size > 0.0) & (np.abs(more) <= table.reach(float(np.sign(size))))]
-        if not len(more):
-            return scan
-        return scan.merged(self._scan(table.delta(more[:, None]), more, precision, scan.laws[peak], steps=2))
-
-    def _jacobian(self, tables: Sequence[Table], sizes: Sequence[FloatArray], law: FloatArray) -> FloatArray:
-        """(n, 2 + p) of the modelled ln k to law and all sizes."""
-        delta = sum((t.delta(s) for t, s in zip(tables, sizes, strict=True)), np.zeros(len(self.observed)))
-        compliance = self.compliance(law, delta)
-        slopes = [-t.slope(s) / compliance[:, None] for t, s in zip(tables, sizes, strict=True)]
-        return np.concatenate([self.law_jacobian(law, compliance), *slopes], axis=1)
 
     def score_subset(self, tables: Sequence[Table], free: tuple[int, ...], start: Fit) -> Fit | None:
         """Candidates with these components free (counted over all of them); None if one ends at zero or at its bound.
@@ -394,8 +338,7 @@ class Problem:
         precision: Precision,
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
         """Law, residual, information and jacobian after fitting the chosen sizes, in place; None where that fails."""
-        prior = np.zeros((2 + len(chosen), 2 + len(chosen)))
-        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+        prior = law_prior(2 + len(chosen))
 
         def added() -> FloatArray:
             return sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
@@ -431,31 +374,6 @@ class Problem:
         return law, self.observed + np.log(self.compliance(law, added())), last.information, last.jacobian
 
 
-@dataclass(frozen=True)
-class _Scan:
-    """Sizes (g,) in rising order, their log posterior with the law integrated out, laws (g, 2), residuals (g, n)."""
-
-    sizes: FloatArray
-    profile: FloatArray
-    laws: FloatArray
-    residuals: FloatArray
-
-    def merged(self, other: _Scan) -> _Scan:
-        """Both, in order, each size once."""
-        sizes, first = np.unique(np.concatenate([self.sizes, other.sizes]), return_index=True)
-        parts = ((getattr(self, name), getattr(other, name)) for name in ("profile", "laws", "residuals"))
-        return _Scan(sizes, *(np.concatenate(pair)[first] for pair in parts))
-
-    def width(self) -> float:
-        """Standard deviation of the size from the curvature at the peak."""
-        peak = int(np.argmax(self.profile))
-        if not 0 < peak < len(self.sizes) - 1:
-            return 0.1 * abs(float(self.sizes[peak]))
-        x, y = self.sizes[peak - 1 : peak + 2], self.profile[peak - 1 : peak + 2]
-        curvature = 2.0 * ((y[2] - y[1]) / (x[2] - x[1]) - (y[1] - y[0]) / (x[1] - x[0])) / (x[2] - x[0])
-        return float(1.0 / np.sqrt(max(-curvature, 1e-2 / x[1] ** 2)))
-
-
 def _starting_sizes(tables: Sequence[Table], start: Fit, chosen: Sequence[tuple[Table, int]]) -> dict[int, FloatArray]:
     """Id of a table -> its sizes where a fit begins: the chosen ones of an earlier fit of the same table, else 0."""
     sizes = {id(t): np.zeros(len(t.candidate.components)) for t in tables}
@@ -477,7 +395,7 @@ def _pull_back(chosen: Sequence[tuple[Table, int]], sizes: dict[int, FloatArray]
     return held
 
 
-def _law_terms(laws: FloatArray, information: FloatArray) -> FloatArray:
+def law_terms(laws: FloatArray, information: FloatArray) -> FloatArray:
     """(g,) log prior of the laws and Laplace's term for integrating them out."""
     penalty = -0.5 * (laws**2).sum(axis=-1) / LAW_PRIOR**2
     return np.asarray(penalty - 0.5 * np.linalg.slogdet(information)[1] - 2.0 * np.log(LAW_PRIOR))

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import Candidate, Component
-from toolpath_stiff.inference.covariances import Groups, Precision
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.minima import bounded_step
 from toolpath_stiff.inference.noise import NormalEquations, Scatter, gauss_newton, scaled_inverse
@@ -24,9 +21,6 @@ STEPS = 8
 
 
 TOLERANCE = 1e-3  # of a standard deviation
-
-
-SAME_ERROR = 1e-10  # of a stiffness; rounding makes 1e-14
 
 
 def refine(problem: Problem, found: Fit, law_free: bool = True) -> Fit:
@@ -70,8 +64,7 @@ def fit_effects(
     Point = tuple[FloatArray, FloatArray, FloatArray]  # law, all sizes, residual
 
     def equations(at: Point) -> NormalEquations:
-        jacobian = search.jacobian(*at)
-        return NormalEquations(jacobian, *_normal_equations(jacobian, at[2], at[0], scatter, law_free))
+        return _normal_equations(search.jacobian(*at), at[2], at[0], scatter, law_free)
 
     def move(at: Point, here: NormalEquations) -> tuple[Point, FloatArray] | None:
         step = search.newton_step(at[1], here.information, here.gradient)
@@ -102,31 +95,21 @@ def _pulls_on_absent(
     if not absent:
         return {}
     jacobian = search.jacobian(law, flat, residual)
-    information, gradient = _normal_equations(jacobian, residual, law, scatter, search.law_free)
-    inverse = scaled_inverse(information)
-    step = inverse @ gradient
+    equations = _normal_equations(jacobian, residual, law, scatter, search.law_free)
+    inverse = scaled_inverse(equations.information)
+    step = inverse @ equations.gradient
     return {i: (float(flat[i] + step[2 + i]), float(np.sqrt(max(inverse[2 + i, 2 + i], 0.0)))) for i in absent}
 
 
 def _normal_equations(
     jacobian: FloatArray, residual: FloatArray, law: FloatArray, scatter: Scatter, law_free: bool
-) -> tuple[FloatArray, FloatArray]:
+) -> NormalEquations:
     weighted = scatter.precision.times(jacobian.T)
-    information = weighted @ jacobian
-    gradient = weighted @ residual
+    information, gradient = weighted @ jacobian, weighted @ residual
     prior = 1.0 / LAW_PRIOR**2 if law_free else 1e12
     information[:2, :2] += prior * np.eye(2)
     gradient[:2] -= prior * law
-    return information, gradient
-
-
-def _equations_of(fit: Fit) -> tuple[FloatArray, FloatArray]:
-    """Those of the last step of a fit."""
-    return _normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
-
-
-def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
-    return np.asarray(scaled_inverse(information) @ gradient)
+    return NormalEquations(jacobian, information, gradient)
 
 
 @dataclass(frozen=True)
@@ -161,7 +144,7 @@ class _Search:
         By bounded-variable least squares where the plain step would leave them: cutting that off leads uphill where
         sizes trade off against each other.
         """
-        step = _solve(information, gradient)
+        step = np.asarray(scaled_inverse(information) @ gradient)
         low, high = (limit[list(self.free)] - flat[list(self.free)] for limit in self.limits())
         if ((step[2:] >= low) & (step[2:] <= high)).all():
             return step
@@ -255,9 +238,9 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
         start = np.array([_start(component, share) for component in candidate.components])
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
         place = np.concatenate([fit.law, *fit.sizes])
-        widths = 1.0 / np.sqrt(np.maximum(np.diag(_equations_of(fit)[0]), 1e-300))
+        last = _normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
         # Two starts mostly end in one place, and go on from there alike.
-        if not any((np.abs(place - other) < TOLERANCE * widths).all() for other in seen):
+        if not any((np.abs(place - other) < TOLERANCE * (1.0 / last.scale)).all() for other in seen):
             yield _nearly_settled(problem, fit)
         seen.append(place)
 
@@ -286,14 +269,15 @@ def _nearly_settled(problem: Problem, fit: Fit) -> tuple[Fit, bool]:
 
 def _gain_to_come(problem: Problem, fit: Fit) -> float:
     """Twice what one more step adds to the log posterior; sizes that it pulls beyond their bounds stay there."""
-    information, gradient = _equations_of(fit)
+    last = _normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
+    gradient = last.gradient
     search = _Search(problem, fit.candidates, fit.free, fit.law_free)
     flat = np.concatenate([fit.law, *fit.sizes])
     low, high = (
         np.concatenate([np.full(2, at), limit]) for at, limit in zip((-np.inf, np.inf), search.limits(), strict=True)
     )
     kept = ~((flat <= low) & (gradient <= 0.0) | (flat >= high) & (gradient >= 0.0))
-    return float(gradient[kept] @ scaled_inverse(information[np.ix_(kept, kept)]) @ gradient[kept])
+    return float(gradient[kept] @ scaled_inverse(last.information[np.ix_(kept, kept)]) @ gradient[kept])
 
 
 def _settled(problem: Problem, fit: Fit) -> Fit:
@@ -339,9 +323,6 @@ def _without_zeros(fit: Fit) -> Fit:
     )
 
 
-AS_GIVEN, LAW_REFITTED = "as given", "strut law refitted"
-
-
 @dataclass(frozen=True)
 class Baseline:
     """The first two models of every report.
@@ -361,155 +342,3 @@ class Baseline:
     def of(cls, problem: Problem) -> Baseline:
         """Of data and model under one noise."""
         return cls(base_fit(problem, law_free=False), base_fit(problem, law_free=True))
-
-
-def deviation_percent(residual: FloatArray) -> FloatArray:
-    """ln(measured / modelled) as (measured - modelled) / modelled in per cent, minus: softer than modelled."""
-    return np.asarray(100.0 * np.expm1(residual))
-
-
-class ErrorFigures(TypedDict):
-    """Errors of a model over some readings; %."""
-
-    mean_abs_error_percent: float
-    bias_percent: float
-    rms_percent: float
-
-
-def error_figures(residual: FloatArray) -> ErrorFigures:
-    """Errors of a model in per cent, of residuals ln(measured / modelled).
-
-    Mean and rms of |modelled - measured| / measured, as the paper counts it; `bias_percent` is the mean of
-    (measured - modelled) / modelled, minus: softer than modelled.
-    """
-    error = np.expm1(-residual)
-    return {
-        "mean_abs_error_percent": 100.0 * float(np.abs(error).mean()),
-        "bias_percent": float(deviation_percent(residual).mean()),
-        "rms_percent": 100.0 * float(np.sqrt((error**2).mean())),
-    }
-
-
-def errors_text(as_given: float, refitted: float | None, rest: Sequence[tuple[str, float]] = ()) -> str:
-    """Mean errors (%) step by step: "as given 4.60 %, strut law refitted 3.73 %, with weak_strut 2.32 %"."""
-    steps = [(AS_GIVEN, as_given), *([] if refitted is None else [(LAW_REFITTED, refitted)]), *rest]
-    return ", ".join(f"{name} {value:.2f} %" for name, value in steps)
-
-
-def scatter_text(floor: float, error: float, guess: str = "") -> str:
-    """How much of a mean error (%) is scatter; where a `guess` would leave more than there is, that nobody knows."""
-    if guess and floor > error:
-        return f"these data do not tell how much of it is scatter (the {guess} guess alone would leave {floor:.2f} %)"
-    return f"scatter alone leaves {floor:.2f} %" + (f" ({guess} guess)" if guess else "")
-
-
-def raised_text(as_given: float, refitted: float) -> str:
-    """Why refitting the strut law raised the mean error (%), a sentence; "" where it did not."""
-    if f"{refitted:.2f}" == f"{as_given:.2f}" or not refitted > as_given:
-        return ""
-    return (
-        f"refitting the strut law raises the mean error from {as_given:.2f} to {refitted:.2f} %: it makes the readings "
-        "likelier, which trusts those less that scatter more or lie far off; the mean error counts all alike"
-    )
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """Residuals at left-out points.
-
-    Attributes
-    ----------
-    residual
-        (n,) ln measured - ln modelled, each by the fit without its point.
-    moves
-        (points, 2 + free) by how much law and sizes moved.
-    point
-        (n,) labels of the points.
-    """
-
-    residual: FloatArray
-    moves: FloatArray
-    point: NDArray[np.str_]
-
-    @property
-    def errors(self) -> FloatArray:
-        """(n,) |modelled - measured| / measured."""
-        return np.abs(np.expm1(-self.residual))
-
-    def of_readings(self, rows: NDArray[np.bool_]) -> HeldOut:
-        """Of some of the readings."""
-        return HeldOut(self.residual[rows], self.moves, self.point[rows])
-
-    @property
-    def mean_error(self) -> float:
-        """Mean of `errors`."""
-        return float(self.errors.mean())
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of (modelled - measured) / measured."""
-        return float(np.sqrt(np.mean(np.expm1(-self.residual) ** 2)))
-
-
-def of_readings(fit: Fit, rows: NDArray[np.bool_]) -> Fit:
-    """A fit with the residuals of some of its readings alone: for counting errors, no longer for fitting."""
-    return fit if rows.all() else replace(fit, residual=fit.residual[rows], jacobian=fit.jacobian[rows])
-
-
-def held_out(fit: Fit, point: NDArray[np.str_]) -> HeldOut:
-    """Leave each point out in turn; with fewer than three points nothing can be left out and all is nan."""
-    points = Groups.by(point)
-    residual = np.full(len(fit.residual), np.nan)
-    moves = np.zeros((points.count, fit.jacobian.shape[1]))
-    if points.count < 3:
-        return HeldOut(residual, moves, point)
-    prior = np.zeros((fit.jacobian.shape[1],) * 2)
-    prior[:2, :2] = np.eye(2) * (1.0 / LAW_PRIOR**2 if fit.law_free else 1e12)
-    precision = fit.scatter.precision
-    scale = np.sqrt(np.maximum(precision.squares(fit.jacobian.T) + np.diag(prior), 1e-300))
-    columns = fit.jacobian / scale
-    for which, out, products in products_without(precision, columns, fit.residual, points):
-        pull = products[..., -1]
-        pull[:, :2] -= (prior[:2, :2] @ fit.law) / scale[:2]
-        information = products[..., :-1] + prior / np.outer(scale, scale)
-        moves[which] = (np.linalg.pinv(information, hermitian=True) @ pull[..., None])[..., 0] / scale
-        residual[out] = fit.residual[out] - (fit.jacobian[out] @ moves[which][..., None])[..., 0]
-    return HeldOut(residual, moves, point)
-
-
-def products_without(
-    precision: Precision, columns: FloatArray, residual: FloatArray, points: Groups
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]]:
-    """For points left out in turn, those of k readings together: the points (m,), their readings (m, k), products.
-
-    The products are (m, p, p + 1) J^T A [J, r] of the readings that stay. Their inverse covariance is the Schur
-    complement A_ss - A_so A_oo^-1 A_os of the inverse covariance of all, of which the products need the readings that
-    are left out only: J^T A J - (A J)_o^T A_oo^-1 (A J)_o.
-    """
-    solved = precision.times(np.concatenate([columns.T, residual[None]]))
-    whole = solved[:-1] @ np.concatenate([columns, residual[:, None]], axis=1)
-    members = points.members()
-    sizes = np.array([len(out) for out in members])
-    for size in np.unique(sizes).tolist():
-        which = np.flatnonzero(sizes == size)
-        out = np.array([members[k] for k in which])
-        part = np.moveaxis(solved[:, out], 0, 1)  # (m, p + 1, k)
-        taken = part[:, :-1] @ np.linalg.solve(precision.block(out), np.swapaxes(part, 1, 2))
-        yield which, out, whole - taken
-
-
-def error_falls(before: HeldOut, after: HeldOut) -> FloatArray:
-    """(n,) fall of each reading's held-out error; 0 where rounding makes it, whose sign is the processor's."""
-    falls = before.errors - after.errors
-    return np.asarray(np.where(np.abs(falls) < SAME_ERROR, 0.0, falls))
-
-
-def gain_in_standard_errors(before: HeldOut, after: HeldOut) -> float:
-    """Mean fall of the held-out error over its standard error, paired by point; nan with fewer than three points."""
-    labels = np.unique(before.point)
-    fallen = error_falls(before, after)
-    falls = np.array([fallen[before.point == label].mean() for label in labels])
-    if len(labels) < 3 or not np.isfinite(falls).all():
-        return float("nan")
-    error = float(falls.std(ddof=1)) / np.sqrt(len(falls))
-    return float(falls.mean() / error) if error > 0.0 else 0.0

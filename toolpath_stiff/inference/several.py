@@ -20,7 +20,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.inference.candidates import Table, tabulate
-from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
 
 SCORED = 8  # sets of effects whose tables are scored
@@ -173,7 +173,7 @@ class LinearSearch:
         # Of the model with its law refitted, at the measured compliance.
         residual = np.expm1(self.base.residual)
         law = self.base.jacobian[:, :2] * np.exp(self.base.residual)[:, None]
-        prior, flat = np.eye(2) / LAW_PRIOR**2, self.columns.reshape(-1, self.columns.shape[-1])
+        prior, flat = law_prior(2), self.columns.reshape(-1, self.columns.shape[-1])
         scatter = self.problem.scatter
         for _ in range(ROUNDS):
             solved = scatter.precision.beside(law.T, prior).times(flat)

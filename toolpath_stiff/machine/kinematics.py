@@ -92,7 +92,7 @@ def solve_struts(
     --------
     On the machine's axis the struts have two lengths, three struts each:
 
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> struts = solve_struts(load_machine("nist"), [0.0, 0.0, 0.8])
     >>> struts.lengths.round(4)
     array([[2.8847, 2.8699, 2.8847, 2.8699, 2.8847, 2.8699]])
@@ -200,7 +200,7 @@ def forward_kinematics(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> machine = load_machine("nist")
     >>> lengths = solve_struts(machine, [0.1, -0.05, 0.8]).lengths
     >>> forward_kinematics(machine, lengths).round(9)[0, :3]

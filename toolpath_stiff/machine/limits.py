@@ -135,7 +135,8 @@ def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: Array
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine, solve_struts
+    >>> from toolpath_stiff.machine.file import load_machine
+    >>> from toolpath_stiff.machine.kinematics import solve_struts
     >>> machine = load_machine("nist")
     >>> position = [[0.0, 0.0, 0.8], [0.0, 0.0, 3.0]]
     >>> found = reach(machine, position, solve_struts(machine, position))
@@ -203,17 +204,6 @@ class Gauge:
     axes: tuple[FloatArray, FloatArray]
     determinant: float
 
-    def extremes(
-        self,
-        position: FloatArray,
-        lengths: FloatArray,
-        determinant: FloatArray,
-        rotation: FloatArray | None,
-        tool: float,
-    ) -> Extremes:
-        """What comes nearest to the limits at n poses with one tool; the arguments as of `reach`."""
-        return Extremes(self, position, lengths, determinant, rotation, tool)
-
     @cached_property
     def by_span(self) -> list[tuple[float, list[Limit]]]:
         """The distinct limits whose margins are counted in the same span."""
@@ -251,7 +241,7 @@ class Gauge:
             As of `reach`; (n,) false where an angle too small for its cosine decides, and `reach` must be asked.
         """
         n = position.shape[1]
-        extremes = self.extremes(position, lengths, determinant, rotation, tool)
+        extremes = Extremes(self, position, lengths, determinant, rotation, tool)
         margin, value, which = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
         for number, (limit, _) in enumerate(self.distinct):
             found = extremes.of(limit)

@@ -97,21 +97,21 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
 def _conditions(machine: Machine) -> dict[str, str]:
     """What the machine file says of set-ups and temperature, if anything."""
     given = {"name": machine.setup, "names": machine.setups or None, "temperature_C": machine.temperature}
-    return {key: _value_text(value) for key, value in given.items() if value is not None}
+    return {key: value_text(value) for key, value in given.items() if value is not None}
 
 
 def _entry_text(kind: str, entry: EffectEntry) -> list[str]:
     lines = [f"[[{kind}]]", f"name = {toml_text(entry.name)}"]
-    lines += [f"{key} = {_value_text(value)}" for key, value in entry.parameters.items()]
+    lines += [f"{key} = {value_text(value)}" for key, value in entry.parameters.items()]
     if entry.provenance:
-        lines += [f"[{kind}.provenance]", *(f"{key} = {_value_text(value)}" for key, value in entry.provenance.items())]
+        lines += [f"[{kind}.provenance]", *(f"{key} = {value_text(value)}" for key, value in entry.provenance.items())]
     return lines
 
 
 def _uncertainty(uncertainty: Uncertainty) -> list[str]:
     return [
         "[uncertainty]",
-        f"parameters = {_value_text(uncertainty.names)}",
+        f"parameters = {value_text(uncertainty.names)}",
         f"sd = {_list(uncertainty.sd)}",
         f"correlation = {_rows(uncertainty.correlation)}",
     ]
@@ -142,7 +142,8 @@ def toml_text(value: str) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _value_text(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """A TOML value."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -150,7 +151,7 @@ def _value_text(value: Any) -> str:
     if isinstance(value, float):
         return _number(value)
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value_text(v) for v in value) + "]"
+        return "[" + ", ".join(value_text(v) for v in value) + "]"
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {_value_text(v)}" for key, v in value.items()) + "}"
+        return "{" + ", ".join(f"{key} = {value_text(v)}" for key, v in value.items()) + "}"
     return toml_text(str(value))

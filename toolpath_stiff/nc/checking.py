@@ -24,7 +24,6 @@ from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
 from toolpath_stiff.nc.reader import (
     INTERPRETERS,
-    ZERO,
     feed_assumption,
     foreign_program,
     lathe_warning,
@@ -32,6 +31,7 @@ from toolpath_stiff.nc.reader import (
     parse_program,
     refused_program,
 )
+from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.nc.state import Flow, State, Then
 from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
 from toolpath_stiff.nc.words import Block, looks_like_cutter_location
@@ -302,8 +302,7 @@ def _check_cutter_location(
 ) -> Checked:
     checked = cutter_location.check(lines, name, controller.tools, MOST_ERRORS, controller.feed)
     state = checked.state
-    offsets = controller.offsets is not None and any(offset.given for offset in controller.offsets.table)
-    warnings = (*cutter_location.not_for(controller, offsets, block_delete), *state.warnings)
+    warnings = (*cutter_location.not_for(controller, controller.offsets, block_delete), *state.warnings)
     x, y, z, a, b, c = origin
     return Checked(
         used=tuple(UsedCode(line, 1, word, text, NOTE, count) for word, text, line, count in checked.meanings()),

@@ -257,7 +257,7 @@ def move_lengths(moves: Moves) -> FloatArray:
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> moves = parse_program("G21 G90 F600\nG1 X30 Y40\nG2 X50 Y40 I10 J0\nM30\n").moves
     >>> (move_lengths(moves) * 1e3).round(3).tolist()  # mm
     [50.0, 31.416]

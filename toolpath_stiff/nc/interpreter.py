@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import (
     FEED,
     LENGTH,
@@ -38,6 +38,7 @@ from toolpath_stiff.nc.codes.points import read_numbers
 from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_parameters
 from toolpath_stiff.nc.codes.saved import leave_level
 from toolpath_stiff.nc.moves import Jump
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word, leader, read_block
@@ -370,7 +371,10 @@ class ProgramRun:
         return block if block.rest is None else block.executed(self.switches)
 
     def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
-        return ProgramError(found, expected=expected, hint=hint, file=self.name, line=at + 1, column=column)
+        return self._place(at).fail(found, expected, hint, column)
+
+    def _place(self, at: int) -> Place:
+        return Place(self.name, at + 1)
 
     def _check_head(self, block: Block, numbered: bool) -> None:
         """A program number within a program: the next one begins where this one did not end."""

@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import LATHE_HINT
 
 HEAD = 2000  # lines: a lathe's program shows what it is at its beginning
@@ -58,12 +59,10 @@ def lathe_program(lines: Sequence[str], name: str) -> InputError | None:
         signs = _signs(lines)
     if len(signs) < 2:
         return None
-    return ProgramError(
+    return Place(name, signs[0][0]).fail(
         f"a lathe's program: {', '.join(f'{what} (line {line})' for line, what in signs)}",
-        expected="a mill's: on a lathe X is a diameter",
-        hint=f"{LATHE_HINT}; one of LinuxCNC's lathes, whose X is a radius (G8), is read with --dialect linuxcnc",
-        file=name,
-        line=signs[0][0],
+        "a mill's: on a lathe X is a diameter",
+        f"{LATHE_HINT}; one of LinuxCNC's lathes, whose X is a radius (G8), is read with --dialect linuxcnc",
     )
 
 

@@ -72,7 +72,7 @@ class Moves:
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> moves = parse_program("G21 G90 F600\nG0 Z5\nG1 Z-1\nX40\nM30\n").moves
     >>> moves
     <Moves: 3 moves of the lines 2 to 4>
@@ -199,7 +199,7 @@ class Program:
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> program = parse_program("G21 G90 F600\nG1 X40\nM30\n", "slot.nc")
     >>> program.name, len(program.moves), program.dialect
     ('slot.nc', 1, 'generic')

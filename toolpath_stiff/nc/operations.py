@@ -195,7 +195,7 @@ def operations(program: Program) -> Operations:
 
     Examples
     --------
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> program = parse_program("F600\n(FACE)\nG0 Z5\nG1 Z0\nX40\n(SLOT)\nG0 Z5\nG1 Z-1\nX0\nM30\n")
     >>> found = operations(program)
     >>> [(row.number, row.name, row.first_line, row.last_line) for row in found.rows]

@@ -12,6 +12,7 @@ from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis, tool_poses
 from toolpath_stiff.nc.moves import RAPID, Moves, Program, ToolUse
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.recovery import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
@@ -198,13 +199,11 @@ def _known_points(
     )
     cuts = fixed & (moves.motion != RAPID)
     if cuts.any():
-        raise ProgramError(
+        raise Place(name, int(moves.line[np.argmax(cuts)])).fail(
             f"a cut that begins or ends at a point of the machine that the program was posted for (G53, G28, G30): "
             f"{reason}",
-            expected="rapids alone there, and X Y Z in the move after them",
-            hint="" if kinematics.tcp else "give G54 in the controller file's [offsets]",
-            file=name,
-            line=int(moves.line[np.argmax(cuts)]),
+            "rapids alone there, and X Y Z in the move after them",
+            "" if kinematics.tcp else "give G54 in the controller file's [offsets]",
         )
     lines = np.unique(moves.line[fixed])
     shown = ", ".join(str(line) for line in lines[:MOST_LINES])

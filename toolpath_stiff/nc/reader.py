@@ -8,24 +8,26 @@ from __future__ import annotations
 import copy
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.codes.points import increments_hint
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Dialect, Switches, check_plain, plain, switches_on
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Dialect, Switches, check_plain, plain
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.lathes import lathe_program
 from toolpath_stiff.nc.moves import RAPID, Moves, Program
 from toolpath_stiff.nc.operations import split_comments
+from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.request import ZERO, Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
 from toolpath_stiff.nc.words import HEAD_LINES, looks_like_cutter_location, read_lines, split_lines
-from toolpath_stiff.units import Pose, ShopPose, mm_per_min_from_m_per_s, pose_in_mm, pose_in_si
+from toolpath_stiff.units import Pose, mm_per_min_from_m_per_s, pose_in_si
 
 _HEIDENHAIN = "Heidenhain's conversational language"
 
@@ -99,12 +101,8 @@ def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = Non
     for at in places:
         what = language_of(lines[at])
         if what is not None:
-            return ProgramError(
-                f"{lines[at].strip()[:40]!r} is {what}, which is not read",
-                expected="G code",
-                hint=HINTS[what],
-                file=name,
-                line=at + 1,
+            return Place(name, at + 1).fail(
+                f"{lines[at].strip()[:40]!r} is {what}, which is not read", "G code", HINTS[what]
             )
     return None
 
@@ -116,9 +114,6 @@ def refused_program(lines: tuple[str, ...], name: str, dialect: Dialect) -> Inpu
 
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
-
-
-ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def read_program(
@@ -179,7 +174,7 @@ def read_program(
     offsets = read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets()
     tools = read_tool_table(tool_table) if tool_table else controller.tools
     options = (offsets, tools, block_delete, interpreter, rs274, unconfined, controller)
-    return _read(_Request(lines, Path(path).name, str(path), place, _six(default_origin), *options))
+    return _read(Request(lines, Path(path).name, str(path), place, _six(default_origin), *options))
 
 
 def parse_program(
@@ -216,107 +211,57 @@ def parse_program(
     lines, place = split_lines(text, name), None if origin is None else _six(origin)
     offsets, tools = offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools
     options = (offsets, tools, block_delete, interpreter, rs274, unconfined, controller)
-    return _read(_Request(lines, name, "", place, _six(default_origin), *options))
+    return _read(Request(lines, name, "", place, _six(default_origin), *options))
 
 
-@dataclass(frozen=True)
-class _Request:
-    """What is to be read, and with what; `origin` and `default_origin` in m and rad."""
-
-    lines: tuple[str, ...]
-    name: str
-    path: str
-    origin: Pose | None
-    default_origin: Pose
-    offsets: Offsets
-    tools: dict[int, ToolEntry] | None
-    block_delete: Switches
-    interpreter: str
-    rs274: str | None
-    unconfined: bool
-    controller: Controller
-
-    @property
-    def posted(self) -> PostedKinematics | None:
-        return self.controller.kinematics
-
-    @property
-    def switches(self) -> frozenset[int]:
-        return switches_on(self.block_delete, self.controller)
-
-    @property
-    def zero(self) -> tuple[ShopPose | None, ShopPose]:
-        """Where G54's zero sits, mm and degrees, as the caller says, and by default.
-
-        A program that was posted for another machine is read in that one's coordinates first.
-        """
-        if self.posted is not None:
-            return None, ZERO
-        return None if self.origin is None else pose_in_mm(self.origin), pose_in_mm(self.default_origin)
-
-
-def _read(asked: _Request) -> Program:
+def _read(request: Request) -> Program:
     """Choose the interpreter: the built-in one, LinuxCNC's, or that where the first refuses."""
-    lines, name = asked.lines, asked.name
-    if asked.interpreter not in INTERPRETERS:
-        raise ProgramError(f"interpreter {asked.interpreter!r}", expected=", ".join(INTERPRETERS))
+    lines, name = request.lines, request.name
+    if request.interpreter not in INTERPRETERS:
+        raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in lines):
         raise ProgramError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
-        return _read_cutter_location(asked)
-    native = asked.interpreter == "linuxcnc"
-    refused = foreign_program(lines, name) if native else refused_program(lines, name, asked.controller.dialect)
+        return _read_cutter_location(request)
+    native = request.interpreter == "linuxcnc"
+    refused = foreign_program(lines, name) if native else refused_program(lines, name, request.controller.dialect)
     if refused is not None:
         raise refused
     if native:
-        check_plain(asked.block_delete, asked.controller)
-        return _read_by_linuxcnc(asked, asked.rs274)
+        check_plain(request.block_delete, request.controller)
+        return _read_by_linuxcnc(request)
     try:
-        return _read_built_in(asked)
+        return _read_built_in(request)
     except InputError as error:
         foreign = foreign_program(lines, name, error.line)
         if foreign is not None:
             raise foreign from None
-        if asked.interpreter == "builtin" or not plain(asked.block_delete, asked.controller):
+        if request.interpreter == "builtin" or not plain(request.block_delete, request.controller):
             raise
-        return _second_opinion(error, asked)
+        return _second_opinion(error, request)
 
 
-def _read_cutter_location(asked: _Request) -> Program:
+def _read_cutter_location(request: Request) -> Program:
     from toolpath_stiff.nc.cutter_location import reader as cutter_location
 
-    if asked.interpreter == "linuxcnc":
-        raise ProgramError(
-            "LinuxCNC's interpreter reads no cutter-location files",
-            expected="--interpreter builtin",
-            file=asked.name,
-        )
-    any_offset = any(offset.given for offset in asked.offsets.table)
-    warnings = cutter_location.not_for(asked.controller, any_offset, bool(asked.block_delete))
-    program = cutter_location.read(
-        asked.lines,
-        asked.name,
-        asked.path,
-        asked.origin,
-        asked.default_origin,
-        asked.tools,
-        warnings,
-        asked.controller.feed,
-    )
-    said = feed_assumption(asked.controller, program.moves)
+    if request.interpreter == "linuxcnc":
+        found = "LinuxCNC's interpreter reads no cutter-location files"
+        raise ProgramError(found, expected="--interpreter builtin", file=request.name)
+    program = cutter_location.read(request)
+    said = feed_assumption(request.controller, program.moves)
     return replace(program, assumptions=(*program.assumptions, *said)) if said else program
 
 
-def _second_opinion(error: InputError, asked: _Request) -> Program:
+def _second_opinion(error: InputError, request: Request) -> Program:
     """What the built-in interpreter refused with `error`, by the second one if it is there and the program harmless."""
     from toolpath_stiff.nc.linuxcnc.reader import refusal
     from toolpath_stiff.nc.linuxcnc.runner import find_rs274
 
-    refused = refusal(asked.lines, asked.name)
+    refused = refusal(request.lines, request.name)
     if refused is not None:
         raise refused from None
     try:
-        found = find_rs274(asked.rs274, asked.unconfined)
+        find_rs274(request.rs274, request.unconfined)
     except InputError as missing:
         raise ProgramError(
             error.found,
@@ -326,67 +271,57 @@ def _second_opinion(error: InputError, asked: _Request) -> Program:
             line=error.line,
             column=error.column,
         ) from None
-    return _read_by_linuxcnc(asked, found)
+    return _read_by_linuxcnc(request)
 
 
-def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
+def _read_by_linuxcnc(request: Request) -> Program:
     from toolpath_stiff.nc.linuxcnc.reader import read
 
-    posted = asked.posted
-    reading = read(
-        asked.lines,
-        asked.name,
-        *asked.zero,
-        asked.offsets,
-        asked.tools,
-        bool(asked.switches),
-        rs274=rs274,
-        unconfined=asked.unconfined,
-        posted=posted is not None,
-        feed=asked.controller.feed,
-    )
+    posted, reading = request.posted, read(request)
     program = Program(
-        name=asked.name,
-        path=asked.path,
-        source=asked.lines,
+        name=request.name,
+        path=request.path,
+        source=request.lines,
         moves=reading.moves,
         origin=pose_in_si(reading.origin),
         origin_source=reading.source,
         unsupported=reading.unsupported,
         warnings=(*reading.warnings, *lathe_warning(reading.turning, reading.moves)),
-        assumptions=(*reading.assumptions, *feed_assumption(asked.controller, reading.moves)),
+        assumptions=(*reading.assumptions, *feed_assumption(request.controller, reading.moves)),
         tools=reading.tools,
         interpreter="linuxcnc",
         dialect="linuxcnc",
     )
-    return program if posted is None else _on_the_part(program, asked, posted, (), asked.offsets)
+    return program if posted is None else _on_the_part(program, request, posted, (), request.offsets)
 
 
-def _read_built_in(asked: _Request) -> Program:
+def _read_built_in(request: Request) -> Program:
     try:
-        return _run_built_in(asked, ProgramRun)
+        return _run_built_in(request, ProgramRun)
     except InputError:
         from toolpath_stiff.nc.parametric.statements import uses_variables
 
-        if not uses_variables(asked.lines):
+        if not uses_variables(request.lines):
             raise
     from toolpath_stiff.nc.parametric.run import ParametricRun
 
-    return replace(_run_built_in(asked, partial(ParametricRun, folder=asked.controller.subprograms)), parametric=True)
+    return replace(
+        _run_built_in(request, partial(ParametricRun, folder=request.controller.subprograms)), parametric=True
+    )
 
 
 def _run_built_in(
-    asked: _Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
+    request: Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
 ) -> Program:
-    posted = asked.posted
-    frames = Frames(copy.deepcopy(asked.offsets), *asked.zero, posted=posted)
-    state = State(asked.name, frames, copy.deepcopy(asked.tools), asked.controller.dialect)
-    state.feed = asked.controller.feed
-    run = begin(state, asked.lines, asked.name, asked.switches)
+    posted = request.posted
+    frames = Frames(copy.deepcopy(request.offsets), *request.zero, posted=posted)
+    state = State(request.name, frames, copy.deepcopy(request.tools), request.controller.dialect)
+    state.feed = request.controller.feed
+    run = begin(state, request.lines, request.name, request.switches)
     warnings = run.run()
     if not state.recorder.cuts:
-        raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=asked.name)
-    g54 = asked.offsets.table[0].given or frames.offsets.table[0].given
+        raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
+    g54 = request.offsets.table[0].given or frames.offsets.table[0].given
     if frames.source == "option" and g54:
         warnings.append(
             f"the program or the offsets file sets G54; {both_names('--origin')} overrides it, other offsets keep "
@@ -394,9 +329,9 @@ def _run_built_in(
         )
     moves = state.recorder.moves()
     program = Program(
-        name=asked.name,
-        path=asked.path,
-        source=asked.lines,
+        name=request.name,
+        path=request.path,
+        source=request.lines,
         moves=moves,
         origin=pose_in_si(frames.origin),
         origin_source=frames.source,
@@ -407,14 +342,14 @@ def _run_built_in(
             *lathe_warning(state.turning, moves),
             *millimetre_warning(state, run.lines),
         ),
-        assumptions=(START, *state.assumptions, *feed_assumption(asked.controller, moves)),
+        assumptions=(START, *state.assumptions, *feed_assumption(request.controller, moves)),
         tools=tuple(state.used_tools.values()),
-        dialect=asked.controller.label,
+        dialect=request.controller.label,
         jumps=tuple(run.jumps),
     )
     if posted is None:
         return program
-    return _on_the_part(program, asked, posted, state.tip_held, frames.offsets)
+    return _on_the_part(program, request, posted, state.tip_held, frames.offsets)
 
 
 def lathe_warning(signs: Mapping[str, int], moves: Moves | None) -> list[str]:
@@ -462,7 +397,7 @@ def feed_assumption(controller: Controller, moves: Moves | None) -> list[str]:
 
 def _on_the_part(
     program: Program,
-    asked: _Request,
+    request: Request,
     posted: PostedKinematics,
     tip_held: Sequence[tuple[int, bool]],
     offsets: Offsets,
@@ -471,9 +406,9 @@ def _on_the_part(
     from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
 
     check_rotary_offsets(offsets, posted, program.name)
-    if asked.origin is None:
-        return recovered(program, posted, tip_held, asked.default_origin, "default")
-    return recovered(program, posted, tip_held, asked.origin, "option")
+    if request.origin is None:
+        return recovered(program, posted, tip_held, request.default_origin, "default")
+    return recovered(program, posted, tip_held, request.origin, "option")
 
 
 def _six(origin: Iterable[float]) -> Pose:

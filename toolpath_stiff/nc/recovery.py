@@ -13,10 +13,10 @@ from dataclasses import fields, replace
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.kinematics import HEAD, LETTERS, PostedKinematics, line_point, roll_pitch, tool_poses, turned
 from toolpath_stiff.nc.moves import FEED, RAPID, Moves
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.units import deg_from_rad, mm_from_m, rad_from_deg
 
 AXIS_STEP = rad_from_deg(1.0)  # largest turn of the rotary axes in one piece
@@ -92,13 +92,11 @@ def recover_moves(
 
 def _check_pieces(count: IntArray, moves: Moves, kinematics: PostedKinematics, name: str) -> None:
     if count.sum() > MOST_PIECES:
-        raise ProgramError(
+        raise Place(name, int(moves.line[np.argmax(count)])).fail(
             f"dividing moves with turning axes within {mm_from_m(kinematics.tolerance):g} mm gives "
             f"{float(count.sum()):.0f} pieces",
-            expected=f"at most {MOST_PIECES}",
-            hint="give a larger kinematics.tolerance_mm in the controller file",
-            file=name,
-            line=int(moves.line[np.argmax(count)]),
+            f"at most {MOST_PIECES}",
+            "give a larger kinematics.tolerance_mm in the controller file",
         )
 
 
@@ -145,12 +143,10 @@ def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> Non
     for column, letter in enumerate(LETTERS):
         used = (moves.start[:, 3 + column] != 0.0) | (moves.end[:, 3 + column] != 0.0)
         if letter not in letters and used.any():
-            raise ProgramError(
+            raise Place(name, int(moves.line[np.argmax(used)])).fail(
                 f"{letter} turns, and the kinematics that the program was posted for has {' and '.join(letters)} alone",
-                expected=f"no {letter} words",
-                hint="see [kinematics] of the controller file",
-                file=name,
-                line=int(moves.line[np.argmax(used)]),
+                f"no {letter} words",
+                "see [kinematics] of the controller file",
             )
 
 
@@ -186,13 +182,11 @@ def _lengths_at_heads(
     missing = tilted & ~held & np.isnan(length)
     if missing.any():
         first = int(np.argmax(missing))
-        raise ProgramError(
+        raise Place(name, int(moves.line[first])).fail(
             f"the head is tilted, and the length of tool {moves.tool[first]} is not known: the pivot is the pivot "
             "length and the tool's length above the tip",
-            expected="the tool's length from the gauge line to the tip",
-            hint="add it to the tool table (--tools FILE, or [[tools]] of the controller file)",
-            file=name,
-            line=int(moves.line[first]),
+            "the tool's length from the gauge line to the tip",
+            "add it to the tool table (--tools FILE, or [[tools]] of the controller file)",
         )
     return length
 

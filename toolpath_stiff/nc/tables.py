@@ -10,6 +10,9 @@ from pathlib import Path
 
 from toolpath_stiff.errors import FileError, ProgramError
 from toolpath_stiff.files import read_bytes
+from toolpath_stiff.nc.moves import ToolUse
+from toolpath_stiff.nc.place import Place
+from toolpath_stiff.units import m_from_mm
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
@@ -23,6 +26,14 @@ HOMES = ("G28", "G30")
 ADDITIONAL = re.compile(r"(G54\.1|G154) ?P([1-9]\d{0,2})")
 
 
+def tool_table_hint(tool: int) -> str:
+    """How to give the length of a tool where there is no tool table, with one to copy."""
+    return (
+        "give one with --tools tools.csv, or drop it on the studio's page first; with the length in mm:\n"
+        f"tool,length_mm\n{tool},LENGTH"
+    )
+
+
 @dataclass
 class ToolEntry:
     """A tool: length, diameter and stick-out (out of its holder) in mm, nan where the table does not say."""
@@ -34,9 +45,19 @@ class ToolEntry:
     stick_out: float = math.nan
     material: str = ""
 
+    def in_use(self) -> ToolUse:
+        """The tool as programs report it, in SI."""
+        length, diameter, stick_out = m_from_mm(self.length), m_from_mm(self.diameter), m_from_mm(self.stick_out)
+        return ToolUse(self.number, length, diameter, self.remark, stick_out, self.material)
+
     def __deepcopy__(self, _memo: dict[int, object]) -> ToolEntry:
         # Every reading copies its tables, field by field at ten times the cost.
         return replace(self)
+
+
+def tool_of(tools: dict[int, ToolEntry] | None, number: int) -> ToolEntry:
+    """The tool of a number; where no table has it, one of which nothing else is known."""
+    return (tools or {}).get(number) or ToolEntry(number)
 
 
 @dataclass
@@ -75,15 +96,13 @@ def _lines(path: str | Path, what: str) -> list[str]:
         raise ProgramError(f"{what} is not a text file", file=str(path)) from None
 
 
-def _number(text: str, what: str, path: str | Path, line: int) -> float:
+def _number(text: str, what: str, place: Place) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or abs(value) > LARGEST_MM:
-        raise ProgramError(
-            f"{what} = {text[:40]!r}", expected=f"a number within +-{LARGEST_MM:g}", file=str(path), line=line
-        )
+        raise place.fail(f"{what} = {text[:40]!r}", f"a number within +-{LARGEST_MM:g}")
     return value
 
 
@@ -112,28 +131,30 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
     found: dict[int, ToolEntry] = {}
     for line, tool in tools:
         if tool.number in found:
-            raise ProgramError(f"tool {tool.number} appears twice", file=str(path), line=line)
+            raise Place(str(path), line).fail(f"tool {tool.number} appears twice")
         found[tool.number] = tool
     return found
 
 
 def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
     columns = ("tool", "length_mm", "diameter_mm", "remark", "stick_out_mm", "material")
-    heading = _cells(path, *lines[0])
+    heading_place = Place(str(path), lines[0][0])
+    heading = _cells(heading_place, lines[0][1])
     unknown = [name for name in heading if name not in columns]
     missing = [name for name in columns[:2] if name not in heading]
     if unknown or missing:
         found = f"column {unknown[0]!r} is not known" if unknown else f"column {missing[0]!r} is missing"
-        raise ProgramError(found, expected=f"columns {', '.join(columns)}", file=str(path), line=lines[0][0])
+        raise heading_place.fail(found, f"columns {', '.join(columns)}")
     rows = []
     for line, text in lines[1:]:
-        cells = dict(zip(heading, _cells(path, line, text), strict=False))
-        number = _number(cells.get("tool", ""), "tool", path, line)
+        place = Place(str(path), line)
+        cells = dict(zip(heading, _cells(place, text), strict=False))
+        number = _number(cells.get("tool", ""), "tool", place)
         if number != int(number) or number < 0:
-            raise ProgramError(f"tool = {cells['tool']!r}", expected="a whole number", file=str(path), line=line)
-        length = _number(cells.get("length_mm", ""), "length_mm", path, line)
+            raise place.fail(f"tool = {cells['tool']!r}", "a whole number")
+        length = _number(cells.get("length_mm", ""), "length_mm", place)
         diameter, stick_out = (
-            _number(cells[name], name, path, line) if cells.get(name) else math.nan
+            _number(cells[name], name, place) if cells.get(name) else math.nan
             for name in ("diameter_mm", "stick_out_mm")
         )
         tool = ToolEntry(int(number), length, diameter, cells.get("remark", ""), stick_out, cells.get("material", ""))
@@ -141,30 +162,28 @@ def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int
     return rows
 
 
-def _cells(path: str | Path, line: int, text: str) -> list[str]:
+def _cells(place: Place, text: str) -> list[str]:
     try:
         return [cell.strip() for cell in next(csv.reader([text]))]
     except csv.Error as error:  # a cell of more than 131,072 characters
-        raise ProgramError(f"a row that cannot be read: {error}", file=str(path), line=line) from None
+        raise place.fail(f"a row that cannot be read: {error}") from None
 
 
 def _linuxcnc_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
     rows = []
     for line, text in lines:
+        place = Place(str(path), line)
         content, _, remark = text.partition(";")
         if not content.strip():
             continue
         words = dict(re.findall(r"([A-Za-z])\s*([^\sA-Za-z]+(?:[eE][+-]?\d+)?)", content))
         words = {letter.upper(): value for letter, value in words.items()}
         if re.fullmatch(r"[0-9]{1,9}", words.get("T", "")) is None:
-            raise ProgramError(
-                f"{content.strip()[:40]!r} is not a tool",
-                expected="T<number> P<pocket> Z<length mm> D<diameter mm> ;remark",
-                file=str(path),
-                line=line,
+            raise place.fail(
+                f"{content.strip()[:40]!r} is not a tool", "T<number> P<pocket> Z<length mm> D<diameter mm> ;remark"
             )
-        length = _number(words["Z"], "Z", path, line) if "Z" in words else math.nan
-        diameter = _number(words["D"], "D", path, line) if "D" in words else math.nan
+        length = _number(words["Z"], "Z", place) if "Z" in words else math.nan
+        diameter = _number(words["D"], "D", place) if "D" in words else math.nan
         rows.append((line, ToolEntry(int(words["T"]), length, diameter, remark.strip())))
     return rows
 
@@ -212,25 +231,22 @@ def read_offsets(path: str | Path) -> Offsets:
         raise ProgramError("the offsets file is empty", expected="lines such as G55 = [100, 0, 0]", file=str(path))
     offsets = Offsets()
     for line, text in filled:
+        place = Place(str(path), line)
         parameter = re.fullmatch(r"([0-9]{1,9})\s+(\S+)", text)
         assignment = re.fullmatch(r'"?([Gg][\d.]+(?: ?[Pp]\d+)?)"?\s*=\s*\[(.*)\]', text)
         if parameter:
-            _set_parameter(offsets, int(parameter[1]), _number(parameter[2], parameter[1], path, line))
+            _set_parameter(offsets, int(parameter[1]), _number(parameter[2], parameter[1], place))
         elif assignment and is_offset(assignment[1].upper()):
             name = assignment[1].upper()
-            values = [_number(v.strip(), name, path, line) for v in assignment[2].split(",") if v.strip()]
+            values = [_number(v.strip(), name, place) for v in assignment[2].split(",") if v.strip()]
             most = 6 if name in HOMES else 7
             if not 1 <= len(values) <= most:
-                raise ProgramError(
-                    f"{name} has {len(values)} numbers", expected=f"1 to {most}", file=str(path), line=line
-                )
+                raise place.fail(f"{name} has {len(values)} numbers", f"1 to {most}")
             set_offset(offsets, name, values)
         else:
-            raise ProgramError(
+            raise place.fail(
                 f"{text[:40]!r} is not an offset",
-                expected="G54 = [x, y, z, a, b, c, r] (to G59.3, G28, G30, G54.1 P1), or LinuxCNC's `5221 12.5`",
-                file=str(path),
-                line=line,
+                "G54 = [x, y, z, a, b, c, r] (to G59.3, G28, G30, G54.1 P1), or LinuxCNC's `5221 12.5`",
             )
     return offsets
 

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.files import check_regular
+from toolpath_stiff.nc.place import Place
 
 NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails does not try shorter numbers
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
@@ -95,78 +96,64 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     >>> [(word.letter, word.value, word.column) for word in block.words]
     [('G', 1.0, 5), ('X', 1.5, 9), ('Y', -2.0, 29)]
     """
-    compact, columns = without_comments(text, line, name, semicolon)
+    place = Place(name, line)
+    compact, columns = without_comments(text, place, semicolon)
     if not compact:
         return Block(line, ())
     if compact == "%":
         return Block(line, (), percent=True)
-    check_length(compact, line, name)
+    check_length(compact, place)
     slash, start, rest, switch = compact.find("/"), 0, None, 1
     if slash > 0 and EXPRESSION.search(compact):  # a quotient
         slash = -1
     if slash >= 0:
-        behind, switch = block_delete(compact, slash, columns, line, name)
+        behind, switch = block_delete(compact, slash, columns, place)
         start = 0 if slash else behind
     if compact.startswith(("O", ":"), start):  # `:` is O on ISO tape
-        return program_number(compact[start:], columns[start], line, name)
-    words = _tokens(compact, columns, start, text, line, name, slash if slash > 0 else None)
+        return program_number(compact[start:], columns[start], place)
+    words = _tokens(compact, columns, start, text, place, slash if slash > 0 else None)
     if slash > 0:
         rest = len(words)
-        words += _tokens(compact, columns, behind, text, line, name)
-    return Block(line, through_pygcode(words, line, name), optional=slash == 0, switch=switch, rest=rest)
+        words += _tokens(compact, columns, behind, text, place)
+    return Block(line, through_pygcode(words, place), optional=slash == 0, switch=switch, rest=rest)
 
 
-def block_delete(compact: str, at: int, columns: Sequence[int], line: int, name: str) -> tuple[int, int]:
+def block_delete(compact: str, at: int, columns: Sequence[int], place: Place) -> tuple[int, int]:
     """Where a block-delete slash and its number end, and which switch it names."""
     end = at + 1
     while end < len(compact) and "0" <= compact[end] <= "9":
         end += 1
     switch = int(compact[at + 1 : end] or 1) if end < at + 3 else 0
     if not 1 <= switch <= 9:
-        raise ProgramError(
-            f"block-delete switch {compact[at : min(end, at + 20)]!r}",
-            expected="/ or /1 to /9",
-            file=name,
-            line=line,
-            column=columns[at],
+        raise place.fail(
+            f"block-delete switch {compact[at : min(end, at + 20)]!r}", "/ or /1 to /9", column=columns[at]
         )
     return end, switch
 
 
-def check_length(compact: str, line: int, name: str) -> None:
+def check_length(compact: str, place: Place) -> None:
     """Refuse a block that no control reads."""
     if len(compact) > LONGEST_BLOCK:
-        raise ProgramError(
-            f"a block of {len(compact)} characters without comments and blanks",
-            expected=f"at most {LONGEST_BLOCK}",
-            file=name,
-            line=line,
+        raise place.fail(
+            f"a block of {len(compact)} characters without comments and blanks", f"at most {LONGEST_BLOCK}"
         )
 
 
-def program_number(compact: str, column: int, line: int, name: str) -> Block:
+def program_number(compact: str, column: int, place: Place) -> Block:
     """`O1234` alone is a program's number; any other O word controls subprograms or loops."""
     if compact[1:].isascii() and compact[1:].isdigit():
         if len(compact) > MOST_DIGITS:
-            raise ProgramError(
-                f"a program number of {len(compact) - 1} digits",
-                expected="O and up to 8 digits",
-                file=name,
-                line=line,
-                column=column,
-            )
-        return Block(line, (Word("O", float(compact[1:]), column, compact),))
-    raise ProgramError(
+            raise place.fail(f"a program number of {len(compact) - 1} digits", "O and up to 8 digits", column=column)
+        return Block(place.line, (Word("O", float(compact[1:]), column, compact),))
+    raise place.fail(
         f"O word {compact[:20]!r}: subprograms and loops are not supported",
-        expected="plain moves",
-        hint="expand it before analyzing (the control or the post can do it), or give --interpreter linuxcnc",
-        file=name,
-        line=line,
+        "plain moves",
+        "expand it before analyzing (the control or the post can do it), or give --interpreter linuxcnc",
         column=column,
     )
 
 
-def without_comments(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Sequence[int]]:
+def without_comments(text: str, place: Place, semicolon: bool) -> tuple[str, Sequence[int]]:
     """Upper-case text without comments and blanks, and the column of each of its characters."""
     if text.isascii() and not COMMENT.search(text):  # the bulk of a big program
         compact = "".join(text.split()).upper()
@@ -183,30 +170,26 @@ def without_comments(text: str, line: int, name: str, semicolon: bool) -> tuple[
         elif depth:
             depth -= character == ")"
         elif character == ";":
-            if not semicolon and without_comments(text[column:].replace(";", " "), line, name, semicolon)[0]:
-                raise ProgramError(
+            if not semicolon and without_comments(text[column:].replace(";", " "), place, semicolon)[0]:
+                raise place.fail(
                     f"{text[column:].strip()[:20]!r} after `;`, which ends the block in this dialect",
-                    expected="comments in parentheses, one block a line",
-                    file=name,
-                    line=line,
+                    "comments in parentheses, one block a line",
                     column=column,
                 )
             break
         elif character == ")":
-            raise ProgramError("`)` without `(`", file=name, line=line, column=column)
+            raise place.fail("`)` without `(`", column=column)
         elif not character.isspace() and character != "\ufeff":
             # Of other scripts some letters grow in upper case, and some become ASCII ones.
             characters.append(character.upper() if character.isascii() else character)
             columns.append(column)
     if depth:
-        raise ProgramError(
-            "a comment is not closed", expected="`)` on the same line", file=name, line=line, column=begun
-        )
+        raise place.fail("a comment is not closed", "`)` on the same line", column=begun)
     return "".join(characters), columns
 
 
 def _tokens(
-    compact: str, columns: Sequence[int], start: int, text: str, line: int, name: str, stop: int | None = None
+    compact: str, columns: Sequence[int], start: int, text: str, place: Place, stop: int | None = None
 ) -> list[Word]:
     """Words of the compacted text; N words are checked and left out."""
     words: list[Word] = []
@@ -216,7 +199,7 @@ def _tokens(
         match = WORD.match(compact, position, stop)
         column = columns[position]
         if match is None:
-            raise _unreadable(compact, position, column, line, name)
+            raise _unreadable(compact, position, column, place)
         letter, number, exponent = match.groups()
         end = match.end()
         if exponent:
@@ -229,34 +212,28 @@ def _tokens(
                 number += exponent
         original = text[column - 1 : columns[end - 1]]
         if end - position > 1 + LONGEST_NUMBER:
-            raise ProgramError(
+            raise place.fail(
                 f"a number of {end - position - 1} characters after {letter}",
-                expected=f"at most {LONGEST_NUMBER}",
-                file=name,
-                line=line,
+                f"at most {LONGEST_NUMBER}",
                 column=column,
             )
         if letter == "N":
             if words:
-                raise ProgramError(
-                    f"line number {original!r} after another word",
-                    expected="N at the beginning of the line",
-                    file=name,
-                    line=line,
-                    column=column,
+                raise place.fail(
+                    f"line number {original!r} after another word", "N at the beginning of the line", column=column
                 )
         elif letter not in LETTERS:
-            raise ProgramError(f"word {original!r} is not known", file=name, line=line, column=column)
+            raise place.fail(f"word {original!r} is not known", column=column)
         else:
             value = float(number)
             if not math.isfinite(value):
-                raise ProgramError(f"{original!r} is not a finite number", file=name, line=line, column=column)
+                raise place.fail(f"{original!r} is not a finite number", column=column)
             words.append(Word(letter, value, column, original))
         position = end
     return words
 
 
-def _unreadable(compact: str, position: int, column: int, line: int, name: str) -> InputError:
+def _unreadable(compact: str, position: int, column: int, place: Place) -> InputError:
     """The error for text that is not a word, with the reason if it is a known one."""
     character = compact[position]
     tail = compact[position : position + 12]
@@ -284,10 +261,10 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
         if compact[1:].isalnum() and not position:  # DIN 66025
             found = f"{compact[:20]!r} is a program's name behind `%`, as Siemens', NUM's and ISG's controls have it"
             hint = "take the name away; a Fanuc's number is read past with --dialect fanuc"
-    return ProgramError(found, expected=expected, hint=hint, file=name, line=line, column=column)
+    return place.fail(found, expected, hint, column=column)
 
 
-def through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...]:
+def through_pygcode(words: list[Word], place: Place) -> tuple[Word, ...]:
     """Let pygcode read the normalised words; what it does not return exactly is an error."""
     if not words:
         return ()
@@ -308,13 +285,7 @@ def through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...]
         except (GCodeWordStrError, ValueError):
             alone = None
         if alone is None or float(alone.value) != word.value:
-            raise ProgramError(
-                f"word {word.text!r} cannot be read",
-                expected=_expected(word.letter),
-                file=name,
-                line=line,
-                column=word.column,
-            )
+            raise place.fail(f"word {word.text!r} cannot be read", _expected(word.letter), column=word.column)
     return tuple(all_words)
 
 
@@ -414,24 +385,14 @@ def split_lines(text: str, name: str) -> tuple[str, ...]:
     binary = BINARY.search(joined) if _any_binary(joined) else None
     if binary is not None:
         at = binary.start()
-        raise ProgramError(
-            f"binary byte 0x{ord(binary[0]):02X}",
-            expected="the text of an NC program",
-            file=name,
-            line=joined.count("\n", 0, at) + 1,
-            column=at - joined.rfind("\n", 0, at),
-        )
+        place = Place(name, joined.count("\n", 0, at) + 1, at - joined.rfind("\n", 0, at))
+        raise place.fail(f"binary byte 0x{ord(binary[0]):02X}", "the text of an NC program")
     found = joined.replace("\x1a", "").replace("\x0c", " ").split("\n")
     if not found[-1]:
         found.pop()
     if max(map(len, found), default=0) > LONGEST_LINE:
         at = next(number for number, line in enumerate(found, 1) if len(line) > LONGEST_LINE)
-        raise ProgramError(
-            f"a line of {len(found[at - 1])} characters",
-            expected=f"lines of at most {LONGEST_LINE}",
-            file=name,
-            line=at,
-        )
+        raise Place(name, at).fail(f"a line of {len(found[at - 1])} characters", f"lines of at most {LONGEST_LINE}")
     return tuple(found)
 
 

@@ -13,21 +13,26 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from itertools import combinations, pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
-from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
+from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.nc.reader import parse_program
-from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated, machine_words
+from toolpath_stiff.results import FolderResult
+from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.tables import Columns, read_table
-from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, number, rad_from_deg
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 PROGRAM = "case_study.nc"
 LOW_MM, HIGH_MM = 400.0, 1200.0
@@ -44,21 +49,71 @@ REGION_COLUMNS = ("x_mm", "y_mm", "z_mm", "rotation_deg")
 MOST_REGIONS = 50
 MEANS_AGREE = 0.01  # the paper: "stiffnesses of the same magnitude"; we ask for one per cent
 WAVES_MM = (10.0, 20.0, 40.0)  # how far the non-planar variants of the path go up and down
-HOLDS = {True: "yes", False: "NO", None: "not tested"}
 DECIMALS = 3  # N/mm: finer than anything that can be measured, coarser than the processor's last digits
 
 
-@dataclass(frozen=True)
-class CaseStudy:
-    """Figures of the case study (`summary`, in mm and N/mm) and the analyses of its regions."""
+@dataclass(frozen=True, repr=False)
+class CaseStudy(FolderResult):
+    r"""One tool path in several regions: the paper's conclusions checked one by one, and where they stop holding.
+
+    Attributes
+    ----------
+    summary
+        The JSON document of the command, in mm and N/mm.
+    regions
+        Name of each region -> the analysis there.
+    inputs
+        Files that were read.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> study = tps.case_study("nist", slot, {"low": (0, 0, 500), "high": (0, 0, 900)}, step_mm=10)
+    >>> study.to_frame()[["region", "z_mm"]].values.tolist()
+    [['low', 500.0], ['high', 900.0]]
+    >>> study.is_own
+    True
+    """
+
+    command: ClassVar[str] = "case-study"
+    shown_by: ClassVar[str] = "case_study"
 
     summary: dict[str, Any]
     regions: dict[str, Analysis]
+    inputs: tuple[str, ...] = ()
 
     @property
     def is_own(self) -> bool:
         """Whether path or regions are a user's; the packaged ones come with non-planar variants."""
         return not self.summary["non_planar"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return self.summary
+
+    def to_frame(self) -> pd.DataFrame:
+        """The regions, one a row."""
+        import pandas as pd
+
+        return pd.DataFrame(self.summary["regions"])
+
+    def plot(self) -> Figure:
+        """The path in its regions, coloured by stiffness."""
+        return cast("Figure", self.view.regions_picture.figure(self))
+
+    def __str__(self) -> str:
+        return str(self.view.text(self))
+
+    def _short(self) -> str:
+        held = [conclusion["holds"] for conclusion in self.summary["conclusions"] if conclusion["holds"] is not None]
+        on = f"{self.summary['program']} on " if self.is_own else ""
+        verb = "conclusion of the paper holds" if len(held) == 1 else "conclusions of the paper hold"
+        return f"{on}{self.summary['machine']}, {sum(held)} of {len(held)} {verb}"
+
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """Name -> content of each file that `save` writes."""
+        return cast("Mapping[str, Content]", self.view.files(self, plots=plots))
 
 
 def case_study_program() -> Program:
@@ -89,6 +144,7 @@ def run_case_study(
     step: float = defaults.STEP,
     read: Callable[[Pose], Program] | None = None,
     regions: Mapping[str, Region] | None = None,
+    inputs: tuple[str, ...] = (),
 ) -> CaseStudy:
     """Analyze a path in every region and over the heights, the packaged one also with waves.
 
@@ -102,6 +158,8 @@ def run_case_study(
         A program of one's own, read for where its zero sits; unless given, the packaged square.
     regions
         Name -> where program zero sits; unless given, `REGIONS`.
+    inputs
+        Files that were read for it.
 
     Raises
     ------
@@ -110,7 +168,7 @@ def run_case_study(
 
     Examples
     --------
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.stiffness.model import build_model
     >>> study = run_case_study(build_model(load_machine("nist")), step=0.02)
     >>> [found["holds"] for found in study.summary["conclusions"]]
@@ -145,7 +203,7 @@ def run_case_study(
         "limits_of_the_conclusions": _limits(heights),
         "non_planar": [] if own else [_wave(model, amplitude, step) for amplitude in WAVES_MM],
     }
-    return CaseStudy(summary, analyses)
+    return CaseStudy(summary, analyses, inputs)
 
 
 def _in_region(at: Callable[[Region], Analysis], name: str, place: Region, own: bool) -> Analysis:
@@ -199,9 +257,9 @@ def read_regions(file: str) -> dict[str, Region]:
             f"column {missing[0]} is missing", expected=",".join(REGION_COLUMNS), file=file, line=table.heading_line
         )
     found: dict[str, Region] = {}
-    for number, (line, cells) in enumerate(table.rows, 1):
+    for row_number, (line, cells) in enumerate(table.rows, 1):
         row = dict(zip(table.heading, cells, strict=False))
-        name = row.get("region") or str(number)
+        name = row.get("region") or str(row_number)
         if name in found:
             raise TableError(f"region {name} stands twice", file=file, line=line)
         try:
@@ -235,7 +293,7 @@ def _conclusions(
     def rises(key: str) -> tuple[bool | None, str]:
         steps = [(figures[low][key], figures[high][key]) for low, high in in_height]
         words = "; ".join(
-            f"region {low} to {high}: {a:.0f} to {b:.0f} N/mm"
+            f"region {low} to {high}: {number(a)} to {number(b)} N/mm"
             for (low, high), (a, b) in zip(in_height, steps, strict=True)
         )
         return (all(b > a for a, b in steps) if steps else None), words or "no two regions differ in height alone"
@@ -247,8 +305,8 @@ def _conclusions(
         for a, b in in_plane
     ]
     same_words = "; ".join(
-        f"regions {pair}: means apart by {100 * gap:.2f} %, ranges {one['range_N_per_mm']:.0f} and "
-        f"{two['range_N_per_mm']:.0f} N/mm"
+        f"regions {pair}: means apart by {100 * gap:.2f} %, ranges {number(one['range_N_per_mm'])} and "
+        f"{number(two['range_N_per_mm'])} N/mm"
         for gap, one, two, pair in apart
     )
     return [
@@ -308,85 +366,3 @@ def _wave(model: StiffnessModel, amplitude: float, step: float) -> dict[str, Any
             for a, b in _pairs_in_plane(figures, REGIONS)
         ],
     }
-
-
-def region_rows(study: CaseStudy) -> str:
-    """`case_study.csv`: a row a region, mean and range first as in the paper's Figure 10."""
-    keys = (
-        "region",
-        "x_mm",
-        "y_mm",
-        "z_mm",
-        "rotation_deg",
-        "mean_N_per_mm",
-        "range_N_per_mm",
-        "min_N_per_mm",
-        "max_N_per_mm",
-    )
-    return csv_text(keys, ([str(row[key]) for key in keys] for row in study.summary["regions"]))
-
-
-def study_text(study: CaseStudy) -> str:
-    """The case study in words and numbers, Markdown."""
-    summary = study.summary
-    count = len(summary["regions"])
-    asked = [
-        f"One path ({summary['program']}, {summary['note']}) in four regions, as the paper's Figure 10: mean stiffness",
-        "under a load along the motion, and in parentheses its range, N/mm.",
-    ]
-    if study.is_own:
-        asked = [
-            f"{summary['program']} in {count} region{'s' if count > 1 else ''}: mean stiffness under a load along the",
-            "motion, and in parentheses its range, N/mm.",
-        ]
-    lines = [
-        f"# Case study on {machine_words(summary)}",
-        "",
-        *(line for text in summary["warnings"] for line in (f"Warning: {text}.", "")),
-        *asked,
-        "",
-        "| region | program zero, mm | turned | mean (range), N/mm |",
-        "| --- | --- | --- | --- |",
-    ]
-    for row in summary["regions"]:
-        place = f"{row['x_mm']:g}, {row['y_mm']:g}, {row['z_mm']:g}"
-        lines.append(
-            f"| {row['region']} | {place} | {row['rotation_deg']:g} deg | "
-            f"{row['mean_N_per_mm']:.0f} ({row['range_N_per_mm']:.0f}) |"
-        )
-    lines += ["", "## The paper's conclusions", ""]
-    for number, found in enumerate(summary["conclusions"], 1):
-        lines.append(f"{number}. {found['statement']}: {HOLDS[found['holds']]}. {found['numbers']}.")
-    lines += ["", "## Where they stop holding", "", *_limits_words(summary, study.is_own)]
-    if study.is_own:
-        return "\n".join([*lines, ""])
-    lines += [
-        "",
-        "Non-planar cuts, of which the paper warns: the square with its height going up and down along every side.",
-        "The means of two places at one height stay as close as before; it is the range that grows, several times,",
-        "because the machine is twice as stiff along Z as along X and Y.",
-        "",
-        f"| waves, mm | means apart at z = {LOW_MM:g} mm | at z = {HIGH_MM:g} mm | ranges in regions 1 to 4, N/mm |",
-        "| --- | --- | --- | --- |",
-    ]
-    for wave in summary["non_planar"]:
-        low, high = wave["means_apart_at_one_height_percent"]
-        ranges = ", ".join(f"{row['range_N_per_mm']:.0f}" for row in wave["regions"])
-        lines.append(f"| {wave['amplitude_mm']:g} | {low:.2f} % | {high:.2f} % | {ranges} |")
-    return "\n".join([*lines, ""])
-
-
-def _limits_words(summary: Mapping[str, Any], own: bool) -> list[str]:
-    limits, heights, at = summary["limits_of_the_conclusions"], summary["heights"], summary["regions"][0]
-    turned = f", turned {at['rotation_deg']:g} deg," if at["rotation_deg"] else ","
-    moved = f"Moved up and down at ({at['x_mm']:g}, {at['y_mm']:g}) mm{turned}"
-    mean, widest = (f"{limits[f'largest_{what}_at_z_mm']:g}" for what in ("mean", "range"))
-    if not own:
-        return [
-            f"{moved} the same path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm: "
-            "beyond, both fall again."
-        ]
-    return [
-        f"{moved} as region {at['region']}, from z = {heights[0]['z_mm']:g} to {heights[-1]['z_mm']:g} mm (where it is "
-        f"within reach), the path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm."
-    ]

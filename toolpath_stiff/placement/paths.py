@@ -15,8 +15,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
-from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program

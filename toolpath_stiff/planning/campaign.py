@@ -9,6 +9,7 @@ so that the scatter is known; random order, so that a drift looks like nothing e
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
@@ -33,8 +34,8 @@ from toolpath_stiff.planning.visits import (
     axis_levels,
     draw_poses,
     images,
-    planned_readings,
     reachable,
+    visits_in_full,
 )
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.units import RAD_PER_DEG
@@ -220,37 +221,27 @@ def _ordered(stops: list[_Stop], rng: Generator) -> list[_Stop]:
     shuffled = [stops[k] for k in rng.permutation(len(stops))]
     first = {(stop.setup, stop.extension): k for k, stop in reversed(list(enumerate(stops)))}
     shuffled.sort(key=lambda stop: first[(stop.setup, stop.extension)])
-    found: list[_Stop] = []
-    counted: dict[tuple[bytes, float, str], int] = {}
+    visited: Counter[tuple[bytes, float, str]] = Counter()
+    ordered = []
     for stop in shuffled:
-        key = (stop.pose.tobytes(), stop.extension, stop.setup)
-        counted[key] = counted.get(key, 0) + 1
-        found.append(_Stop(stop.pose, stop.extension, stop.setup, counted[key], stop.purpose))
-    return found
+        place = (stop.pose.tobytes(), stop.extension, stop.setup)
+        visited[place] += 1
+        ordered.append(replace(stop, repeat=visited[place]))
+    return ordered
 
 
 def _visits(stops: Sequence[_Stop], menu: Menu, rng: Generator) -> Visits:
     loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads))))
-    jobs = list(product(AXES, loads))
-    count = len(jobs)
-    orders = [rng.permutation(count) for _ in stops]
-    names = np.array([jobs[k][0] for order in orders for k in order])
-    pose = np.array([stop.pose for stop in stops])
-    extension = np.array([stop.extension for stop in stops])
-    setup = np.array([stop.setup for stop in stops], dtype=str)
-    readings = planned_readings(
-        np.repeat(pose, count, axis=0),
-        names,
-        np.array([jobs[k][1] for order in orders for k in order]),
-        np.repeat(extension, count),
-        np.repeat(setup, count),
-        np.tile(READING_EVERY * np.arange(1.0, count + 1.0), len(stops)),
+    names, forces = (np.array(column) for column in zip(*product(AXES, loads), strict=True))
+    orders = np.array([rng.permutation(len(names)) for _ in stops])
+    return visits_in_full(
+        np.array([stop.pose for stop in stops]),
+        np.array([stop.extension for stop in stops]),
+        np.array([stop.setup for stop in stops], dtype=str),
+        names[orders],
+        forces[orders],
+        READING_EVERY * np.arange(1.0, len(names) + 1.0),
     )
-    v = len(stops)
-    return Visits(
-        pose, extension, np.zeros(v), setup, np.full(v, ""), readings, names, np.ones(v * count, dtype=np.int64),
-        np.arange(v * count), np.arange(v) * count,
-    )  # fmt: skip
 
 
 def _minutes(stops: Sequence[_Stop], visits: Visits, costs: Costs) -> float:

@@ -10,10 +10,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.visits import Visits
+from toolpath_stiff.planning.visits import AXES, Visits
 from toolpath_stiff.readings.loops import LoopColumns
 from toolpath_stiff.readings.measurements import Measurements, with_offsets
 
@@ -25,9 +25,6 @@ PLACES = 40  # with an indicator: a link shows at any pose where it is loaded
 
 
 MOST_LOOPS = 4  # one strut or vertex stands for all where an effect is of all
-
-
-AXES = ("X", "Y", "Z")
 
 
 def loops_between(rivals: Sequence[Rival]) -> tuple[str, ...]:
@@ -67,55 +64,33 @@ def with_indicators(machine: Machine, visits: Visits, loops: Sequence[str], nois
     """
     if not loops:
         return visits
-    plain = _plain(visits)
+    plain = _beside_which(visits)
     plain = plain[np.unique(np.linspace(0, len(plain) - 1, min(PLACES, len(plain))).astype(int))]
-    rows = [visits.rows(int(visit)) for visit in plain]
-    taken = np.concatenate(rows)
-    readings, names, rounds = [visits.readings], [visits.names], [visits.rounds]
-    members = [visits.members]
-    starts, owner, loop_of = [visits.starts], list(range(len(visits))), [""] * len(visits)
-    at, first = len(visits.members), len(visits.readings)
-    for loop in loops:
-        readings.append(_read_across(visits.readings.select(taken), loop))
-        names.append(visits.names[taken])
-        rounds.append(visits.rounds[taken])
-        for visit, own in zip(plain.tolist(), rows, strict=True):
-            members.append(np.concatenate([own, np.arange(first, first + len(own))]))
-            starts.append(np.array([at]))
-            owner.append(visit)
-            loop_of.append(loop)
-            at, first = at + 2 * len(own), first + len(own)
-    which = np.array(owner)
+    rows = np.array([visits.rows(int(visit)) for visit in plain])
+    count, tip = len(loops) * len(plain), visits.readings.select(rows.ravel())
+    across = len(visits.readings) + np.arange(count * len(AXES)).reshape(count, len(AXES))
+    members = np.concatenate([np.tile(rows, (len(loops), 1)), across], axis=1)
+    owner = np.concatenate([np.arange(len(visits)), np.tile(plain, len(loops))])
+    of_visits = {name: getattr(visits, name)[owner] for name in ("pose", "extension", "wait", "setup", "label")}
+    readings = [visits.readings, *(replace(tip, loop=np.full(len(tip), loop)) for loop in loops)]
     return replace(
         visits,
-        pose=visits.pose[which],
-        extension=visits.extension[which],
-        wait=visits.wait[which],
-        setup=visits.setup[which],
-        label=visits.label[which],
+        **of_visits,
         readings=with_offsets(_stacked(readings), machine, noise),
-        names=np.concatenate(names),
-        rounds=np.concatenate(rounds),
-        members=np.concatenate(members),
-        starts=np.concatenate(starts),
-        loop=np.array(loop_of),
+        names=np.concatenate([visits.names, np.tile(visits.names[rows.ravel()], len(loops))]),
+        rounds=np.concatenate([visits.rounds, np.tile(visits.rounds[rows.ravel()], len(loops))]),
+        members=np.concatenate([visits.members, members.ravel()]),
+        starts=np.concatenate([visits.starts, len(visits.members) + members.shape[1] * np.arange(count)]),
+        loop=np.concatenate([np.full(len(visits), ""), np.repeat(loops, len(plain))]),
     )
 
 
-def _plain(visits: Visits) -> NDArray[np.int64]:
+def _beside_which(visits: Visits) -> IntArray:
     """(k,) visits that read X, Y, Z once each, under their largest load: what an indicator is set beside."""
-    found = []
-    for visit in range(len(visits)):
-        own = visits.members[visits.starts[visit] : visits.starts[visit] + visits.counts[visit]]
-        if len(own) == len(AXES) and set(visits.names[own].tolist()) == set(AXES):
-            found.append((visit, float(visits.readings.force[own].max())))
-    largest = max((load for _, load in found), default=0.0)
-    return np.array([visit for visit, load in found if load == largest], dtype=np.int64)
-
-
-def _read_across(readings: Measurements, loop: str) -> Measurements:
-    """The same loads, read across a loop."""
-    return replace(readings, loop=np.full(len(readings), loop))
+    names = np.split(visits.names[visits.members], visits.starts[1:])
+    loads = np.maximum.reduceat(visits.readings.force[visits.members], visits.starts)
+    plain = np.array([sorted(read) == list(AXES) for read in names])
+    return np.flatnonzero(plain & (loads == loads[plain].max(initial=0.0)))
 
 
 def _stacked(parts: Sequence[Measurements]) -> Measurements:

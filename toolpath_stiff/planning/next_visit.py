@@ -12,22 +12,31 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import FileError, InputError
-from toolpath_stiff.files import read_bytes
-from toolpath_stiff.planning.gaps import SETTLED, ReadingNoise, choose, pair_shares, why_of
-from toolpath_stiff.planning.plan import Plan, Proposal
+from toolpath_stiff.files import read_bytes, write_atomically
+from toolpath_stiff.planning.gaps import SETTLED, ReadingNoise, choose, further_minutes, pair_shares, why_of
+from toolpath_stiff.planning.plan import RivalPlan
+from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.rivals import Forecast, principal
+from toolpath_stiff.planning.rows import POSE, plan_csv, plan_rows
 from toolpath_stiff.planning.visits import Costs, Menu, Visits, planned_readings
-from toolpath_stiff.readings.rows import COLUMNS, Row, read_rows, with_dates
-from toolpath_stiff.tables import read_table
+from toolpath_stiff.readings.mapping import mapped_table
+from toolpath_stiff.readings.rows import COLUMNS, Row, read_rows
+from toolpath_stiff.results import Result
+from toolpath_stiff.units import certain
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TABLES = "plan_tables.npz"  # in the plan's folder
 
@@ -47,14 +56,14 @@ WILD_SHARE = 0.1  # of the readings may be that far off; assumed
 OF_VISITS = ("pose", "extension", "wait", "setup", "label", "names", "rounds", "members", "starts")
 
 
-def tables_of(proposal: Proposal) -> bytes:
+def tables_of(planned: Plan) -> bytes:
     """Content of `TABLES`: everything that the choice of the next visit needs."""
-    plan = proposal.plan
-    assert isinstance(plan, Plan)
+    plan = planned.choice
+    assert isinstance(plan, RivalPlan)
     readings, beside = plan.visits.readings, plan.visits.readings.beside
     arrays: dict[str, Any] = {name: getattr(plan.visits, name) for name in OF_VISITS}
-    arrays |= {"loop": np.full(len(plan.visits), "") if plan.visits.loop is None else plan.visits.loop}
     arrays |= {
+        "loop": np.full(len(plan.visits), "") if plan.visits.loop is None else plan.visits.loop,
         "force": readings.force,
         "time": readings.time,
         "of_loop": readings.loop,
@@ -70,10 +79,10 @@ def tables_of(proposal: Proposal) -> bytes:
         "version": VERSION,
         "rivals": [[one.name, one.weight] for one in plan.forecasts],
         "noise": [plan.scatter.repeat, plan.scatter.clamping],
-        "costs": vars(proposal.costs),
-        "setups": list(proposal.menu.setups),
-        "tools": list(proposal.menu.tool_extensions),
-        "waits": list(proposal.menu.waits),
+        "costs": vars(planned.costs),
+        "setups": list(planned.menu.setups),
+        "tools": list(planned.menu.tool_extensions),
+        "waits": list(planned.menu.waits),
     }
     file = io.BytesIO()
     np.savez(file, said=np.frombuffer(json.dumps(said).encode(), dtype=np.uint8), **arrays)
@@ -182,18 +191,18 @@ class Taken(NamedTuple):
     where: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class NextVisit:
-    """Where a plan stands, and where to go next.
+@dataclass(frozen=True, eq=False, repr=False)
+class NextVisit(Result):
+    """Where a plan stands, and the visit to make next.
 
     Attributes
     ----------
-    tables
+    folder, tables
         The plan's.
     taken
         Readings so far.
-    probability
-        Rival -> probability.
+    weights
+        Rival -> probability, the likeliest first.
     visit
         Number of the next visit; None where the question is settled or nothing is left to go to.
     why
@@ -204,21 +213,98 @@ class NextVisit:
         What was passed over, or is doubtful.
     """
 
+    command: ClassVar[str] = "plan"
+
+    folder: str | Path
     tables: Tables
     taken: Taken
-    probability: dict[str, float]
+    weights: dict[str, float]
     visit: int | None
     why: str
     unlike: bool
     notes: tuple[str, ...]
 
     @property
+    def probability(self) -> dict[str, float]:
+        """Explanation -> probability, the likeliest first; figures as they are written."""
+        weights: dict[str, float] = certain(self.weights)
+        return weights
+
+    @property
     def settled(self) -> bool:
-        """Whether one rival has `SETTLED`."""
-        return not self.unlike and max(self.probability.values()) >= SETTLED
+        """Whether one of them has 95 %."""
+        return not self.unlike and max(self.weights.values()) >= SETTLED
+
+    @cached_property
+    def rows(self) -> list[dict[str, Any]]:
+        """Rows of the next visit, as of plan.csv; none where there is no next visit."""
+        if self.visit is None:
+            return []
+        clamp = len(set(self.taken.clamp.tolist())) + 1
+        point = str(self.tables.visits.label[self.visit]) or f"next {clamp}"
+        return [{**row, "clamp": clamp, "point": point} for row in plan_rows(self.tables.visits, [self.visit])]
+
+    @property
+    def sentences(self) -> list[str]:
+        """Where the plan stands, and what is next."""
+        chances = ", ".join(f"{name} {_percent(weight)}" for name, weight in self.weights.items())
+        lines = [f"after {len(self.taken.rows)} readings of this plan: {chances}"]
+        if self.unlike:
+            return [*lines, "too many readings are far off under each of these: ask tps diagnose what else it could be"]
+        if self.settled:
+            return [*lines, f"settled: one explanation has {100 * SETTLED:.0f} % or more; confirm it with tps diagnose"]
+        if not self.rows:
+            return [*lines, "nothing is left to go to that would tell them apart; ask tps diagnose"]
+        x, y, z, a, b, c, tool = (f"{self.rows[0][key]:g}" for key in (*POSE, "tool_extension_mm"))
+        longer = f", tool {tool} mm longer" if float(tool) else ""
+        return [*lines, f"next: X{x} Y{y} Z{z} mm, A{a} B{b} C{c} deg{longer}", f"  {self.why}"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Probabilities, the next visit and its rows."""
+        minutes = None
+        if self.visit is not None:
+            minutes = float(further_minutes(self.tables.visits, (), self.tables.costs, self.tables.menu)[self.visit])
+        return {
+            "rivals": [{"name": name, "probability": weight} for name, weight in self.probability.items()],
+            "readings": len(self.taken.rows),
+            "settled": self.settled,
+            "minutes": certain(minutes),
+            "why": self.why,
+            "text": self.sentences,
+            "notes": list(self.notes),
+            "rows": self.rows,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a reading of the next visit, the stiffness left empty; none where there is no next visit."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows)
+
+    def save(self) -> list[Path]:
+        """Write the next visit's rows, a measurement file to fill in, as next_1.csv (2, 3...) into the plan's folder.
+
+        A file that is there already stays: it is the same visit, perhaps filled in.
+        """
+        file = Path(self.folder) / f"next_{self.rows[0]['clamp']}.csv" if self.rows else None
+        return [] if file is None or file.exists() else [write_atomically(file, plan_csv(self.rows))]
+
+    def __str__(self) -> str:
+        return "\n".join([*self.sentences, *(f"note: {note}" for note in self.notes)])
+
+    def _short(self) -> str:
+        count = len(self.taken.rows)
+        return f"{count} reading{'' if count == 1 else 's'}, {'settled' if self.settled else 'open'}"
 
 
-def next_visit(folder: str | Path, files: tuple[str, ...] = ()) -> NextVisit:
+def _percent(share: float) -> str:
+    """Never "100 %" or "0 %"."""
+    if share > 0.99:
+        return "more than 99 %"
+    return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
+
+
+def next_visit(folder: str | Path, files: tuple[str, ...] = (), columns: Mapped = None) -> NextVisit:
     """Where to go next after some readings of a plan.
 
     Parameters
@@ -235,7 +321,7 @@ def next_visit(folder: str | Path, files: tuple[str, ...] = ()) -> NextVisit:
         The folder holds no tables; a file cannot be read, bad rows.
     """
     tables = Tables.read(folder)
-    taken, notes = _taken(tables, files or own_files(folder))
+    taken, notes = _taken(tables, files or own_files(folder), columns)
     forecasts, far = tables.forecasts, list[tuple[int, float]]()
     if len(taken.rows):
         forecasts, far = conditioned(tables, taken)
@@ -244,7 +330,7 @@ def next_visit(folder: str | Path, files: tuple[str, ...] = ()) -> NextVisit:
     unlike = len(far) > max(1.0, WILD_SHARE * len(taken.rows))
     done = unlike or max(probability.values()) >= SETTLED
     visit, why = (None, "") if done else _next(tables, forecasts, taken)
-    return NextVisit(tables, taken, probability, visit, why, unlike, tuple(notes))
+    return NextVisit(folder, tables, taken, probability, visit, why, unlike, tuple(notes))
 
 
 def own_files(folder: str | Path) -> tuple[str, ...]:
@@ -329,7 +415,7 @@ def _been(tables: Tables, taken: Taken) -> NDArray[np.bool_]:
     return found
 
 
-def _taken(tables: Tables, files: tuple[str, ...]) -> tuple[Taken, list[str]]:
+def _taken(tables: Tables, files: tuple[str, ...], columns: Mapped) -> tuple[Taken, list[str]]:
     """The readings of measurement files that are the plan's, in their order; how many are not."""
     readings = tables.visits.readings
     known: dict[tuple[Any, ...], int] = {}
@@ -342,7 +428,7 @@ def _taken(tables: Tables, files: tuple[str, ...]) -> tuple[Taken, list[str]]:
             k,
         )  # fmt: skip
     rows, logs, clamps, where, others = [], [], [], [], 0
-    for table in with_dates([read_table(name, "measurements", COLUMNS) for name in files]):
+    for table in [mapped_table(name, "measurements", COLUMNS, columns) for name in files]:
         for row in read_rows(table, planned=True).rows:
             own = known.get(_of_row(row, tables.menu.setups[0]))
             value = np.nan if own is None else _log(row, float(tables.offset[own]), float(tables.toward[own]))

@@ -11,7 +11,7 @@ has been told apart counts no more; one that cannot be told apart takes nothing 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -21,14 +21,12 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.candidates import testable_effects
-from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.judgement import NAMED, Judgement, judge, question
-from toolpath_stiff.inference.noise import LEAST, Noise, noise_models
-from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.judgement import NAMED
+from toolpath_stiff.inference.noise import LEAST
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.campaign import RISER, TABLE, Campaign, first_campaign
 from toolpath_stiff.planning.gaps import (
+    MOST_REPEATS,
+    SETTLED,
     Expectation,
     GapShares,
     ReadingNoise,
@@ -45,19 +43,8 @@ from toolpath_stiff.planning.gaps import (
     why_of,
 )
 from toolpath_stiff.planning.indicators import loops_between, with_indicators
-from toolpath_stiff.planning.rivals import (
-    Forecast,
-    Rival,
-    errors_so_far,
-    fitted_rivals,
-    forecast_all,
-    rivals_of,
-    unfitted_rivals,
-)
-from toolpath_stiff.planning.visits import Costs, Matters, Menu, Visits, possible_visits, with_options
-from toolpath_stiff.readings.measurements import Measurements
-from toolpath_stiff.stiffness.catalogue import known_effects
-from toolpath_stiff.stiffness.contract import Effect
+from toolpath_stiff.planning.rivals import Forecast, Rival, forecast_all
+from toolpath_stiff.planning.visits import Costs, Matters, Menu, Visits, possible_visits
 
 MOST_RIVALS = 6  # a plan that separates more would separate none well
 
@@ -90,26 +77,25 @@ class PairGap:
 
     Attributes
     ----------
-    first, second
-        Names.
-    gap, best_visit_gap
+    effects
+        Names of the two.
+    separation_sigma, best_single_pose_sigma
         In standard deviations: after the plan; at the best single visit of all that are possible.
     separable
         Whether tip stiffness can tell them apart: a gap of `LEAST_GAP` after the plan.
-    indicators
+    indicator_across
         Where an indicator would tell instead: link -> place; for separable pairs as well.
     """
 
-    first: str
-    second: str
-    gap: float
-    best_visit_gap: float
+    effects: tuple[str, str]
+    separation_sigma: float
+    best_single_pose_sigma: float
     separable: bool
-    indicators: dict[str, str]
+    indicator_across: dict[str, str]
 
 
 @dataclass(frozen=True)
-class Plan:
+class RivalPlan:
     """Visits to make, in order, and what is to be expected of them.
 
     Attributes
@@ -185,7 +171,7 @@ def plan_measurements(
     seed: int = 0,
     effect_files: Sequence[str | Path] = (),
     strut_spread: float = STRUT_SPREAD,
-) -> Plan:
+) -> RivalPlan:
     """Choose the visits that best tell rivals apart per minute.
 
     Parameters
@@ -228,27 +214,26 @@ def plan_measurements(
     if not usable.any():
         raise InputError("no pose that every rival has an answer to", hint="plan with fewer rivals, or other heights")
     # A reading without an answer belongs to visits that are never chosen; its numbers only must not spread.
-    forecasts = [_cleaned(f, good) for f in forecasts]
+    forecasts = [
+        replace(f, mean=np.where(good, f.mean, 0.0), factor=np.where(good[:, None], f.factor, 0.0)) for f in forecasts
+    ]
     noise = ReadingNoise(repeat, clamping, scatter)
     notes.extend(_floors_in_words(menu, visits))
     shares = {(f.name, g.name): pair_shares(visits, f, g, noise) for f, g in combinations(forecasts, 2)}
     weights = {f.name: f.weight for f in forecasts}
     picked = choose(visits, usable, shares, weights, n, costs, menu)
     chosen = in_order(visits, picked, menu, seed)
-    before = float(np.square([f.weight for f in forecasts]).sum())
-    after = expectation(visits, picked, forecasts, noise, seed)
-    pairs = tuple(sorted((_pair(p, shares[p], chosen, usable, ranked) for p in shares), key=lambda pair: pair.gap))
-    kinds = tuple(kind_of(visits, v, menu) for v in chosen)
-    why = tuple(why_of(visits, v, shares, menu) for v in chosen)
-    return Plan(
+    return RivalPlan(
         visits=visits,
         chosen=chosen,
         shares=shares,
-        pairs=pairs,
-        kinds=kinds,
-        why=why,
-        before=Expectation(before, float(max(weights.values()) >= NAMED)),
-        after=after,
+        pairs=_pairs(ranked, shares, chosen, usable),
+        kinds=tuple(kind_of(visits, visit, menu) for visit in chosen),
+        why=tuple(why_of(visits, visit, shares, menu) for visit in chosen),
+        before=Expectation(
+            float(np.square([f.weight for f in forecasts]).sum()), float(max(weights.values()) >= NAMED)
+        ),
+        after=expectation(visits, picked, forecasts, noise, seed),
         enough=enough(visits, picked, forecasts, noise, seed),
         repeats=repeats_needed(visits, picked, forecasts, noise, seed),
         minutes=plan_minutes(visits, chosen, costs, menu),
@@ -296,13 +281,7 @@ def matters(rivals: Sequence[Rival]) -> Matters:
     return Matters(load=loaded or "force_N" in needs, setup="setup" in needs or bool(chosen), time="time_min" in needs)
 
 
-def _cleaned(forecast: Forecast, good: NDArray[np.bool_]) -> Forecast:
-    return replace(
-        forecast, mean=np.where(good, forecast.mean, 0.0), factor=np.where(good[:, None], forecast.factor, 0.0)
-    )
-
-
-def random_visits(plan: Plan, n: int, seed: int) -> tuple[int, ...]:
+def random_visits(plan: RivalPlan, n: int, seed: int) -> tuple[int, ...]:
     """As many visits to different places drawn blindly from the same menu: what planning is compared with."""
     free = np.ones(len(plan.visits), dtype=bool)
     rng = np.random.default_rng(seed)
@@ -314,184 +293,67 @@ def random_visits(plan: Plan, n: int, seed: int) -> tuple[int, ...]:
     return tuple(found)
 
 
-def _pair(
-    names: tuple[str, str],
-    share: GapShares,
+def _pairs(
+    rivals: Sequence[Rival],
+    shares: dict[tuple[str, str], GapShares],
     chosen: Sequence[int],
     usable: NDArray[np.bool_],
-    rivals: Sequence[Rival],
-) -> PairGap:
-    gap = share.gap(chosen)
-    return PairGap(
-        *names,
-        gap=gap,
-        best_visit_gap=float(share.gaps_with(())[usable].max()),
-        separable=gap >= LEAST_GAP,
-        indicators=_indicators(*(next(r for r in rivals if r.name == name) for name in names)),
+) -> tuple[PairGap, ...]:
+    """The gaps, the narrowest first, with the links at which two rivals differ and where an indicator reads them."""
+    pairs = []
+    for names, share in shares.items():
+        both = [rival for rival in rivals if rival.name in names]
+        common = set.intersection(*(set(rival.names) for rival in both))
+        links = [active.effect.link for rival in both for active in rival.effects if active.effect.name not in common]
+        best, gap = float(share.gaps_with(())[usable].max()), share.gap(chosen)
+        pairs.append(PairGap(names, gap, best, gap >= LEAST_GAP, {link: INDICATORS[link] for link in links}))
+    return tuple(sorted(pairs, key=lambda pair: pair.separation_sigma))
+
+
+def _percent(share: float) -> str:
+    """Never "100 %" for what is only expected."""
+    return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"
+
+
+def plan_text(plan: RivalPlan) -> list[str]:
+    """What the plan promises, in sentences."""
+    count = len(plan.chosen)
+    lines = [
+        f"{count} pose{'s' if count > 1 else ''}, about {plan.minutes:.0f} minutes: the probability of the right "
+        f"explanation is expected to rise from {_percent(plan.before.truth)} to {_percent(plan.after.truth)}, "
+        f"and the verdict to be settled in {_percent(plan.after.settled)} of cases"
+    ]
+    if not plan.gains:
+        lines = [nothing_gained(plan)]
+    elif plan.enough is not None and plan.enough < count:
+        lines.append(f"{plan.enough} of the poses should do for {100 * SETTLED:.0f} %; the others are in reserve")
+    elif plan.repeats is None:
+        lines.append(f"{100 * SETTLED:.0f} % is not expected from repeats of these poses, up to {MOST_REPEATS} of them")
+    elif plan.repeats > 1:
+        lines.append(f"{100 * SETTLED:.0f} % is expected after {plan.repeats} repeats of each, clamped anew")
+    for pair in plan.pairs:
+        if not pair.separable:
+            first, second = pair.effects
+            places = "; or ".join(f"{link}: {place}" for link, place in pair.indicator_across.items())
+            lines.append(
+                f"tip stiffness cannot tell {first} from {second} ({pair.separation_sigma:.1f} sigma after all poses); "
+                f"put an indicator across the link: {places}"
+            )
+    return lines
+
+
+def nothing_gained(plan: RivalPlan) -> str:
+    """That a plan is not worth its minutes, and what would tell its two likeliest rivals apart instead."""
+    count = len(plan.chosen)
+    first, second = (rival.name for rival in plan.rivals[:2])
+    pair = next(pair for pair in plan.pairs if {first, second} == set(pair.effects))
+    beside = bool((plan.visits.readings.loop != "").any())  # indicators take part already
+    places = [] if beside else list(pair.indicator_across.values())
+    across = dict.fromkeys(place.split(":")[0] for place in places if not place.startswith("none: "))
+    parts = ["nothing worth measuring" + ("" if beside else " at the tip")]
+    parts += [f"an indicator {' or '.join(across)} would tell {first} from {second}"] if across else []
+    parts += dict.fromkeys(place.removeprefix("none: ") for place in places if place.startswith("none: "))
+    return "; ".join(parts) + (
+        f". {count} pose{'s' if count > 1 else ''}, about {plan.minutes:.0f} minutes, would bring the probability of "
+        f"the right explanation from {_percent(plan.before.truth)} to {_percent(plan.after.truth)}"
     )
-
-
-def _indicators(first: Rival, second: Rival) -> dict[str, str]:
-    """Links at which the two differ, and where an indicator reads them."""
-    effects = [active.effect for active in (*first.effects, *second.effects)]
-    common = set(first.names) & set(second.names)
-    links = dict.fromkeys(effect.link for effect in effects if effect.name not in common)
-    return {link: INDICATORS[link] for link in links}
-
-
-PLAN_POSES, CAMPAIGN_POSES = 6, 24
-
-
-CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """What to measure, and why.
-
-    Attributes
-    ----------
-    machine, data
-        What is to be measured; what has been, None before the first campaign.
-    plan
-        Visits that tell rivals apart, or a first campaign.
-    menu, costs
-        What might vary, and what it costs.
-    noise
-        Relative sd of a reading, or (repeat, clamping), that was planned for.
-    verdict, errors
-        Of the diagnosis of the data, "" if none was made; mean errors so far, %.
-    effect_files, files, seed
-        For the record.
-    """
-
-    machine: Machine
-    data: Measurements | None
-    plan: Plan | Campaign
-    menu: Menu
-    costs: Costs
-    noise: float | tuple[float, float]
-    verdict: str
-    errors: Mapping[str, float]
-    effect_files: tuple[str | Path, ...]
-    files: tuple[str, ...]
-    seed: int
-
-
-def plan(
-    machine: Machine,
-    data: Measurements | None = None,
-    *,
-    between: Sequence[str] = (),
-    n: int | None = None,
-    radius: float | None = None,
-    heights: Sequence[float] | None = None,
-    max_tilt: float | None = None,
-    loads: Sequence[float] | None = None,
-    tool_extensions: Sequence[float] | None = None,
-    setups: Sequence[str] | None = None,
-    indicators: bool = False,
-    costs: Costs | None = None,
-    noise: float | tuple[float, float] | None = None,
-    strut_spread: float = STRUT_SPREAD,
-    effect_files: Sequence[str | Path] = (),
-    seed: int = 0,
-    judgement: Judgement | None = None,
-    files: Sequence[str] = (),
-) -> Proposal:
-    """What to measure next, after some measurements; or first.
-
-    Parameters
-    ----------
-    machine, data
-        The model; n readings, or None for a plan before any.
-    between
-        Effects to be told apart, or `none`; empty: what a diagnosis leaves standing, or a first campaign.
-    n
-        Poses; None: 6, or 24 of a first campaign.
-    radius, heights, max_tilt, loads, tool_extensions, setups
-        What may vary, as in `Menu`: m, m, rad, N, m, names; None: the usual, and what the data have.
-    indicators
-        Whether a second indicator may be set across a link of the load path.
-    costs
-        Minutes of work.
-    noise, strut_spread, effect_files, seed
-        As in `diagnose`; without data, a noise of `CAMPAIGN_NOISE` is assumed.
-    judgement
-        What a diagnosis of these data came to already (`Diagnosis.main`): it is not made again.
-    files
-        Names of the measurement files, for the record.
-
-    Raises
-    ------
-    InputError
-        An unknown effect, a number of poses or a menu that cannot be, no reachable pose.
-
-    Examples
-    --------
-    >>> from toolpath_stiff.machine import load_machine
-    >>> found = plan(load_machine("nist"), between=("spindle_compliance", "none"), n=2)
-    >>> len(found.plan.chosen), found.plan.separable
-    (2, True)
-    """
-    costs = costs or Costs()
-    menu = with_options(
-        Menu(setups=(TABLE, RISER)) if data is None else Menu.of(data), radius=radius, heights=heights,
-        max_tilt=max_tilt, loads=loads, tool_extensions=tool_extensions, setups=setups, indicators=indicators,
-    )  # fmt: skip
-    record = (tuple(effect_files), tuple(files), seed)
-    effects = known_effects(effect_files)
-    planned_for: float | tuple[float, float] = CAMPAIGN_NOISE if noise is None else noise
-    if data is None and not between:
-        campaign = first_campaign(
-            machine, CAMPAIGN_POSES if n is None else n, menu=menu, costs=costs, seed=seed, effects=effects,
-            noise=planned_for, effect_files=effect_files,
-        )  # fmt: skip
-        return Proposal(machine, data, campaign, menu, costs, planned_for, "", {}, *record)
-    verdict, errors = "", dict[str, float]()
-    if data is None:
-        rivals = unfitted_rivals(between, effects, setup=menu.setups[-1])
-        notes = ["no data: the rivals are taken at their usual sizes"]
-        notes += [] if noise is not None else [f"noise of a reading: {100 * CAMPAIGN_NOISE:g} % assumed"]
-    else:
-        rivals, verdict, scatter, problem, notes = _rivals_after(
-            machine, data, between, effects, noise, strut_spread, effect_files, seed, judgement
-        )
-        planned_for, errors = (scatter.typical_repeat, scatter.clamping), errors_so_far(problem, rivals)
-    found = plan_measurements(
-        machine, rivals, planned_for, PLAN_POSES if n is None else n, menu=menu, costs=costs, seed=seed,
-        effect_files=effect_files, strut_spread=strut_spread,
-    )  # fmt: skip
-    found = replace(found, notes=(*notes, *found.notes))
-    return Proposal(machine, data, found, menu, costs, planned_for, verdict, errors, *record)
-
-
-def _rivals_after(
-    machine: Machine,
-    data: Measurements,
-    between: Sequence[str],
-    effects: Mapping[str, Effect],
-    noise: float | tuple[float, float] | None,
-    strut_spread: float,
-    effect_files: Sequence[str | Path],
-    seed: int,
-    judgement: Judgement | None,
-) -> tuple[list[Rival], str, Noise, Problem, list[str]]:
-    """Rivals after some measurements, the diagnosis's verdict ("" if none was made), noise, problem, notes."""
-    if judgement is not None:
-        scatter, problem = judgement.noise, judgement.problem
-    else:
-        # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
-        scatter = noise_models(data, noise, strut_spread)[-1]
-        problem = Problem.of(Predictor(machine, data, effect_files), scatter)
-    notes = [*filter(None, [question(problem.predictor)]), f"noise: {scatter.origin}"]
-    if between:
-        return fitted_rivals(problem, between, effects), "", scatter, problem, notes
-    if judgement is None:
-        judgement = judge(problem, scatter, testable_effects(problem.predictor)[0], seed)
-    verdict = judgement.verdict
-    if verdict == "described":
-        notes.append("the answer is only described: the plan goes where it would show, or fail")
-    elif verdict != "ambiguous":
-        notes.append(f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next")
-    return rivals_of(judgement), verdict, scatter, problem, notes

@@ -19,8 +19,9 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Component
+from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, error_figures
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
-from toolpath_stiff.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, error_figures, fit_effects, refine
+from toolpath_stiff.inference.fits import Baseline, fit_effects, refine
 from toolpath_stiff.inference.hypotheses import score_family
 from toolpath_stiff.inference.judgement import NONE, Judgement
 from toolpath_stiff.inference.noise import JOINT_ERROR

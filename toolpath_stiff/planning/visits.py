@@ -424,6 +424,27 @@ def planned_readings(
     )
 
 
+def visits_in_full(
+    pose: FloatArray,
+    extension: FloatArray,
+    setup: NDArray[np.str_],
+    names: NDArray[np.str_],
+    force: FloatArray,
+    time: FloatArray,
+) -> Visits:
+    """Visits (v,) with k readings each, taken once: along `names` (v, k) under `force` (v, k), at `time` (k,)."""
+    v, count = names.shape
+    readings = planned_readings(
+        np.repeat(pose, count, axis=0), names.ravel(), force.ravel(), np.repeat(extension, count),
+        np.repeat(setup, count), np.tile(time, v),
+    )  # fmt: skip
+    members = np.arange(v * count)
+    return Visits(
+        pose, extension, np.zeros(v), setup, np.full(v, ""), readings, names.ravel(),
+        np.ones(v * count, dtype=np.int64), members, members[::count].copy(),
+    )  # fmt: skip
+
+
 def draw_poses(machine: Machine, menu: Menu, count: int, rng: Generator) -> FloatArray:
     """(m, 6) round, reachable poses with the reference tool, m <= count; a quarter of them with a vertical spindle."""
     levels = np.array(menu.heights or axis_levels(machine))

@@ -19,7 +19,8 @@ from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.portrait.choice import ROUGH, Weighed
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.selection import Selection
-from toolpath_stiff.portrait.terms import CATALOGUE_LINKS, Term
+from toolpath_stiff.stiffness.term_effect import CATALOGUE_LINKS
+from toolpath_stiff.stiffness.terms import Term
 
 # Odds beyond which what fits worse is not the same (strong evidence: Kass and Raftery 1995). A term that is one of many
 # constants or places must fit better than the plainest ones by as much as its prior weight is smaller.

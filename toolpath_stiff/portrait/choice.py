@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.fits import HeldOut, held_out
+from toolpath_stiff.inference.left_out import HeldOut, held_out
 from toolpath_stiff.portrait.dictionary import Entry, crossed
 from toolpath_stiff.portrait.selection import Description, Selection
-from toolpath_stiff.portrait.terms import Term
+from toolpath_stiff.stiffness.terms import Term
 
 MOST_TERMS, POINTS_EACH = 3, 6  # and points for each term but the first
 

@@ -11,7 +11,11 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
-from toolpath_stiff.portrait.terms import (
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
+from toolpath_stiff.stiffness.term_loads import along_pins, carriers, coupled, pair_stiffness, reading_share
+from toolpath_stiff.stiffness.terms import (
     AXES,
     IN_SERIES,
     PINS,
@@ -20,19 +24,11 @@ from toolpath_stiff.portrait.terms import (
     VARIABLES,
     Constants,
     Term,
-    along_pins,
-    carriers,
-    coupled,
-    coupling_share,
     factor_values,
     multiplied,
-    reading_share,
     shape_values,
     variable_values,
 )
-from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.contract import LoadPath
-from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
 
 Shapes = tuple[tuple[tuple[str, Constants], ...], FloatArray]  # shape and constants; (s, n) or (s, n, 6) values
 
@@ -256,7 +252,7 @@ class Ground:
             return np.asarray(each)
         if term.action == "coupling":
             first, second = coupled(term)
-            return np.asarray(2.0 * self.forces[:, first] * self.forces[:, second] * coupling_share(plain, path))
+            return np.asarray(2.0 * self.forces[:, first] * self.forces[:, second] * (1.0 / pair_stiffness(term, path)))
         if term.action == "joint offset":
             strut, axis = (term.where or 1) - 1, "XYZ".index(term.direction)
             at = 3 * (strut + 6 * (term.column == "platform")) + axis

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.portrait.terms import PINS, PLACE, SWINGS, Action, Constants, Factor, Term
+from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Factor, Term
 
 if TYPE_CHECKING:
     from toolpath_stiff.portrait.columns import Ground

@@ -14,16 +14,16 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import held_out
+from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.gates import Simulator
+from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.portrait.choice import Chosen, choose
 from toolpath_stiff.portrait.columns import Ground
-from toolpath_stiff.portrait.selection import Description, Selection, law_prior
+from toolpath_stiff.portrait.selection import Description, Selection
 from toolpath_stiff.portrait.smooth import smooth_rms
-from toolpath_stiff.portrait.terms import Term
+from toolpath_stiff.stiffness.terms import Term
 
 HELD = 0.90  # probability that a set of links or variables adds up to
 
@@ -216,7 +216,7 @@ def noise_floor(selection: Selection, description: Description) -> float:
     draws = Simulator.of(selection.noise, selection.problem.scatter.covariance, selection.seed, FLOOR_DRAWS).draws
     jacobian, precision = description.fit.jacobian, description.fit.scatter.precision
     weighted = precision.times(jacobian.T)
-    inverse = np.linalg.pinv(weighted @ jacobian + law_prior(description.fit), hermitian=True)
+    inverse = np.linalg.pinv(weighted @ jacobian + law_prior(len(weighted)), hermitian=True)
     points = selection.problem.predictor.data.point
     squares = []
     for draw in draws:

@@ -15,12 +15,12 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Precision, inverse_root
-from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem, law_prior
 from toolpath_stiff.inference.gates import Simulator, set_wild_aside
 from toolpath_stiff.inference.noise import Noise, Scatter, scaled_inverse
 from toolpath_stiff.portrait.columns import Ground, shapes_near
 from toolpath_stiff.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of, products
-from toolpath_stiff.portrait.terms import Factor, Term
+from toolpath_stiff.stiffness.terms import Factor, Term
 
 DRAWS = 200  # simulated campaigns
 
@@ -41,13 +41,6 @@ NOT_LINEAR, AT_SIZE = ("turning",), 3  # actions that are not linear in their si
 
 
 ROUNDS = 2  # searches for wild readings
-
-
-def law_prior(fit: Fit) -> FloatArray:
-    """(2 + p, 2 + p) information of the strut law's prior beside p sizes."""
-    prior = np.zeros((fit.jacobian.shape[1],) * 2)
-    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
-    return prior
 
 
 @dataclass(frozen=True)
@@ -131,16 +124,13 @@ class Selection:
         none = np.zeros((0, len(self.compliance)))
         return self.described((), none, np.zeros(0), self.base.law, self.base.scatter)
 
-    # -- fits ----------------------------------------------------------------------------------------------------------
-
     def fitted(
         self, columns: FloatArray, low: FloatArray, high: FloatArray, law: FloatArray, precision: Precision
     ) -> Sizes:
         """Gauss-Newton for G sets at once: columns (G, p, n), bounds (G, p) on their sizes."""
         sets, count, n = columns.shape
         laws, size = np.repeat(law[None], sets, axis=0), np.zeros((sets, count))
-        prior = np.zeros((2 + count, 2 + count))
-        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+        prior = law_prior(2 + count)
         for _ in range(STEPS):
             residual, jacobian = self._linearised(laws, size, columns)
             flat = jacobian.reshape(-1, n)
@@ -190,15 +180,12 @@ class Selection:
             if term.action in NOT_LINEAR:
                 grows = self.ground.slope(term) / scale[k]
                 jacobian[2 + k] = -grows * np.exp(self.problem.observed - found.residual[0])
-        information = scatter.precision.times(jacobian) @ jacobian.T
-        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
+        information = scatter.precision.times(jacobian) @ jacobian.T + law_prior(len(jacobian))
         fit = replace(
             self.base, law=found.law[0], residual=found.residual[0], jacobian=jacobian.T,
             covariance=np.asarray(scaled_inverse(information)), scatter=scatter,
         )  # fmt: skip
         return Description(sized, columns, scale, fit, float(found.posterior[0]) + scatter.log_price)
-
-    # -- search --------------------------------------------------------------------------------------------------------
 
     def scores(self, before: Description) -> FloatArray:
         """(N,) twice the gain in log likelihood of each term beside a description, linearised."""
@@ -215,7 +202,7 @@ class Selection:
         return float((1.0 + (best >= gain).sum()) / (1.0 + len(best))), float(np.quantile(best, 1.0 - JOINS))
 
     def _projected(self, before: Description) -> Precision:
-        return before.fit.scatter.precision.beside(before.fit.jacobian.T, law_prior(before.fit))
+        return before.fit.projected
 
     @cached_property
     def _squares(self) -> FloatArray:
@@ -228,7 +215,7 @@ class Selection:
         Beside a description each term has the information A - A J (J^T A J + prior)^-1 J^T A leaves of it.
         """
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
-        root = inverse_root(weighted @ before.fit.jacobian + law_prior(before.fit))
+        root = inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
         information = self._squares - ((self.dictionary.columns @ (weighted.T @ root)) ** 2).sum(axis=1)
         allowed = self.dictionary.signed | (slope > 0.0)
         seen = information > 1e-6 * self._squares

@@ -10,10 +10,9 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Groups
+from toolpath_stiff.inference.discrepancies import POINT_TO_POINT, discrepancy_forms
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.gates import POINT_TO_POINT, discrepancy_forms
 from toolpath_stiff.inference.hypotheses import AMPLITUDES
-from toolpath_stiff.portrait.selection import law_prior
 
 GENERAL = ("smooth over the workspace, different by direction", "linear over the workspace, different by direction")
 
@@ -26,7 +25,7 @@ def smooth_rms(problem: Problem, fit: Fit, form: str) -> float:
     points = Groups.by(problem.predictor.data.point)
     if points.count < 3:
         return float("nan")
-    precision = fit.scatter.precision.beside(fit.jacobian.T, law_prior(fit))
+    precision = fit.projected
     best: tuple[float, FloatArray, float] | None = None
     pull = precision.times(fit.residual)
     forms = discrepancy_forms(problem.predictor)

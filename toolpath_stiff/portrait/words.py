@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypedDict
 
 from toolpath_stiff.portrait.alike import Alike
-from toolpath_stiff.portrait.terms import PINS, SWINGS, Term
 from toolpath_stiff.stiffness.contract import joined
+from toolpath_stiff.stiffness.terms import PINS, SWINGS, Term
 from toolpath_stiff.units import RAD_PER_DEG, json_number
 
 if TYPE_CHECKING:

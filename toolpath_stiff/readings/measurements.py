@@ -15,40 +15,26 @@ from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, TextArray
+from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
-from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.dates import day_of, days_since_first
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
-from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows, with_dates
+from toolpath_stiff.readings.mapping import mapped_table
+from toolpath_stiff.readings.measured_poses import pose_warnings
+from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
-from toolpath_stiff.tables import Table, parse_table, read_table
+from toolpath_stiff.tables import parse_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 
 NIST_TABLE_1 = "nist-table1"
 
 
 RISER_ABOVE = 1.0  # m: of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser
-
-
-SINGULAR = 1e-6  # singularity index: the tip would be a million times softer than at the neutral pose
-
-
-# Section of the machine file -> the word in its limits' names.
-LIMIT_WORDS = {
-    "limits.strut_length": "length",
-    "limits.joint_angle": "angle",
-    "limits.workspace": "workspace",
-    "limits.singularity": "singularity",
-}
-
-
-NAMED = 5  # so many poses are named in a warning
 
 
 @dataclass(frozen=True)
@@ -165,7 +151,7 @@ class Measurements:
 
 
 def read_measurements(
-    paths: str | Path | Iterable[str | Path], machine: Machine, planned: bool = False
+    paths: str | Path | Iterable[str | Path], machine: Machine, planned: bool = False, columns: Mapped = None
 ) -> Measurements:
     """Read measurement files.
 
@@ -177,6 +163,8 @@ def read_measurements(
         The machine that was measured; its poses are checked against it.
     planned
         Whether the stiffness may be left empty.
+    columns
+        Which columns the files call otherwise, as `mapping` says.
 
     Raises
     ------
@@ -193,50 +181,34 @@ def read_measurements(
         if name in seen:
             raise MeasurementError(f"{name!r} is given twice", hint="name it once")
         seen.add(name)
-    files = _read_files([str(name) for name in names], planned)
+    files: list[RowFile] = []
     errors: list[InputError] = []
-    for parsed in files:
-        if isinstance(parsed, InputErrors):
-            errors += parsed.errors
-    good = [parsed for parsed in files if isinstance(parsed, RowFile)]
-    errors = errors or duplicates([row for parsed in good for row in parsed.rows], across_files=True)
+    for name in map(str, names):
+        try:
+            files.append(_rows(name, planned, columns))
+        except InputErrors as bad:  # those of all files are reported together
+            errors += bad.errors
+    errors = errors or duplicates([row for file in files for row in file.rows], across_files=True)
     if errors:
         raise InputErrors(errors)
-    return with_offsets(_checked(_columns(good, machine), machine), machine)
+    data = _columns(files, machine)
+    places = list(zip(data.file.tolist(), data.line.tolist(), strict=True))
+    warnings = pose_warnings(machine, data.position, data.angles, data.tool_extension, places)
+    return with_offsets(replace(data, warnings=warnings), machine)
 
 
-def _read_files(names: list[str], planned: bool) -> list[RowFile | InputErrors]:
-    """Every file; bad rows of one are handed back, so that those of all files are reported together."""
-    found: list[Table | InputErrors] = []
-    for name in names:
-        try:
-            found.append(_table(name))
-        except InputErrors as bad:
-            found.append(bad)
-    dated = iter(with_dates([one for one in found if isinstance(one, Table)]))
-    return [one if isinstance(one, InputErrors) else _rows(next(dated), planned) for one in found]
-
-
-def _table(name: str) -> Table:
+def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
+    """Rows of a file, or of the paper's Table 1."""
     if name != NIST_TABLE_1:
-        return read_table(name, "measurements", COLUMNS)
+        return read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
     text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
-    return parse_table(text, NIST_TABLE_1, COLUMNS)
-
-
-def _rows(table: Table, planned: bool) -> RowFile | InputErrors:
-    if table.file != NIST_TABLE_1:
-        try:
-            return read_rows(table, planned)
-        except InputErrors as bad:
-            return bad
-    own = read_rows(table)
+    table_1 = read_rows(parse_table(text, NIST_TABLE_1, COLUMNS))
     rows = tuple(
         replace(row, labels={**row.labels, "setup": "riser" if row.position[2] > RISER_ABOVE else "no riser"})
-        for row in own.rows
+        for row in table_1.rows
     )
     note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
-    return RowFile(rows, own.columns | {"setup"}, (*own.notes, note))
+    return RowFile(rows, table_1.columns | {"setup"}, (*table_1.notes, note))
 
 
 def _columns(files: list[RowFile], machine: Machine) -> Measurements:
@@ -411,51 +383,6 @@ def _clampings(rows: list[Row], point: TextArray, setup: TextArray) -> TextArray
         ],
         dtype=str,
     )
-
-
-def _checked(data: Measurements, machine: Machine) -> Measurements:
-    """The same with warnings about poses beyond limits; singular and impossible poses are errors."""
-    rotation = data.rotation
-    struts = solve_struts(machine, data.position, rotation, data.tool_extension + machine.reference_tool_length)
-    index = singularity_index(machine, struts)
-    stiffness = machine.strut_law.stiffness(struts.lengths)
-    errors = []
-    for i in range(len(data)):
-        where = f"pose {_shown(data, i)}"
-        if not index[i] >= SINGULAR:
-            found = f"{where} is singular: the struts cannot hold the platform"
-        elif stiffness[i].min() <= 0.0:
-            found = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
-        else:
-            continue
-        errors.append(MeasurementError(found, hint="check the pose's unit", file=data.file[i], line=int(data.line[i])))
-    if errors:
-        raise InputErrors(errors)
-    stand = reach(machine, data.position, struts, rotation)
-    beyond: dict[str, list[int]] = {}
-    for row in np.flatnonzero(~stand.reachable).tolist():
-        beyond.setdefault(stand.limits[int(stand.limit[row])].name, []).append(row)
-    warnings = []
-    for name, those in beyond.items():
-        poses = list(dict.fromkeys(_shown(data, i) for i in those))
-        more = f" and {len(poses) - NAMED} more" if len(poses) > NAMED else ""
-        warnings.append(
-            f"measured beyond a limit of the machine file ({name}, {_origin(machine, name)}): "
-            f"{'; '.join(poses[:NAMED])}{more}. {stand.describe(those[0])}"
-        )
-    return replace(data, warnings=(*data.warnings, *warnings))
-
-
-def _origin(machine: Machine, limit: str) -> str:
-    """Where a limit comes from."""
-    quantity = next((q for q, word in LIMIT_WORDS.items() if word in limit), "")
-    return machine.origins.get(quantity, "origin not stated")
-
-
-def _shown(data: Measurements, i: int) -> str:
-    mm = ", ".join(f"{mm_from_m(value):g}" for value in data.position[i])
-    degrees = np.degrees(data.angles[i])
-    return f"({mm}) mm" + (f" at ({', '.join(f'{d:.4g}' for d in degrees)}) deg" if degrees.any() else "")
 
 
 def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.column_names import heading_key, same_quantity, unit_of
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.readings.dates import day_of, like_date
+from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import loop_of
-from toolpath_stiff.readings.raw_layouts import MISSING
+from toolpath_stiff.readings.mapping import DATE, check_heading
 from toolpath_stiff.readings.rows import (
     ANGLES,
-    DATE,
     LABELS,
     POSITION,
     SOFTEST,
@@ -58,17 +57,22 @@ STIFFNESS = ("stiffness_N_per_mm", "strut_force_N")  # of a table of struts that
 FAILED = 0.05  # of the rows of such a table: tests that may have failed, near zero; of more the unit is wrong; assumed
 
 
+SERIAL = "serial"  # number of the strut: another one is another part
+
+
+KNOWN = (*PLACE, *READINGS, *CONDITIONS, "strut", SERIAL)
+
+
+MISSING = ("", "-", "--", "---", "nan", "n/a", "na", "null", "none", "#n/a")  # what is written for a lost reading
+
+
 COLUMNS = Columns(
     numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", "length_mm", *READINGS, *CONDITIONS, *STIFFNESS),
-    texts=("direction", *LABELS, DATE, "strut"),
-    converted=True,
+    texts=("direction", *LABELS, DATE, "strut", SERIAL),
 )
 
 
 BENCH = "strut,date,force_N,displacement_um of a strut on a bench"
-
-
-WHICH = "name the strut in a column, above the heading (`strut: 3`) or in the file's name (strut3_2021-09-16.csv)"
 
 
 SIGNED = {"force_N": 1e7, "displacement_um": 1e6, "jog_um": 1e6}  # largest magnitude, either sign
@@ -100,6 +104,8 @@ class Loop:
         (m,) m, N, m, along the direction. `jog` is None of a strut on a bench.
     line, file
         Line of the first record, and of which file.
+    serial
+        Number of the part, where the file has it.
     """
 
     place: Mapping[str, str]
@@ -109,6 +115,7 @@ class Loop:
     displacement: FloatArray
     line: int
     file: str = ""
+    serial: str = ""
 
     @property
     def deflection(self) -> FloatArray:
@@ -166,9 +173,9 @@ def read_raw(table: Table) -> RawRecords:
         Bad records, all of them.
     """
     file = table.file
-    unused = _check_heading(list(table.heading), file, table.heading_line)
-    if DATE not in table.heading:
-        _refuse_unnamed_dates(table, unused)
+    layouts = f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}"
+    check_heading(table, KNOWN, _needed(table.heading), layouts)
+    unused = [name for name in table.heading if name and name not in KNOWN]
     notes = [f"{file}: column {name} is not used" for name in unused]
     if not table.rows:
         raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
@@ -183,7 +190,7 @@ def read_raw(table: Table) -> RawRecords:
                 continue
             values = _values(record)
         except InputError as error:
-            errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
+            errors.append(error.in_line(file, line))
             continue
         if DATE in record and not record[DATE]:
             errors.append(MeasurementError("no date", expected="one in every record", file=file, line=line))
@@ -200,23 +207,10 @@ def read_raw(table: Table) -> RawRecords:
     return RawRecords(sorted(found, key=lambda loop: loop.line), notes)
 
 
-def _refuse_unnamed_dates(table: Table, unused: list[str]) -> None:
-    """A column of dates by another name: without it the records of all dates would be one loop."""
-    for name in unused:
-        cells = {row[table.heading.index(name)] for _, row in table.rows if len(row) == len(table.heading)}
-        if len(cells) > 1 and all(like_date(cell) for cell in cells):
-            raise MeasurementError(
-                f"column {name!r} holds several dates, and there is no column date",
-                expected="date, so that the records of each are a loop of their own",
-                hint=f"rename {name} to date",
-                file=table.file,
-                line=table.heading_line,
-            )
-
-
 def is_table(table: Table) -> bool:
     """Whether the rows are stiffnesses of struts that were reduced elsewhere."""
-    return STIFFNESS[0] in table.heading and "displacement_um" not in table.heading
+    stated = {*table.heading, *(doubt.name for doubt in table.doubts)}
+    return STIFFNESS[0] in stated and "displacement_um" not in stated
 
 
 def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]]]:
@@ -230,15 +224,9 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
         Rows that are not of a strut alone, have no stiffness or none that could be; all of them.
     """
     heading, errors = table.heading, []
-    if "strut" not in heading and "loop" not in heading:
-        raise MeasurementError(
-            "stiffnesses without a column strut",
-            expected="strut,date,stiffness_N_per_mm of struts alone, or raw records",
-            hint="readings of the tip need no reduction: `tps compare` takes them",
-            file=table.file,
-            line=table.heading_line,
-        )
-    known = ("strut", *LABELS, DATE, "length_mm", *STIFFNESS)
+    known = ("strut", SERIAL, *LABELS, DATE, "length_mm", *STIFFNESS)
+    layouts = "strut,date,stiffness_N_per_mm of struts alone (readings of the tip need no reduction), or raw records"
+    check_heading(table, known, (STIFFNESS[0],) if "loop" in heading else ("strut", STIFFNESS[0]), layouts)
     notes = [f"{table.file}: column {name} is not used" for name in heading if name not in known]
     loops, figures, failed = [], [], []
     for line, cells in table.rows:
@@ -253,13 +241,11 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
                 continue
             own = n_per_m_from_n_per_mm(number(record, STIFFNESS[0])), optional_number(record, STIFFNESS[1])
         except InputError as error:
-            errors.append(
-                MeasurementError(error.found, expected=error.expected, hint=error.hint, file=table.file, line=line)
-            )
+            errors.append(error.in_line(table.file, line))
             continue
         none = np.empty(0)
         place = {name: record[name] for name in PLACE if record.get(name)}
-        loops.append(Loop(place, {}, None, none, none, line, table.file))
+        loops.append(Loop(place, {}, None, none, none, line, table.file, record.get(SERIAL, "")))
         figures.append(own)
     many = f"{len(failed)} of {len(table.rows)} rows with a stiffness within {SOFTEST:g} N/mm of zero"
     if len(failed) > FAILED * len(table.rows):
@@ -320,51 +306,18 @@ def _by_time(records: list[Record]) -> list[list[Record]]:
     return list(times.values()) if min(map(len, times.values())) >= SHARED else [records]
 
 
-def _check_heading(heading: list[str], file: str, line: int) -> list[str]:
-    """Columns that are not used. Raises `InputError` at the first thing that is wrong."""
-    known = (*PLACE, *READINGS, *CONDITIONS, "strut")
-    unused = [name for name in heading if name and name not in known]
-    _refuse_missing(heading, unused, file, line)
-    for name in heading:
-        if heading.count(name) > 1:
-            raise MeasurementError(f"column {name} stands twice", file=file, line=line)
-    for name in unused:
-        near = next(iter(difflib.get_close_matches(name, known, n=1, cutoff=0.75)), None)
-        if near and near not in heading:
-            hint = f"did you mean {near}? Otherwise give it another name"
-            raise MeasurementError(f"unknown column {name!r}", hint=hint, file=file, line=line)
-    if "direction" in heading and any(name in heading for name in VECTOR):
-        raise MeasurementError("two directions", expected="direction, or dx,dy,dz", file=file, line=line)
-    return unused
-
-
-def _refuse_missing(heading: list[str], unused: list[str], file: str, line: int) -> None:
-    """Raise `InputError` for the first column that is needed and not there."""
-    vector = "direction" not in heading
+def _needed(heading: Sequence[str]) -> tuple[str, ...]:
+    """Columns that records need; a strut on a bench has neither pose nor jog."""
+    stiffnesses = (heading_key(name).startswith("stiff") or same_quantity(unit_of(name), "N/mm") for name in heading)
+    if any(stiffnesses) and "displacement_um" not in heading:
+        return ("strut", STIFFNESS[0])
+    if "loop" in heading:
+        return READINGS[1:]
+    if "strut" in heading or not any(name in heading for name in (*POSITION, "jog_um")):
+        return ("strut", *READINGS[1:])
     angles = ANGLES if any(name in heading for name in ANGLES) else ()
-    asked = (*POSITION, *angles, *(VECTOR if vector else ("direction",)), *READINGS)
-    bench = "strut" in heading or "loop" in heading  # has neither pose nor jog; others say so by record
-    if bench or not any(name in heading for name in (*POSITION, "jog_um")):
-        asked = (*(() if bench else ("strut",)), *READINGS[1:])
-    name = next((name for name in asked if name not in heading), None)
-    if name is None:
-        return
-    near = next(iter(difflib.get_close_matches(name, unused, n=1, cutoff=0.85)), None)
-    raise MeasurementError(
-        "no direction" if vector and name in VECTOR else f"column {name} is missing",
-        expected=f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}",
-        hint=f"is it {near!r}?" if near else _to_do(name, unused),
-        file=file,
-        line=line,
-    )
-
-
-def _to_do(missing: str, unused: list[str]) -> str:
-    """What to do about a missing column."""
-    parts = [WHICH] if missing == "strut" else []
-    if unused:
-        parts.append(f"{', '.join(repr(name) for name in unused)} are not known: rename what is meant")
-    return "; ".join(parts)
+    direction = VECTOR if any(name in heading for name in VECTOR) else ("direction",)
+    return (*POSITION, *angles, *direction, *READINGS)
 
 
 def _signed(record: Mapping[str, str], name: str) -> float:
@@ -390,4 +343,5 @@ def _loop(records: list[Record], file: str) -> Loop:
         displacement=m_from_um(displacement),
         line=line,
         file=file,
+        serial=record.get(SERIAL, ""),
     )

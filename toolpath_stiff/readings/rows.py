@@ -6,16 +6,16 @@ so on). A bad row is named with its line; all bad rows of a file are reported to
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.readings.dates import WRITE_ISO, Order, day_of, read_dates
+from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import LARGEST_UM, loop_of, loop_reading
+from toolpath_stiff.readings.mapping import DATE, check_heading
 from toolpath_stiff.stiffness.measuring_loop import TIP, MeasuringLoop
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
@@ -46,9 +46,6 @@ WIDE = tuple(f"measured_{axis}_N_per_mm" for axis in "xyz")
 
 
 WIDE_MODEL = tuple(f"modeled_{axis}_N_per_mm" for axis in "xyz")
-
-
-DATE = "date"
 
 
 OPTIONAL = ("force_N", "sd_N_per_mm", *LABELS, "time_min", "tool_extension_mm", "temperature_C")
@@ -170,7 +167,18 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
         Bad rows, all of them.
     """
     file, heading, line = table.file, list(table.heading), table.heading_line
-    _check_heading(heading, file, line, planned)
+    place = {"file": file, "line": line}
+    if "" in heading:
+        raise MeasurementError("a column without a name", **place)  # type: ignore[arg-type]
+    if not {*WIDE}.isdisjoint(heading) and not {
+        "direction",
+        *VECTOR,
+        "stiffness_N_per_mm",
+        "displacement_um",
+    }.isdisjoint(heading):
+        fault = "columns of the wide layout beside those of the long one"
+        raise MeasurementError(fault, hint="use one of the two", **place)  # type: ignore[arg-type]
+    check_heading(table, (*KNOWN, *WIDE, *WIDE_MODEL), _needed(heading, planned))
     if not table.rows:
         raise MeasurementError(
             "no rows below the heading", expected="one row a measured stiffness", file=file, line=line
@@ -190,7 +198,7 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
         try:
             rows += _rows_of(table.record(cells), more, file, line, planned)
         except InputError as error:
-            errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
+            errors.append(error.in_line(file, line))
     errors += duplicates(rows)
     if errors:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
@@ -198,98 +206,19 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
     return RowFile(tuple(rows), frozenset(columns), tuple(notes))
 
 
-def with_dates(tables: Sequence[Table], order: Order | None = None, remedy: str = WRITE_ISO) -> list[Table]:
-    """Tables of one set with their dates in ISO 8601; what was assumed stands in the notes of the first that has some.
-
-    Raises
-    ------
-    InputError
-        Dates that can be read in two ways.
-    """
-    at = [(table, table.heading.index(DATE)) for table in tables if DATE in table.heading]
-    cells = [cells[i] for table, i in at for _, cells in table.rows if i < len(cells)]
-    try:
-        dates = read_dates(cells, order, remedy)
-    except InputError as error:
-        raise MeasurementError(
-            error.found, expected=error.expected, hint=error.hint, file=at[0][0].file, line=at[0][0].heading_line
-        ) from None
-    if not dates.iso and not dates.notes:
-        return list(tables)
-    found, notes = [], dates.notes
-    for table in tables:
-        found.append(with_cells(table, DATE, dates.iso, *notes))
-        notes = [] if DATE in table.heading else notes
-    return found
-
-
-def with_cells(table: Table, column: str, cells: Mapping[str, str], *notes: str) -> Table:
-    """The table with other texts in the cells of a column, if it has that, and notes of it."""
-    if column not in table.heading:
-        return table
-    i = table.heading.index(column)
-    rows = tuple((n, (*c[:i], cells.get(c[i], c[i]), *c[i + 1 :]) if i < len(c) else c) for n, c in table.rows)
-    return replace(table, rows=rows, notes=(*table.notes, *(f"{table.file}: {note}" for note in notes if note)))
-
-
-def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> None:
-    """Raise `InputError` at the first thing that is wrong with a heading."""
-    wide = any(name in heading for name in WIDE)
-    wrong = _check_names(heading) or _check_layout(heading) or _check_groups(heading)
-    wrong = wrong or (None if wide else _check_long(heading, planned))
-    if wrong is not None:
-        found, expected, hint = wrong
-        raise MeasurementError(found, expected=expected, hint=hint, file=file, line=line)
-
-
-Wrong = tuple[str, str, str]  # what was found, what was expected, a hint
-
-
-def _check_names(heading: list[str]) -> Wrong | None:
-    """Names that are missing, there twice, or almost those of a known column."""
-    for name in heading:
-        if not name:
-            return "a column without a name", "", ""
-        if heading.count(name) > 1:
-            return f"column {name} stands twice", "", ""
-        if name not in KNOWN and name not in WIDE and name not in WIDE_MODEL:
-            near = difflib.get_close_matches(name, (*KNOWN, *WIDE), n=1, cutoff=0.75)
-            if near:
-                return f"unknown column {name}", "", f"did you mean {near[0]}? Otherwise give it another name"
-    return None
-
-
-def _check_layout(heading: list[str]) -> Wrong | None:
-    """Wide or long, not both, with the columns that the layout needs."""
-    wide = any(name in heading for name in WIDE)
-    places = () if "loop" in heading else POSITION  # a strut on a bench has none
-    missing = [name for name in (POSITION + WIDE if wide else places) if name not in heading]
-    if missing:
-        return f"column {missing[0]} is missing", "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm or more", ""
-    if wide and any(name in heading for name in ("direction", *VECTOR, "stiffness_N_per_mm", "displacement_um")):
-        return "columns of the wide layout beside those of the long one", "", "use one of the two"
-    return None
-
-
-def _check_groups(heading: list[str]) -> Wrong | None:
-    """Three angles and three components of a direction, or none."""
-    for group in (ANGLES, VECTOR):
-        absent = [name for name in group if name not in heading]
-        if absent and len(absent) < len(group):
-            return f"column {absent[0]} is missing", f"all of {', '.join(group)} or none", ""
-    return None
-
-
-def _check_long(heading: list[str], planned: bool) -> Wrong | None:
-    """One direction, and a stiffness unless it is still to be measured."""
-    directions = ("direction" in heading) + (VECTOR[0] in heading)
-    if directions == 2 or (not directions and "loop" not in heading):
-        found = "two directions" if directions else "no direction"
-        return found, "direction, or dx,dy,dz", ""
+def _needed(heading: list[str], planned: bool) -> tuple[str, ...]:
+    """Columns that the layout of a heading needs: three angles and three components of a direction, or none."""
+    groups = tuple(name for group in (ANGLES, VECTOR) if not {*group}.isdisjoint(heading) for name in group)
+    if not {*WIDE}.isdisjoint(heading):
+        return (*POSITION, *WIDE, *groups)
+    bench = "loop" in heading  # a strut on a bench has neither place nor direction
     loaded = "displacement_um" in heading and ("force_N" in heading or "strut_force_N" in heading)
-    if not planned and "stiffness_N_per_mm" not in heading and not loaded:
-        return "no measured stiffness", "stiffness_N_per_mm, or force_N with displacement_um", ""
-    return None
+    return (
+        *(() if bench else POSITION),
+        *groups,
+        *(() if bench or VECTOR[0] in heading else ("direction",)),
+        *(() if planned or loaded else ("stiffness_N_per_mm",)),
+    )
 
 
 def _all_numbers(table: Table, column: int) -> bool:

@@ -1,14 +1,16 @@
-"""The results of a case study, the paper's or one's own: files and pictures."""
+"""The results of a case study, the paper's or one's own: text, files and pictures."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.placement.case_study import CaseStudy, region_rows, study_text
+from toolpath_stiff.placement.case_study import HIGH_MM, LOW_MM, REGION_COLUMNS, CaseStudy
 from toolpath_stiff.report.figure import (
     BLUE,
     COLOUR_MAP,
@@ -19,8 +21,8 @@ from toolpath_stiff.report.figure import (
     new_figure,
     picture,
 )
-from toolpath_stiff.report.words import number
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.stiffness.model import machine_words
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,6 +33,9 @@ if TYPE_CHECKING:
 MOST_PANELS = 3
 ABOVE, LEAST_ASPECT = 0.2, 0.6  # of a path of one's own: room for words above it; a panel's height over its width
 BESIDE = 1.3  # inches
+HOLDS = {True: "yes", False: "NO", None: "not tested"}
+# As in the paper's Figure 10, mean and range first.
+COLUMNS = ("region", *REGION_COLUMNS, "mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")
 NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
 
@@ -169,6 +174,72 @@ def heights_picture(study: CaseStudy) -> Figure:
         return figure
 
 
+def text(study: CaseStudy) -> str:
+    """The case study in words and numbers, Markdown."""
+    summary = study.summary
+    count = len(summary["regions"])
+    asked = [
+        f"One path ({summary['program']}, {summary['note']}) in four regions, as the paper's Figure 10: mean stiffness",
+        "under a load along the motion, and in parentheses its range, N/mm.",
+    ]
+    if study.is_own:
+        asked = [
+            f"{summary['program']} in {count} region{'s' if count > 1 else ''}: mean stiffness under a load along the",
+            "motion, and in parentheses its range, N/mm.",
+        ]
+    lines = [
+        f"# Case study on {machine_words(summary)}",
+        "",
+        *(line for warning in summary["warnings"] for line in (f"Warning: {warning}.", "")),
+        *asked,
+        "",
+        "| region | program zero, mm | turned | mean (range), N/mm |",
+        "| --- | --- | --- | --- |",
+    ]
+    for row in summary["regions"]:
+        place = f"{row['x_mm']:g}, {row['y_mm']:g}, {row['z_mm']:g}"
+        lines.append(
+            f"| {row['region']} | {place} | {row['rotation_deg']:g} deg | "
+            f"{number(row['mean_N_per_mm'])} ({number(row['range_N_per_mm'])}) |"
+        )
+    lines += ["", "## The paper's conclusions", ""]
+    for row_number, found in enumerate(summary["conclusions"], 1):
+        lines.append(f"{row_number}. {found['statement']}: {HOLDS[found['holds']]}. {found['numbers']}.")
+    lines += ["", "## Where they stop holding", "", *_limits_words(summary, study.is_own)]
+    if study.is_own:
+        return "\n".join([*lines, ""])
+    lines += [
+        "",
+        "Non-planar cuts, of which the paper warns: the square with its height going up and down along every side.",
+        "The means of two places at one height stay as close as before; it is the range that grows, several times,",
+        "because the machine is twice as stiff along Z as along X and Y.",
+        "",
+        f"| waves, mm | means apart at z = {LOW_MM:g} mm | at z = {HIGH_MM:g} mm | ranges in regions 1 to 4, N/mm |",
+        "| --- | --- | --- | --- |",
+    ]
+    for wave in summary["non_planar"]:
+        low, high = wave["means_apart_at_one_height_percent"]
+        ranges = ", ".join(number(row["range_N_per_mm"]) for row in wave["regions"])
+        lines.append(f"| {wave['amplitude_mm']:g} | {low:.2f} % | {high:.2f} % | {ranges} |")
+    return "\n".join([*lines, ""])
+
+
+def _limits_words(summary: Mapping[str, Any], own: bool) -> list[str]:
+    limits, heights, at = summary["limits_of_the_conclusions"], summary["heights"], summary["regions"][0]
+    turned = f", turned {at['rotation_deg']:g} deg," if at["rotation_deg"] else ","
+    moved = f"Moved up and down at ({at['x_mm']:g}, {at['y_mm']:g}) mm{turned}"
+    mean, widest = (f"{limits[f'largest_{what}_at_z_mm']:g}" for what in ("mean", "range"))
+    if not own:
+        return [
+            f"{moved} the same path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm: "
+            "beyond, both fall again."
+        ]
+    return [
+        f"{moved} as region {at['region']}, from z = {heights[0]['z_mm']:g} to {heights[-1]['z_mm']:g} mm (where it is "
+        f"within reach), the path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm."
+    ]
+
+
 def names(plots: bool = True) -> tuple[str, ...]:
     """Names of the files that `files` makes."""
     data = ("case_study.csv", "case_study.json", "case_study.md")
@@ -178,9 +249,9 @@ def names(plots: bool = True) -> tuple[str, ...]:
 def files(study: CaseStudy, *, plots: bool = True) -> dict[str, Content]:
     """Table, summary and text of the study, and with `plots` its two pictures."""
     contents: dict[str, Content] = {
-        "case_study.csv": region_rows(study),
+        "case_study.csv": csv_text(COLUMNS, ([str(row[key]) for key in COLUMNS] for row in study.summary["regions"])),
         "case_study.json": json.dumps(study.summary, indent=2) + "\n",
-        "case_study.md": study_text(study),
+        "case_study.md": text(study),
     }
     if plots:
         contents |= {"regions.png": regions_picture(study), "heights.png": heights_picture(study)}

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from toolpath_stiff.report.words import aligned, duration, first_column_fitted, number, plain
+from toolpath_stiff.analysis.program_check import ProgramCheck
+from toolpath_stiff.report.words import aligned, duration, first_column_fitted, plain
+from toolpath_stiff.units import number
 
 INDENT = 2  # columns to the left of the tables
 
@@ -58,8 +60,9 @@ def _table(head: list[str], rows: list[list[str]]) -> list[str]:
     return aligned(first_column_fitted([head, *rows], INDENT))
 
 
-def text(document: Mapping[str, Any]) -> str:
+def text(check: ProgramCheck) -> str:
     """What `--json` prints, for people."""
+    document = check.to_dict()
     posted = f", posted for {document['kinematics']}" if document["kinematics"] else ""
     lines = [f"{document['program']}, read as {document['dialect']}{posted}"]
     if document["interpreter"] != "builtin":

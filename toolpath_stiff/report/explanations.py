@@ -7,17 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from toolpath_stiff.defaults import MEAN_OVER_SD
+from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import parted
 from toolpath_stiff.inference.candidates import choice_text
-from toolpath_stiff.inference.fits import scatter_text
+from toolpath_stiff.inference.errors import scatter_text
 from toolpath_stiff.inference.noise import GUESSES
-from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, number, plain, shortened
-
-if TYPE_CHECKING:
-    from toolpath_stiff.diagnosis.document import DiagnosisDocument
+from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, plain, shortened
+from toolpath_stiff.units import number
 
 NONE = "none"
 LEAST = 0.005  # probability from which a row is more than "< 0.5 %"
@@ -34,18 +32,12 @@ HEADLINES = {
 }
 
 
-def figure_of(entry: Mapping[str, Any] | None, name: str) -> float | None:
+def figure_of(entry: Document | None, name: str) -> float | None:
     """A finite number of an entry, or None."""
     value = (entry or {}).get(name)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
     return float(value)
-
-
-def entries(document: DiagnosisDocument | Mapping[str, Any], name: str) -> list[Any]:
-    """A list of the document, empty where it is absent."""
-    found = document.get(name)
-    return list(found) if isinstance(found, list | tuple) else []
 
 
 def significant(value: float | None, digits: int = 3) -> str:
@@ -77,19 +69,17 @@ def probability_text(value: float | None) -> str:
     return f"{100.0 * value:.0f} %"
 
 
-def effect_names(entry: Mapping[str, Any]) -> list[str]:
+def effect_names(entry: Document) -> list[str]:
     """Effects of a candidate (`effect`) or a pair (`effects`)."""
-    several = entry.get("effects")
-    names = several if isinstance(several, list | tuple) else [entry.get("effect", "?")]
-    return [plain(str(name)) for name in names]
+    return [plain(name) for name in entry.get("effects") or [entry["effect"]]]
 
 
-def name_text(entry: Mapping[str, Any]) -> str:
+def name_text(entry: Document) -> str:
     """Name with what it acts on: "weak_strut (strut 3)"; a pair as "a + b"."""
     parts = []
     for name in effect_names(entry):
         inner = (entry.get("parameters") or {}).get(name)  # of a pair: sizes and choices together
-        own: Mapping[str, Any] = inner if isinstance(inner, Mapping) else entry.get("choice") or {}
+        own: Document = inner if isinstance(inner, Mapping) else entry.get("choice") or {}
         acts_on = [choice_text(key, value) for key, value in own.items() if _says_something(value)]
         parts.append(plain(f"{name} ({', '.join(acts_on)})") if acts_on else name)
     return " + ".join(parts)
@@ -99,7 +89,7 @@ def _says_something(value: object) -> bool:
     return value not in ("", 0, None) and not isinstance(value, Mapping)
 
 
-def parameter_texts(entry: Mapping[str, Any], intervals: bool = True) -> list[str]:
+def parameter_texts(entry: Document, intervals: bool = True) -> list[str]:
     """Each fitted size in words: "radial 5.12 nm/N (4.40 to 5.90)"; those of a pair one effect after the other."""
     parameters = entry.get("parameters") or {}
     texts = []
@@ -111,7 +101,7 @@ def parameter_texts(entry: Mapping[str, Any], intervals: bool = True) -> list[st
     return texts
 
 
-def _parameter_text(key: str, value: Mapping[str, Any], intervals: bool) -> str:
+def _parameter_text(key: str, value: Document, intervals: bool) -> str:
     unit = str(value.get("unit") or "")
     name = parameter_name(key, unit)
     size = value.get("value")
@@ -130,45 +120,44 @@ def parameter_name(key: str, unit: str) -> str:
     return (key.removesuffix(f"_{tail}") if tail else key).replace("_", " ")
 
 
-def explanations(document: DiagnosisDocument | Mapping[str, Any]) -> list[str]:
+def explanations(document: Document) -> list[str]:
     """What is left standing: effects, `none`, pairs as "a + b"."""
-    return [plain(str(name)) for name in entries(document, "explanations")]
+    return [plain(name) for name in document["explanations"]]
 
 
-def is_plausible(entry: Mapping[str, Any], document: DiagnosisDocument | Mapping[str, Any]) -> bool:
+def is_plausible(entry: Document, document: Document) -> bool:
     """Whether it is one of the explanations left standing; a member of a pair alone is not."""
     return " + ".join(effect_names(entry)) in explanations(document)
 
 
-def is_offered(entry: Mapping[str, Any], document: DiagnosisDocument | Mapping[str, Any]) -> bool:
+def is_offered(entry: Document, document: Document) -> bool:
     """False only where the diagnosis says so and does not rely on it all the same."""
     return entry.get("eligible") is not False or is_plausible(entry, document)
 
 
-def model_rows(document: DiagnosisDocument) -> list[dict[str, Any]]:
+def model_rows(document: Document) -> list[dict[str, Any]]:
     """The machine file as given, then with its strut law refitted: the first rows of every table and ladder."""
     base = document["baseline"]
-    as_given = base.get("as_given")
-    first = [{**as_given, "effect": AS_GIVEN, "title": "the machine file as it stands"}] if as_given else []
-    return [*first, {**base, "effect": NONE, "title": "no further effect"}]
+    first = {**base["as_given"], "effect": AS_GIVEN, "title": "the machine file as it stands"}
+    return [first, {**base, "effect": NONE, "title": "no further effect"}]
 
 
-def row_name(entry: Mapping[str, Any]) -> str:
+def row_name(entry: Document) -> str:
     """Name of a row: "as given", "strut law refitted (none)", or the effects with what they act on."""
     return "strut law refitted (none)" if entry.get("effect") == NONE else name_text(entry)
 
 
-def best_explanation(document: DiagnosisDocument | Mapping[str, Any]) -> Mapping[str, Any] | None:
+def best_explanation(document: Document) -> Document | None:
     """The entry that `best` names; else the likeliest candidate or pair that is offered, the first of equals."""
-    found = [*entries(document, "candidates"), *entries(document, "pairs")]
+    found = [*document["candidates"], *document["pairs"]]
     for entry in found:
-        if " + ".join(effect_names(entry)) == document.get("best"):
+        if " + ".join(effect_names(entry)) == document["best"]:
             return dict(entry)
     offered = [entry for entry in found if is_offered(entry, document)]
     return max(offered, key=lambda e: figure_of(e, "probability") or 0.0, default=None)
 
 
-def remark_text(entry: Mapping[str, Any]) -> str:
+def remark_text(entry: Document) -> str:
     """How it stands, and what is against it."""
     own = str(entry.get("remark") or "")
     said = str(entry.get("words") or "")
@@ -178,50 +167,45 @@ def remark_text(entry: Mapping[str, Any]) -> str:
     return plain("; ".join(part for part in (said, own or ("leaves structure" if settled else "")) if part))
 
 
-def noise_floor_percent(document: DiagnosisDocument) -> float | None:
+def noise_floor_percent(document: Document) -> float | None:
     """Mean absolute error that scatter alone would leave."""
-    stated = figure_of(document.get("baseline"), "noise_floor_percent")
-    noise = figure_of(document.get("baseline"), "noise_percent")
-    if stated is not None:
-        return stated
-    return None if noise is None else MEAN_OVER_SD * noise
+    floor: float | None = document["baseline"]["noise_floor_percent"]
+    return floor
 
 
-def missing_text(entry: Mapping[str, Any]) -> str:
+def missing_text(entry: Document) -> str:
     """An effect that cannot be tested and why: "thermal_drift (no time_min)"."""
-    columns = [str(name) for name in entry.get("missing") or []]
-    reason = f"no {', '.join(columns)}" if columns else "nothing in these data depends on it"
-    return plain(f"{entry.get('effect', '?')} ({reason})")
+    columns = ", ".join(entry["missing"])
+    return plain(f"{entry['effect']} ({f'no {columns}' if columns else 'nothing in these data depends on it'})")
 
 
-def size_text(entry: Mapping[str, Any]) -> str:
+def size_text(entry: Document) -> str:
     """The smallest size of an effect that would have been seen."""
-    return plain(f"{significant(figure_of(entry, 'size'))} {entry.get('unit') or ''}".rstrip())
+    return plain(f"{significant(entry['size'])} {entry['unit']}".rstrip())
 
 
-def hidden_name(entry: Mapping[str, Any]) -> str:
+def hidden_name(entry: Document) -> str:
     """Effect and parameter of an entry of `detectable`."""
-    parameter = str(entry.get("parameter") or "").replace("_", " ")
-    return plain(f"{entry.get('effect', '?')} {parameter}".rstrip())
+    return plain(f"{entry['effect']} {entry['parameter'].replace('_', ' ')}".rstrip())
 
 
-def floor_text(document: DiagnosisDocument) -> str:
+def floor_text(document: Document) -> str:
     """The noise floor in words; a guess says so."""
     guess = _guess(document)
     return percent(noise_floor_percent(document), 2) + (f" ({guess} guess)" if guess else "")
 
 
-def _guess(document: DiagnosisDocument) -> str:
+def _guess(document: Document) -> str:
     """Which guess the noise is, "low" or "high"; "" where it is none."""
     name = str(document["noise"]["name"])
     return name if name in GUESSES else ""
 
 
-def headline(document: DiagnosisDocument) -> str:
+def headline(document: Document) -> str:
     """The verdict as one sentence: the cause where one was found."""
-    if document.get("question"):
-        return plain(str(document["question"]))
-    verdict = str(document.get("verdict") or "-")
+    if document["question"]:
+        return plain(document["question"])
+    verdict = document["verdict"]
     cause = str((best_explanation(document) or {}).get("finding") or "")
     if cause and verdict in ("identified", "described"):
         said = " (described, not confirmed)" if verdict == "described" else ""
@@ -229,15 +213,14 @@ def headline(document: DiagnosisDocument) -> str:
     standing = explanations(document)
     if verdict == "ambiguous" and len(standing) == 1:
         return plain(f"{standing[0]} is likeliest, but something else is not ruled out")
-    found = document.get("by_noise") or {}
-    if verdict == "ambiguous" and len({str(one.get("verdict")) for one in found.values()}) > 1:
+    if verdict == "ambiguous" and len({judged["verdict"] for judged in document["by_noise"].values()}) > 1:
         return "It depends on how much the readings scatter, which these data do not tell"
-    return plain(HEADLINES.get(verdict, verdict))
+    return HEADLINES[verdict]
 
 
-def path_text(document: DiagnosisDocument) -> str:
+def path_text(document: Document) -> str:
     """How far apart the plausible explanations are on a tool path, in one sentence; "" where it was not tried."""
-    path = document.get("path") or {}
+    path = document["path"] or {}
     program = plain(str(path.get("program") or "the program"))
     program += plain(f" in set-up {path['setup']}") if path.get("setup") else ""
     if path.get("reason"):
@@ -267,7 +250,7 @@ MOST_SIZES = 6
 LONGEST_NAME = 45
 
 
-def text(document: DiagnosisDocument) -> str:
+def text(document: Document) -> str:
     """The diagnosis in some 25 lines.
 
     Parameters
@@ -275,27 +258,26 @@ def text(document: DiagnosisDocument) -> str:
     document
         As in `diagnose.json`.
     """
-    verdict = str(document.get("verdict") or "-")
-    portrait = document.get("portrait")
+    portrait = document["portrait"]
     lines = [
         *_entry("data", _data(document)),
-        *_entry("verdict", f"{verdict.upper()}. {document.get('text') or ''}"),
-        *_listed("why", entries(document, "why")),
+        *_entry("verdict", f"{document['verdict'].upper()}. {document['text']}"),
+        *_listed("why", document["why"]),
         *_listed("portrait", [portrait["text"]] if portrait else []),
         *_entry("error", _error(document)),
         "",
         *_table(document),
         "",
         *_entry("plausible", plausible_text(explanations(document))),
-        *_listed("beside it", [str(document.get("not_excluded_text") or "")]),
+        *_listed("beside it", [document["not_excluded_text"]]),
         *_by_noise(document),
-        *_listed("beside the tip", [str(one["text"]) for one in entries(document.get("loops", {}), "by_loop")]),
-        *_listed("cannot test", ["; ".join(missing_text(e) for e in entries(document, "cannot_test"))]),
+        *_listed("beside the tip", [loop["text"] for loop in document["loops"]["by_loop"]]),
+        *_listed("cannot test", ["; ".join(missing_text(e) for e in document["cannot_test"])]),
         *_listed("would show", [_detectable(document)]),
         *_listed("path", [path_text(document)]),
-        *_hints("next", [*entries(document, "next"), *_next_readings(document)]),
-        *_entry("assumptions", f"{len(entries(document, 'assumptions'))}, listed in diagnose.json"),
-        *_listed("warning", entries(document, "warnings")),
+        *_hints("next", [*document["next"], *_next_readings(document)]),
+        *_entry("assumptions", f"{len(document['assumptions'])}, listed in diagnose.json"),
+        *_listed("warning", document["warnings"]),
     ]
     return "\n".join(lines)
 
@@ -320,38 +302,34 @@ def _hints(label: str, hints: Sequence[object]) -> list[str]:
     return lines
 
 
-def _data(document: DiagnosisDocument) -> str:
-    files = ", ".join(str(name) for name in entries(document, "data")) or "-"
-    readings = figure_of(document, "readings")
-    count = f"{counted(readings, 'reading')} of " if readings is not None else ""
-    return f"{count}{files}, machine {machine_text(document)}"
+def _data(document: Document) -> str:
+    return (
+        f"{counted(document['readings'], 'reading')} of {', '.join(document['data'])}, machine {machine_text(document)}"
+    )
 
 
-def _error(document: DiagnosisDocument) -> str:
+def _error(document: Document) -> str:
     """The fall of the error in one sentence: in sample, at left-out points, against the noise floor."""
     base = document["baseline"]
-    parts = []
-    as_given = figure_of(base.get("as_given"), "mean_abs_error_percent")
-    if as_given is not None:
-        parts.append(f"{percent(as_given, 2)} as given")
-    parts.append(_pair_of_errors(base) + " with the strut law refitted")
+    as_given = percent(base["as_given"]["mean_abs_error_percent"], 2)
+    parts = [f"{as_given} as given", f"{_pair_of_errors(base)} with the strut law refitted"]
     best = best_explanation(document)
-    if best is not None and document.get("verdict") != "adequate":
+    if best is not None and document["verdict"] != "adequate":
         parts.append(_pair_of_errors(best) + f" with {name_text(best)}")
     floor, error = noise_floor_percent(document), figure_of(base, "mean_abs_error_percent")
     tail = "" if floor is None else f"; {scatter_text(floor, error or 0.0, _guess(document))}"
     return "mean " + ", ".join(parts) + tail
 
 
-def _pair_of_errors(entry: Mapping[str, Any]) -> str:
+def _pair_of_errors(entry: Document) -> str:
     inside, outside = (figure_of(entry, f"{key}_error_percent") for key in ("mean_abs", "held_out"))
     return f"{percent(inside, 2)} ({percent(outside, 2)} at points left out)"
 
 
-def _table(document: DiagnosisDocument) -> list[str]:
+def _table(document: Document) -> list[str]:
     """As given, strut law refitted, pairs and the best candidates; an asterisk marks what is left standing."""
     models = model_rows(document)
-    candidates, pairs = entries(document, "candidates"), entries(document, "pairs")
+    candidates, pairs = document["candidates"], document["pairs"]
     shown = [*models, *pairs[:MOST_PAIRS], *candidates[:MOST_CANDIDATES]]
     shown += [entry for entry in candidates[MOST_CANDIDATES:] if is_plausible(entry, document)]
     rows = [["", "probab.", "error %", "left out %", "gain/SE", "", ""], *(_row(entry, document) for entry in shown)]
@@ -361,7 +339,7 @@ def _table(document: DiagnosisDocument) -> list[str]:
     return [*lines, f"  and {more} less likely, in diagnose.json"] if more > 0 else lines
 
 
-def _row(entry: Mapping[str, Any], document: Mapping[str, Any]) -> list[str]:
+def _row(entry: Document, document: Document) -> list[str]:
     """Name, four figures, words, and what stands on a line of its own below: sizes and a remark."""
     mark = "* " if is_plausible(entry, document) else "  "
     figures = [figure_of(entry, f"{key}_error_percent") for key in ("mean_abs", "held_out")]
@@ -385,37 +363,34 @@ def _row_lines(row: Sequence[str], widths: Sequence[int]) -> list[str]:
     return [first, shortened("      " + row[6], WIDTH)] if row[6] else [first]
 
 
-def _by_noise(document: DiagnosisDocument) -> list[str]:
+def _by_noise(document: Document) -> list[str]:
     """Verdicts under each guess of the noise, where there are several."""
-    found = document.get("by_noise") or {}
-    if len(found) < 2:
+    if len(document["by_noise"]) < 2:
         return []
     parts = [
-        f"{name} ({percent(figure_of(one, 'noise_percent'))}): {one.get('verdict', '-')}"
-        f" ({plausible_text(one.get('plausible') or [])})"
-        for name, one in found.items()
+        f"{name} ({percent(judged['noise_percent'])}): {judged['verdict']} ({plausible_text(judged['plausible'])})"
+        for name, judged in document["by_noise"].items()
     ]
     return _entry("noise", "; ".join(parts))
 
 
-def _detectable(document: DiagnosisDocument) -> str:
+def _detectable(document: Document) -> str:
     """Of an adequate model: the smallest sizes that these data would have shown, and what they never show."""
-    if document.get("verdict") != "adequate":
+    if document["verdict"] != "adequate":
         return ""
-    found = entries(document, "detectable")
-    never = [hidden_name(e) for e in found if e.get("detectable") is False]
-    seen = [e for e in found if e.get("detectable") is not False and figure_of(e, "size") is not None]
+    never = [hidden_name(e) for e in document["detectable"] if not e["detectable"]]
+    seen = [e for e in document["detectable"] if e["detectable"] and e["size"] is not None]
     parts = [f"{hidden_name(e)} {size_text(e)}" for e in seen[:MOST_SIZES]]
     text = ", ".join(parts) + (f" and {len(seen) - MOST_SIZES} more in diagnose.json" if len(seen) > MOST_SIZES else "")
     return "; ".join(part for part in (text, f"at no size: {', '.join(never)}" if never else "") if part)
 
 
-def _next_readings(document: DiagnosisDocument) -> list[str]:
+def _next_readings(document: Document) -> list[str]:
     """How many readings are proposed, and what they would settle."""
-    readings = [e for e in entries(document, "next_measurements") if isinstance(e, Mapping)]
+    readings = document["next_measurements"]
     if not readings:
         return []
-    reasons = list(dict.fromkeys(str(e["why"]) for e in readings if e.get("why")))
+    reasons = list(dict.fromkeys(reading["why"] for reading in readings))
     more = len(reasons) - FEW_REASONS
     said = "; ".join([*reasons[:FEW_REASONS], *([f"{more} more in the file"] if more > 0 else [])])
-    return [f"{counted(len(readings), 'reading')} proposed in diagnose.json" + (f": {said}" if said else "")]
+    return [f"{counted(len(readings), 'reading')} proposed in diagnose.json: {said}"]

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.report.figure import BLUE, house_style, new_figure, picture
-from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness.model import acting_names, condition_warnings, effects_stated
 from toolpath_stiff.stiffness.truss import HUB, TIP, platform_bars, platform_nodes
 from toolpath_stiff.units import (
     deg_from_rad,
@@ -29,16 +25,10 @@ from toolpath_stiff.units import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.analysis.checks import MachineCheck
-    from toolpath_stiff.analysis.poses import PoseReport
     from toolpath_stiff.machine.limits import Reach
-    from toolpath_stiff.stiffness.contract import Effect, Parameter
-    from toolpath_stiff.stiffness.model import StiffnessModel
-    from toolpath_stiff.stiffness.trial import Trial
 
 
 STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
-POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 TOP = 0.84  # of the picture's height, below the headings
 BELOW = -0.1  # of the picture's height: the views' empty rims lie beyond it
 ZOOMS = np.arange(1.5, 0.5, -0.05)  # of a view, the largest at which its axes and labels stay in its half
@@ -57,11 +47,12 @@ def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> Figur
         detail = figure.add_axes((0.5, BELOW, 0.5, 1.0), projection="3d")
         _draw_platform(detail, machine, mm_from_m(nodes))
         _fit(figure, (whole, detail))
-        _heading(figure, machine, pose)
+        heading(figure, machine, pose)
         return figure
 
 
-def _heading(figure: Figure, machine: Machine, pose: FloatArray) -> None:
+def heading(figure: Figure, machine: Machine, pose: FloatArray) -> None:
+    """Name of the machine, and the pose (6,) in m and rad, above everything."""
     x, y, z = (mm_from_m(float(v)) for v in pose[:3])
     a, b, c = (deg_from_rad(float(v)) for v in pose[3:])
     figure.text(0.02, 0.95, machine.title, fontsize=15, weight="bold")
@@ -87,7 +78,7 @@ def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArr
         # The two struts of a vertex run close together: their labels sit at different heights.
         at = frame[i] + (0.3 if i % 2 else 0.55) * (joints[i] - frame[i])
         label = f"{i + 1}: {mm_from_m(struts.lengths[0, i]):.0f} mm, {stiffness[i] / 1e3:.1f} kN/mm"
-        axes.text(*at, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=_LABEL)
+        axes.text(*at, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=LABEL)
     _truss(axes, machine, nodes, lw=1.2)
     axes.scatter(*nodes[TIP], color=TOOL, s=30, depthshade=False)
     axes.set_title("whole machine: struts with length and stiffness", fontsize=10, color="#374151", y=0.85 - BELOW)
@@ -145,7 +136,7 @@ def _fits(figure: Figure, axes: Any, extent: FloatArray) -> bool:
     return bool(room.x0 <= left and right <= room.x1 and below >= 0.0 and above <= TOP * figure.bbox.height)
 
 
-_LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
+LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
 
 
 def _draw_platform(axes: Any, machine: Machine, nodes: FloatArray) -> None:
@@ -178,52 +169,6 @@ def _finish(axes: Any, points: FloatArray) -> None:
     axes.tick_params(labelsize=7.5, colors="#6b7280")
     axes.locator_params(nbins=5)
     axes.view_init(elev=18, azim=-62)
-
-
-@picture
-def machine_views(
-    machine: Machine, pose: FloatArray, struts: Struts, marked: tuple[tuple[str, int], ...] = ()
-) -> Figure:
-    """PNG of the machine from above and from the side at one pose (6,) m and rad, struts numbered.
-
-    `marked` are joints that stand apart, drawn with a ring: ("frame" or "platform", index from 0).
-    """
-    joints = mm_from_m(pose[:3] + struts.arms[0])
-    frame, tip = mm_from_m(machine.frame_joints), mm_from_m(pose[:3])
-    with house_style():
-        figure = new_figure(14.0, 7.4)
-        for k, (first, second, title) in enumerate(((0, 1, "from above"), (0, 2, "from the side, along Y"))):
-            axes = figure.add_axes((0.06 + 0.49 * k, 0.09, 0.42, 0.74))
-            _draw_view(axes, frame, joints, tip, [first, second])
-            for body, i in marked:
-                at = (frame if body == "frame" else joints)[i]
-                axes.plot(at[first], at[second], "o", ms=18, mfc="none", mec=TOOL, mew=2.0)
-            axes.set_title(title, fontsize=11, color="#374151")
-            axes.set_xlabel(f"{'XYZ'[first]} mm")
-            axes.set_ylabel(f"{'XYZ'[second]} mm")
-        _heading(figure, machine, pose)
-        if marked:
-            words = "ring: does not follow the symmetry of the other joints"
-            figure.text(0.98, 0.91, words, fontsize=11, color=TOOL, ha="right")
-        return figure
-
-
-def _draw_view(axes: Any, frame: FloatArray, joints: FloatArray, tip: FloatArray, seen: list[int]) -> None:
-    for body, colour in ((frame, FRAME), (joints, PLATFORM)):
-        beside = body[:, :2] - body[:, :2].mean(axis=0)
-        order = np.argsort(np.arctan2(beside[:, 1], beside[:, 0]), kind="stable")
-        axes.plot(*body[[*order, order[0]]][:, seen].T, color=colour, lw=1.6)
-        axes.plot(*body[:, seen].T, "o", color=colour, ms=6)
-    for i, (one, other) in enumerate(zip(frame[:, seen], joints[:, seen], strict=True)):
-        axes.plot(*np.array([one, other]).T, color=STRUT, lw=1.8)
-        # Struts of a vertex, and those behind each other, have their numbers at different places.
-        at = one + (0.25 + 0.1 * i) * (other - one)
-        axes.text(*at, f"{i + 1}", fontsize=10, weight="bold", color=STRUT, ha="center", va="center", bbox=_LABEL)
-    axes.plot(*tip[seen], "o", color=TOOL, ms=8)
-    axes.annotate("tool tip", tip[seen], xytext=(8, -4), textcoords="offset points", fontsize=9, color=TOOL)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.06)
-    axes.grid(True, color="#e5e7eb", lw=0.6)
 
 
 def _law_figures(law: StrutLaw) -> tuple[str, str]:
@@ -298,179 +243,3 @@ def text(machine: Machine, stand: Reach) -> str:
     remarks = {row[4] for row in rows if row[4]}
     said = "".join(f"\n  {name}: {remark}" for name, remark in machine.remarks.items() if remark in remarks)
     return "\n".join([*lines, f"{said}\n\n  at the pose drawn: {stand.describe(0)}"])
-
-
-def check_text(file: str, model: StiffnessModel, found: MachineCheck) -> str:
-    """What is wrong or doubtful in a machine file, what acts, how stiff it is."""
-    from toolpath_stiff.analysis.checks import neutral_words, symmetry_words
-
-    machine = model.machine
-    verdict = "the file is good" if found.good else f"{len(found.wrong)} things cannot be right"
-    if len(found.wrong) == 1:
-        verdict = "one thing cannot be right"
-    if found.good and found.doubtful:
-        verdict = "the file can be used; look at what is doubtful"
-    lines = [f"{file}: {machine.title}: {verdict}"]
-    for word, texts in (("WRONG", found.wrong), ("doubtful", found.doubtful), ("warning", condition_warnings(model))):
-        lines += [f"  {word}: {text}" for text in texts]
-    effects = ", ".join([*acting_names(model), *(active.effect.name for active in model.instruments)]) or "none"
-    lines += [f"  effects: {effects}", f"  {symmetry_words(found.symmetry)}"]
-    if found.neutral.reach.reachable[0]:
-        lines.append(f"  {neutral_words(machine, found.neutral)}")
-    if found.origin.reach.reachable[0]:
-        kx, ky, kz = n_per_mm_from_n_per_m(found.origin.along_axes[0])
-        lines.append(
-            f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; "
-            f"{found.origin.reach.describe(0)}"
-        )
-    return "\n".join(lines)
-
-
-def pose_csv(poses: FloatArray, found: PoseReport) -> str:
-    """One row a pose; `poses` (n, 6) in mm and degrees."""
-    columns = pose_columns(poses, found)
-    return ",".join(columns) + "\n" + csv_rows(columns, {name: pose_decimals(name) for name in columns})
-
-
-def pose_columns(poses: FloatArray, found: PoseReport) -> dict[str, Any]:
-    """Column -> values of the table, in the shop's units."""
-    names = np.array([limit.name for limit in found.reach.limits] or ["none"])
-    columns: dict[str, Any] = {name: poses[:, i] for i, name in enumerate(POSE_COLUMNS)}
-    for i, axis in enumerate("xyz"):
-        columns[f"k{axis}_N_per_mm"] = n_per_mm_from_n_per_m(found.along_axes[:, i])
-    for which, direction, stiffness in (
-        ("softest", found.softest, found.softest_stiffness),
-        ("stiffest", found.stiffest, found.stiffest_stiffness),
-    ):
-        columns[f"{which}_N_per_mm"] = n_per_mm_from_n_per_m(stiffness)
-        for i, axis in enumerate("xyz"):
-            columns[f"{which}_d{axis}"] = direction[:, i]
-    for i in range(6):
-        columns[f"strut{i + 1}_mm"] = mm_from_m(found.strut_lengths[:, i])
-    columns["extrapolated"] = found.extrapolated.astype(int)
-    columns["margin"] = found.reach.margin
-    columns["margin_limit"] = names[found.reach.limit]
-    return columns
-
-
-def pose_decimals(name: str) -> int | None:
-    """Decimals of a column; None: a whole number or a word."""
-    if name in ("extrapolated", "margin_limit"):
-        return None
-    return 4 if name.endswith("N_per_mm") else 6
-
-
-def pose_text(model: StiffnessModel, values: Mapping[str, Any], found: PoseReport) -> str:
-    """One pose: `values` are those of its row of `pose_columns`."""
-    x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
-
-    named = machine_text({"machine": model.machine.title, **effects_stated(model)})
-    lines = [f"{named}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n"]
-    for axis in "xyz":
-        lines.append(f"  stiffness along {axis.upper()}   {values[f'k{axis}_N_per_mm']:10.0f} N/mm")
-    for which in ("softest", "stiffest"):
-        dx, dy, dz = (values[f"{which}_d{axis}"] + 0.0 for axis in "xyz")
-        lines.append(
-            f"  {which:<10} direction{values[f'{which}_N_per_mm']:10.0f} N/mm along ({dx:.3f}, {dy:.3f}, {dz:.3f})"
-        )
-    lengths = "  ".join(f"{values[f'strut{i}_mm']:.3f}" for i in range(1, 7))
-    lines.append(f"  struts 1 to 6        {lengths} mm")
-    lines.append(f"  nearest limit        {found.reach.describe(0)} (margin {values['margin']:.3f} of its span)")
-    if values["extrapolated"]:
-        lines.append("  the strut law is extrapolated at this pose")
-    for warning in condition_warnings(model):
-        lines.append(f"  warning              {warning}")
-    return "\n".join(lines)
-
-
-# -- effects -----------------------------------------------------------------------------------------------------------
-
-TRIAL_WORDS = {True: "good", False: "FAILS", None: "note"}
-
-
-def trials_text(trials: Sequence[Trial], machine: str) -> str:
-    """What the trial of each effect of a file showed."""
-    lines = []
-    for trial in trials:
-        lines.append(f"{trial.effect.name}, on machine {machine}: {'good' if trial.passed else 'FAILS'}")
-        width = max(len(outcome.name) for outcome in trial.outcomes)
-        lines += [f"  {TRIAL_WORDS[one.passed]:<5}  {one.name:<{width}}  {one.found}" for one in trial.outcomes]
-    return "\n".join(lines)
-
-
-def describe_effect(effect: Effect) -> dict[str, object]:
-    """What the effect declares, in its own units; JSON has no infinity, so that "inf" stands for it."""
-    return {
-        "name": effect.name,
-        "title": effect.title,
-        "link": effect.link,
-        "equation": effect.equation,
-        "source": effect.source,
-        "load_dependent": effect.load_dependent,
-        "needs": list(effect.needs),
-        "parameters": [
-            {
-                "name": p.name,
-                "key": p.key,
-                "unit": p.unit,
-                "bounds": [_json_number(value) for value in p.bounds],
-                "typical": [_json_number(value) for value in p.typical],
-                "neutral": _json_number(p.neutral),
-                "kind": p.kind,
-                "meaning": p.meaning,
-                "source": p.source,
-            }
-            for p in effect.parameters
-        ],
-    }
-
-
-def effects_table(effects: list[Effect], broken: dict[str, str]) -> str:
-    """One line an effect: link, name, title, parameters with their units; then the plug-ins that do not load."""
-    rows = [("link", "name", "title", "parameters")]
-    for effect in effects:
-        parameters = ", ".join(f"{p.name} ({p.unit})" if p.unit else p.name for p in effect.parameters)
-        rows.append((effect.link, effect.name, effect.title, parameters or "-"))
-    widths = [max(len(row[i]) for row in rows) for i in range(4)]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    if broken:
-        lines += ["", "plug-ins that do not load:"]
-        lines += [f"  {name}: {reason}" for name, reason in broken.items()]
-    return "\n".join(lines)
-
-
-def effect_details(effect: Effect) -> str:
-    """The whole effect, for people, with the lines for a machine file."""
-    lines = [
-        f"{effect.name}: {effect.title}",
-        f"  link       {effect.link}",
-        f"  equation   {effect.equation}",
-        f"  source     {effect.source}",
-    ]
-    if effect.load_dependent:
-        lines.append("  load       depends on the size of the load (--force, force_N): the stiffness is the secant one")
-    if effect.needs:
-        lines.append(f"  needs      columns {', '.join(effect.needs)} in the measurements")
-    for p in effect.parameters:
-        lines += ["", f"  {p.key}", f"    meaning  {p.meaning or p.name}"]
-        if p.discrete:
-            lines += [f"    value    {p.expected}; chosen, not fitted", f"    source   {p.source}"]
-            continue
-        lines += [
-            f"    bounds   {_range(p.bounds, p)}",
-            f"    typical  {_range(p.typical, p)}",
-            f"    source   {p.source}",
-            f"    neutral  {p.neutral:g}",
-        ]
-    kind = "instrument" if effect.is_instrument else "effect"
-    lines += ["", "In a machine file:", f"  [[{kind}]]", f'  name = "{effect.name}"']
-    lines += [f'  {p.key} = ""' if p.kind == "text" else f"  {p.key} = {p.typical[0]:g}" for p in effect.parameters]
-    return "\n".join(lines)
-
-
-def _range(values: tuple[float, float], parameter: Parameter) -> str:
-    return f"{values[0]:g} to {values[1]:g} {parameter.unit}".rstrip()
-
-
-def _json_number(value: float) -> float | str:
-    return value if math.isfinite(value) else str(value)

@@ -3,35 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.poses import StiffnessMap, turning_points
+from toolpath_stiff.analysis.grid import StiffnessMap
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.files import Content
-from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, page_colours, picture
 from toolpath_stiff.report.pages import render
-from toolpath_stiff.report.words import machine_text, number, plain
-from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import machine_text, plain
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
-    from toolpath_stiff.stiffness.model import StiffnessModel
-
 MOST_CELLS = 120  # along a side; a finer grid is thinned for the page, the CSV file has all of it
 
 
-def map_page(machine: Machine, found: StiffnessMap, warnings: Sequence[str] = ()) -> str:
-    """The page's text."""
+def map_page(found: StiffnessMap, heading: str) -> str:
+    """The page's text; `heading` names the machine and what acts on it."""
     step = max(1, -(-max(len(found.x), len(found.y)) // MOST_CELLS))
     stiffness = n_per_mm_from_n_per_m(found.stiffness[:, ::step, ::step])
     data = {
@@ -43,7 +38,7 @@ def map_page(machine: Machine, found: StiffnessMap, warnings: Sequence[str] = ()
     }
     tilt = ", ".join(f"{deg_from_rad(v):g}" for v in found.abc)
     about = [
-        machine.title,
+        heading,
         f"slices at z = {', '.join(f'{z:g}' for z in data['z'])} mm",
         *([f"roll, pitch, yaw {tilt} degrees"] if any(found.abc) else []),
     ]
@@ -54,7 +49,7 @@ def map_page(machine: Machine, found: StiffnessMap, warnings: Sequence[str] = ()
         data=data,
         title=f"Stiffness map, load {found.load}",
         about=" · ".join(about),
-        warnings=[f"Warning: {text}" for text in warnings],
+        warnings=[f"Warning: {text}" for text in found.to_dict()["warnings"]],
     )
 
 
@@ -65,7 +60,7 @@ ACROSS = 3  # panels in a row
 
 
 @picture
-def map_picture(machine: Machine, found: StiffnessMap) -> Figure:
+def map_picture(found: StiffnessMap, heading: str = "") -> Figure:
     """PNG of every slice, one colour scale for all."""
     slices = len(found.z)
     rows = -(-slices // ACROSS)
@@ -91,7 +86,7 @@ def map_picture(machine: Machine, found: StiffnessMap) -> Figure:
         drawn = None
         for i in range(slices):
             axes = figure.add_subplot(grid[i // columns, i % columns])
-            drawn = _slice(axes, machine, found, i, stiffness[i], low, high)
+            drawn = _slice(axes, found, i, stiffness[i], low, high)
             below, first = i + columns >= slices, i % columns == 0
             axes.set_xlabel("X mm" if below else "")
             axes.set_ylabel("Y mm" if first else "")
@@ -104,14 +99,12 @@ def map_picture(machine: Machine, found: StiffnessMap) -> Figure:
         figure.text(0.75 / width, 1 - 0.38 / height, f"Stiffness map, load {found.load}", fontsize=14, weight="bold")
         a, b, c = (deg_from_rad(v) for v in found.abc)
         tilt = f"   ·   roll {a:g}, pitch {b:g}, yaw {c:g} degrees" if any(found.abc) else ""
-        text = f"{machine.title}{tilt}   ·   {number(low)} to {number(high)} N/mm"
+        text = f"{heading or found.model.machine.title}{tilt}   ·   {number(low)} to {number(high)} N/mm"
         figure.text(0.75 / width, 1 - 0.68 / height, text, fontsize=10, color=MUTED)
         return figure
 
 
-def _slice(
-    axes: Axes, machine: Machine, found: StiffnessMap, i: int, stiffness: FloatArray, low: float, high: float
-) -> Any:
+def _slice(axes: Axes, found: StiffnessMap, i: int, stiffness: FloatArray, low: float, high: float) -> Any:
     """One height: colours, contours, the edge of reach, the directions of the joints."""
     x, y = mm_from_m(found.x), mm_from_m(found.y)
     mesh = axes.pcolormesh(x, y, stiffness, cmap=COLOUR_MAP, vmin=low, vmax=high, shading="gouraud", rasterized=True)
@@ -123,7 +116,7 @@ def _slice(
     axes.set_aspect("equal")
     axes.grid(visible=False)
     axes.set_title(f"z = {mm_from_m(found.z[i]):g} mm", fontsize=10)
-    names = _directions(axes, mm_from_m(machine.frame_joints), x, y)
+    names = _directions(axes, mm_from_m(found.model.machine.frame_joints), x, y)
     if np.nanmax(stiffness) > np.nanmin(stiffness):
         lines = axes.contour(x, y, stiffness, levels=CONTOURS, colors="white", linewidths=0.7, alpha=0.9)
         _keep_apart(axes, axes.clabel(lines, fontsize=7, fmt=number), names)
@@ -178,73 +171,26 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return ("map.csv", "map.json", *(("map.png", "map.html") if plots else ()))
 
 
-def files(
-    model: StiffnessModel, found: StiffnessMap, summary: dict[str, Any], *, plots: bool = True
-) -> dict[str, Content]:
-    """Table and summary (`map_summary`), and with `plots` picture and page."""
-    contents: dict[str, Content] = {"map.csv": map_csv(found), "map.json": json.dumps(summary, indent=2) + "\n"}
+def files(found: StiffnessMap, plots: bool) -> dict[str, Content]:
+    """Table and summary, and with `plots` picture and page."""
+    contents: dict[str, Content] = {"map.csv": map_csv(found), "map.json": json.dumps(found.to_dict(), indent=2) + "\n"}
     if plots:
-        headed = model.machine.with_changes(title=machine_text({**summary, "machine": model.machine.title}))
-        contents["map.png"] = map_picture(headed, found)
-        contents["map.html"] = map_page(headed, found, summary["warnings"])
+        heading = machine_text({**found.to_dict(), "machine": found.model.machine.title})
+        contents["map.png"] = map_picture(found, heading)
+        contents["map.html"] = map_page(found, heading)
     return contents
-
-
-def map_summary(model: StiffnessModel, found: StiffnessMap) -> dict[str, Any]:
-    """Extremes of each slice, and of a circle about the machine axis where the map holds one."""
-    slices = []
-    for i, height in enumerate(found.z):
-        layer = found.stiffness[i]
-        row: dict[str, Any] = {"z_mm": mm_from_m(float(height)), "reachable_share": float(found.reachable[i].mean())}
-        if found.reachable[i].any():
-            for name, at in (("softest", np.nanargmin(layer)), ("stiffest", np.nanargmax(layer))):
-                j, k = np.unravel_index(int(at), layer.shape)
-                row[name] = {
-                    "x_mm": mm_from_m(float(found.x[k])),
-                    "y_mm": mm_from_m(float(found.y[j])),
-                    "stiffness_N_per_mm": n_per_mm_from_n_per_m(float(layer[j, k])),
-                }
-            radius = min(-found.x[0], found.x[-1], -found.y[0], found.y[-1])
-            if radius > 0.0 and not any(found.abc):
-                turns = turning_points(model, float(radius), float(height), found.load)
-                row["circle"] = {
-                    "radius_mm": mm_from_m(float(radius)),
-                    **{f"{k}_deg": [round(deg_from_rad(v), 2) for v in angles] for k, angles in turns.items()},
-                }
-        slices.append(row)
-    return {
-        "machine": model.machine.name,
-        "load": str(found.load),
-        "abc_deg": [deg_from_rad(v) for v in found.abc],
-        "points": int(found.stiffness.size),
-        "slices": slices,
-        **effects_stated(model),
-        "warnings": condition_warnings(model),
-    }
 
 
 def map_csv(found: StiffnessMap) -> Iterator[str]:
     """`map.csv`, a slice at a time."""
     yield ",".join(DECIMALS) + "\n"
-    for columns in map_columns(found):
+    for columns in found.columns():
         yield csv_rows({**columns, "reachable": columns["reachable"].astype(int)}, DECIMALS)
 
 
-def map_columns(found: StiffnessMap) -> Iterator[dict[str, NDArray[Any]]]:
-    """Column -> values of each slice."""
-    ys, xs = np.meshgrid(mm_from_m(found.y), mm_from_m(found.x), indexing="ij")
-    for i, height in enumerate(found.z):
-        yield {
-            "x_mm": xs.ravel(),
-            "y_mm": ys.ravel(),
-            "z_mm": np.full(xs.size, mm_from_m(float(height))),
-            "stiffness_N_per_mm": n_per_mm_from_n_per_m(found.stiffness[i].ravel()),
-            "reachable": found.reachable[i].ravel(),
-        }
-
-
-def text(summary: dict[str, Any]) -> str:
+def text(found: StiffnessMap) -> str:
     """The extremes of each slice, for the terminal."""
+    summary = found.to_dict()
     lines = [f"machine {machine_text(summary)}, load {summary['load']}, {summary['points']} points"]
     for warning in summary["warnings"]:
         lines.append(f"warning: {plain(warning)}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.report.captions import add_heading, add_legend
 from toolpath_stiff.report.figure import (
     DPI,
     INK,
@@ -23,19 +21,9 @@ from toolpath_stiff.report.figure import (
     new_figure,
     picture,
 )
-from toolpath_stiff.report.painting import (
-    add_scales,
-    label_places,
-    new_pen,
-    paint,
-    paint_scale,
-    painted_axes,
-    word_extent,
-    word_font,
-    write_word,
-)
-from toolpath_stiff.report.words import number, plain, shortened
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.painting import add_heading, add_legend, label_places
+from toolpath_stiff.report.words import plain, shortened
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,34 +46,23 @@ MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seve
 
 
 @picture
-def profile_picture(
-    analysis: Analysis, *, other: Analysis | None = None, required: float | None = None, show_plunges: bool = False
-) -> Figure:
-    """Stiffness against path length, as PNG.
+def profile_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
+    """Stiffness against path length, as PNG; on the other machine a second curve; the required level, red below it.
 
-    Parameters
-    ----------
-    analysis
-        What to draw.
-    other
-        The same program on another machine: a second curve.
-    required
-        N/m: a line, and red below it.
-    show_plunges
-        The axis holds the plunges beside the headline, and they belong to the curve; else they are grey, and arrows
-        say where they leave the axis.
+    With `show_plunges` the axis holds the plunges beside the headline, and they belong to the curve; else they are
+    grey, and arrows say where they leave the axis.
     """
     strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
     figure = new_figure(WIDTH, HEIGHT)
     frame = HEIGHT - TOP - BOTTOM - strip
-    axes = painted_axes(figure, (LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
+    axes = figure.add_axes((LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
     s, k = profile_curve(analysis, show_plunges)
     band = profile_band(analysis, show_plunges)
-    _set_limits(axes, analysis, other, required, band, show_plunges)
+    _set_limits(axes, analysis, band, show_plunges)
     _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
     _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
     columns = int(axes.get_window_extent().width)
-    if other is not None:
+    if (other := analysis.on_other) is not None:
         s2, k2 = profile_curve(other, show_plunges)
         keep = extremes_by_column(s2, k2, columns)
         name = shortened(plain(other.machine.name), 30)
@@ -97,12 +74,12 @@ def profile_picture(
     name = shortened(plain(analysis.machine.name), 30)
     axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
     _draw_plunges(axes, analysis, columns, PLUNGE_SLATE, show_plunges, "plunges")
-    _levels(axes, analysis, required)
+    _levels(axes, analysis)
     _tool_changes(axes, analysis)
     if strip:
         _operations(axes, analysis, strip / frame)
     _line_numbers(axes, analysis, 1.0 + strip / frame)
-    places = analysis.weakest
+    places = analysis.weakest_rows
     spots = [(float(s[row]), float(k[row])) for row in places]
     label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
     _legend(figure, axes)
@@ -202,20 +179,14 @@ def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
     return np.asarray(rows[~missing[rows] | fresh[rows]])
 
 
-def _set_limits(
-    axes: Axes,
-    analysis: Analysis,
-    other: Analysis | None,
-    required: float | None,
-    band: tuple[FloatArray, FloatArray] | None,
-    show_plunges: bool,
-) -> None:
+def _set_limits(axes: Axes, analysis: Analysis, band: tuple[FloatArray, FloatArray] | None, show_plunges: bool) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    curves = [*(profile_curve(a, show_plunges)[1] for a in (analysis, other) if a is not None), *(band or ())]
+    machines = [analysis, *([analysis.on_other] if analysis.on_other else [])]
+    curves = [*(profile_curve(machine, show_plunges)[1] for machine in machines), *(band or ())]
     low, high = float(min(np.nanmin(k) for k in curves)), float(max(np.nanmax(k) for k in curves))
-    if required is not None:
-        level = n_per_mm_from_n_per_m(required)
+    if analysis.required is not None:
+        level = n_per_mm_from_n_per_m(analysis.required)
         low, high = min(low, level), max(high, level)
     pad = max(0.12 * (high - low), 0.005 * high)
     axes.set_ylim(max(low - pad, 0.0), high + pad)
@@ -228,7 +199,6 @@ def _set_limits(
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if end > 20 else 2)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if high - low > 5 else 2)))
     axes.grid(axis="x", visible=False)
-    add_scales(axes)
 
 
 def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) -> None:
@@ -241,13 +211,13 @@ def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) 
     axes.broken_barh(spans, (low, high - low), facecolor=colour, edgecolor="none", label=label, zorder=1)
 
 
-def _levels(axes: Axes, analysis: Analysis, required: float | None) -> None:
+def _levels(axes: Axes, analysis: Analysis) -> None:
     mean = stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"]
     if mean is not None:
         axes.axhline(mean, color=INK, linewidth=1.0, linestyle=(0, (6, 3)), zorder=5, label=f"mean {number(mean)} N/mm")
-    if required is None:
+    if analysis.required is None:
         return
-    level = n_per_mm_from_n_per_m(required)
+    level = n_per_mm_from_n_per_m(analysis.required)
     axes.axhline(level, color=UNREACHABLE_RED, linewidth=1.3, zorder=5, label=f"required {number(level)} N/mm")
 
 
@@ -293,22 +263,14 @@ def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
             zorder=2,
         )
     pixels = float(axes.get_window_extent().width) / float(edges[-1] or 1.0)
-    names = [
-        (start, _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 2.0 * INSET))
-        for row, (start, length) in zip(rows, spans, strict=True)
-    ]
-    paint(axes, partial(_paint_names, names=[one for one in names if one[1]], middle=1.0 + height / 2.0), zorder=6)
-
-
-def _paint_names(renderer: Any, axes: Axes, names: list[tuple[float, str]], middle: float) -> None:
-    """Words that begin beside places along the path, in mm; `middle` in heights of the axes."""
-    font = word_font(NAME_SIZE)
-    _, tall, below = word_extent(renderer, "lp", font)
-    base = axes.bbox.y0 + middle * axes.bbox.height - (tall - below) / 2.0
-    inset = INSET * renderer.points_to_pixels(POINTS / DPI)
-    with new_pen(renderer, None, INK, 0.0) as pen:
-        for place, text in names:
-            write_word(renderer, pen, axes.transData.transform((place, 0.0))[0] + inset, base, text, font)
+    inset = INSET / DPI * POINTS
+    for row, (start, length) in zip(rows, spans, strict=True):
+        text = _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 2.0 * INSET)
+        if text:
+            axes.annotate(
+                text, (start, 1.0 + height / 2.0), (inset, 0.0), xycoords=across, textcoords="offset points",
+                fontsize=NAME_SIZE, va="center", zorder=6, annotation_clip=False,
+            )  # fmt: skip
 
 
 def _fitting(text: str, least: str, room: float) -> str:
@@ -339,17 +301,32 @@ def _fitting(text: str, least: str, room: float) -> str:
 
 def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
     """Program lines above the frame, at `height` of its height, where the ticks below fall."""
+    from matplotlib.markers import TICKUP
+
     end = float(analysis.samples.s[-1])
     where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
     rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)
-    shown = partial(
-        paint_scale, side="top", values=mm_from_m(where), words=[str(line) for line in analysis.samples.line[rows]],
-        name="program line", size=9.0, colour=MUTED, edge=height,
+    across = axes.get_xaxis_transform()
+    places = mm_from_m(where)
+    axes.plot(
+        places, np.full(len(places), height), linestyle="none", marker=TICKUP, markersize=3.5, color=MUTED,
+        markeredgewidth=0.8, transform=across, clip_on=False, zorder=2,
     )  # fmt: skip
-    paint(axes, shown, zorder=2.0)
+    words: dict[str, Any] = {
+        "fontsize": 9.0,
+        "color": MUTED,
+        "ha": "center",
+        "textcoords": "offset points",
+        "annotation_clip": False,
+    }
+    for place, row in zip(places.tolist(), rows.tolist(), strict=True):
+        axes.annotate(str(analysis.samples.line[row]), (place, height), (0.0, 7.0), xycoords=across, **words)
+    axes.annotate("program line", (0.5, height), (0.0, 20.0), xycoords="axes fraction", **words)
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
     keys = list(zip(*axes.get_legend_handles_labels(), strict=True))
     corner = 1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT
-    add_legend(figure, keys, corner, right=True, size=9.5, between=1.4, wide=1.8)
+    add_legend(
+        figure, keys, corner, loc="upper right", ncols=len(keys) or 1, fontsize=9.5, columnspacing=1.4, handlelength=1.8
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.fits import LAW_REFITTED, deviation_percent
+from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent
 from toolpath_stiff.report.explanations import AS_GIVEN, best_explanation, figure_of, name_text, percent
 from toolpath_stiff.report.figure import (
     BLUE,
@@ -23,9 +23,8 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.painting import add_scales, painted_axes
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain, shortened
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -128,10 +127,11 @@ def _half(figure: Figure, data: Measurements, residual: FloatArray, left: float,
     for i, level in enumerate(np.unique(levels)):
         for j, direction in enumerate(d for d in DIRECTION_COLOURS if (directions == d).any()):
             bottom = height - 1.35 - MAP * (i + 1) + 0.1
-            axes = painted_axes(
-                figure, ((left + MAP * j) / width, bottom / height, (MAP - 0.15) / width, (MAP - 0.3) / height)
+            axes = figure.add_axes(
+                ((left + MAP * j) / width, bottom / height, (MAP - 0.15) / width, (MAP - 0.3) / height),
+                xticks=[],
+                yticks=[],
             )
-            add_scales(axes, sides=())
             points = _map(axes, data, residual, (levels == level) & (directions == direction), limit)
             axes.set_title(direction if i == 0 else "", size=9.5, color=MUTED)
             if left < 1.0 and j == 0:  # of the first half

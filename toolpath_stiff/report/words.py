@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Mapping
 from typing import Any
 
 from toolpath_stiff.analysis.loads import PLUNGES_ONLY
 from toolpath_stiff.stiffness.model import machine_words
+from toolpath_stiff.units import number
 
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
@@ -26,14 +26,6 @@ MINUS_IS_SOFTER = "minus: softer than modelled"
 
 
 ONLY_PLUNGES = "only plunges"  # beside a program, a tool or an operation
-
-
-def number(value: float | None, digits: int = 0) -> str:
-    """A figure with thin groups of thousands ("45 123"), "-" where there is none."""
-    if value is None or not math.isfinite(value):
-        return "-"
-    text = f"{value:,.{digits}f}".replace(",", " ")
-    return text.replace("-", "", 1) if float(text.replace(" ", "")) == 0.0 else text
 
 
 def counted(count: float, thing: str) -> str:

@@ -24,6 +24,7 @@ from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, Offsets, ToolEntry
 from toolpath_stiff.nc.words import CORNERS, Block, read_block, read_text, split_lines
@@ -101,7 +102,7 @@ def rewrite_program(
     Examples
     --------
     >>> from math import pi
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> program = parse_program("G21 G90 F600 (slot)\nG0 X0 Y0 Z5\nG1 Z-1\nX40\nM30\n", "slot.nc")
     >>> rewritten = rewrite_program(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
     >>> print(rewritten.text, end="")
@@ -205,24 +206,20 @@ def _refuse_parts(block: Block, number: int, name: str) -> None:
     """A slash in the middle of a block, and corners that a block makes of the next one."""
     corner = next((word for word in block.words if word.letter in CORNERS), None)
     if block.rest is not None or corner is not None:
-        raise ProgramError(
+        raise Place(name, number).fail(
             "a block with a slash in its middle cannot be rewritten"
             if corner is None
             else f"{corner.text} makes a corner with the next block, which cannot be rewritten",
             hint="put what follows the slash into a block of its own" if corner is None else "post the corner's moves",
-            file=name,
-            line=number,
         )
 
 
 def _refuse_left_out(words: bool, number: int, name: str) -> None:
     """A block that --block-delete leaves out would stay as it was, and be wrong once the switch is off."""
     if words:
-        raise ProgramError(
+        raise Place(name, number).fail(
             "a block that --block-delete leaves out cannot be rewritten",
             hint="take it out of the program, or do without --block-delete",
-            file=name,
-            line=number,
         )
 
 
@@ -280,7 +277,7 @@ def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> Of
     Examples
     --------
     >>> from math import pi
-    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.nc.reader import parse_program
     >>> program = parse_program("G21 G90 F600\nG1 X40\nM30\n", "slot.nc")
     >>> blocks = offset_blocks(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2))
     >>> blocks.linuxcnc

@@ -9,18 +9,24 @@ import difflib
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
 from types import CodeType, ModuleType
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.results import Result
 from toolpath_stiff.stiffness import effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect
 from toolpath_stiff.stiffness.guard import check_declarations, line_in, line_of
+from toolpath_stiff.stiffness.term_file import effects_of_terms
 
 ENTRY_POINTS = "toolpath_stiff.effects"
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
@@ -68,7 +74,7 @@ def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
     for file in files:
         for name, effect in effects_from_file(file).items():
             if name in known:
-                line = line_of(type(effect), "name")
+                line = None if effect.file else line_of(type(effect), "name")
                 raise EffectError(
                     f"effect {name} exists already", hint="give it another name", file=str(file), line=line
                 )
@@ -95,7 +101,9 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
 
 
 def effects_from_file(file: str | Path) -> dict[str, Effect]:
-    """Name -> effect of every `Effect` subclass that a Python file defines; run once as long as it does not change.
+    """Name -> effect of a file: of every `Effect` subclass that a Python file defines, or of the terms of a TOML file.
+
+    Read once as long as it does not change.
 
     Raises
     ------
@@ -108,9 +116,8 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
     except OSError:
         state = None
     if state is None or not path.is_file():
-        raise EffectError(
-            f"effects file {str(file)!r} does not exist", hint=f"`{command_line('effects', 'new', path)}` writes one"
-        )
+        writes = f"`{command_line('effects', 'new', path)}` writes one" if path.suffix == ".py" else ""
+        raise EffectError(f"effects file {str(file)!r} does not exist", hint=writes)
     return _loaded(str(file), path.resolve(), state.st_mtime_ns, state.st_size)
 
 
@@ -125,8 +132,10 @@ class _Source(importlib.machinery.SourceFileLoader):
 def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]:
     """`path`, `changed` and `size` tell files and their versions apart."""
     name = f"toolpath_stiff_user_effects_{path.stem}"
+    if path.suffix == ".toml":
+        return effects_of_terms(file)
     if path.suffix != ".py":
-        raise EffectError("not a Python file", expected="a name that ends in .py", file=file)
+        raise EffectError("neither Python nor TOML", expected="a name that ends in .py or .toml", file=file)
     spec = importlib.util.spec_from_file_location(name, path, loader=_Source(name, str(path)))
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -178,3 +187,50 @@ def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
                 )
             found[effect.name] = effect
     return found
+
+
+class EffectCatalogue(Result):
+    """Effects, in the order of the load path.
+
+    Attributes
+    ----------
+    effects
+        The effects themselves.
+    broken
+        Plug-ins that do not load -> why.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> catalogue = tps.effects()
+    >>> catalogue["weak_strut"].link, catalogue.broken
+    ('struts', {})
+    >>> catalogue.to_frame().columns.tolist()
+    ['link', 'name', 'title', 'equation', 'source', 'load_dependent']
+    >>> len(catalogue.to_dict()["effects"]) == len(catalogue.effects)
+    True
+    """
+
+    command: ClassVar[str] = "effects"
+    shown_by: ClassVar[str] = "effects"
+
+    def __init__(self, effects: Sequence[Effect], broken: Mapping[str, str]) -> None:
+        self.effects, self.broken = list(effects), dict(broken)
+
+    def __getitem__(self, name: str) -> Effect:
+        """An effect by its name."""
+        return next(effect for effect in self.effects if effect.name == name)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What each effect declares, in its own units."""
+        return {"effects": [self.view.describe_effect(effect) for effect in self.effects], "broken": self.broken}
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row an effect: link of the load path, name, title, equation, source."""
+        import pandas as pd
+
+        columns = ["link", "name", "title", "equation", "source", "load_dependent"]
+        return pd.DataFrame(self.to_dict()["effects"])[columns]
+
+    def _short(self) -> str:
+        return f"{len(self.effects)} effects"

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -235,16 +235,17 @@ class Effect:
     'the screws give way, compliance 2.5 nm/N'
     """
 
-    name: ClassVar[str]
-    title: ClassVar[str]
-    link: ClassVar[str]
-    equation: ClassVar[str]
-    source: ClassVar[str]
-    parameters: ClassVar[tuple[Parameter, ...]]
-    needs: ClassVar[tuple[str, ...]] = ()
-    load_dependent: ClassVar[bool] = False
-    unknown_to_control: ClassVar[bool] = False
-    described_from: ClassVar[tuple[str, ...]] = ()
+    name: str
+    title: str
+    link: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    needs: tuple[str, ...] = ()
+    load_dependent: bool = False
+    unknown_to_control: bool = False
+    described_from: tuple[str, ...] = ()
+    file: str = ""  # that declares it without code
 
     def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
         """(n, 6) m/N in series with each strut. `p`: parameter name -> SI value.
@@ -324,6 +325,7 @@ class Effect:
         Examples
         --------
         >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
         >>> [tps.effects()["weak_strut"].seen_by(MeasuringLoop(kind)) for kind in ("tip", "strut", "spindle")]
         [1.0, 1.0, 0.0]
         """

@@ -242,7 +242,7 @@ def line_in(error: BaseException, file: str) -> int | None:
 def file_of(effect: Effect) -> str:
     """The file that defines it, as short as it can be written from here."""
     module = sys.modules.get(type(effect).__module__)
-    file = Path(getattr(module, "__file__", None) or type(effect).__module__)
+    file = Path(effect.file or getattr(module, "__file__", None) or type(effect).__module__)
     return str(file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file)
 
 
@@ -389,14 +389,14 @@ def _check_parameters(effect: Effect, refuse: Callable[..., InputError]) -> None
     for i, parameter in enumerate(effect.parameters):
         if not isinstance(parameter, Parameter):
             raise refuse("parameters", f"parameters hold {parameter!r:.60}", "Parameter(...)", i)
-        wrong = _wrong_in(parameter)
+        wrong = wrong_in(parameter)
         if wrong:
             raise refuse("parameters", f"parameter {parameter.name}: {wrong[0]}", wrong[1], i)
         if parameter.name in [earlier.name for earlier in effect.parameters[:i]]:
             raise refuse("parameters", f"parameter {parameter.name} is declared twice", index=i)
 
 
-def _wrong_in(parameter: Parameter) -> tuple[str, str] | None:
+def wrong_in(parameter: Parameter) -> tuple[str, str] | None:
     """What is wrong, and what was expected."""
     for attribute in ("name", "unit", "source", "meaning"):
         if not isinstance(getattr(parameter, attribute), str):

@@ -151,9 +151,9 @@ def build_model(
     How far the tip gives way in its softest direction; then with one strut at 70 % of its stiffness:
 
     >>> import numpy as np
-    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.stiffness import core
-    >>> from toolpath_stiff.stiffness.effects import find_effect
+    >>> from toolpath_stiff.stiffness.catalogue import find_effect
     >>> machine = load_machine("nist")
     >>> weak = ActiveEffect(find_effect("weak_strut"), {"strut": 1, "factor": 0.7})
     >>> for model in (build_model(machine), build_model(machine, extra=[weak])):

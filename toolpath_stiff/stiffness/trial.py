@@ -5,11 +5,11 @@ from __future__ import annotations
 import pickle
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact, guard
 from toolpath_stiff.stiffness.catalogue import effects_from_file
@@ -29,6 +30,9 @@ from toolpath_stiff.stiffness.model import TOOL, ActiveEffect, StiffnessModel, b
 from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
 
 POSES, DRAWN, TIMED = 24, 600, 512
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 LEANING = rad_from_deg(10.0)  # largest roll, pitch and yaw of the poses
@@ -339,3 +343,52 @@ def _token_in_si(token: str) -> float | None:
     if token[1:] in PREFIXED and token[:1] in PREFIXES:
         return float(PREFIXES[token[0]] * BASE[token[1:]])
     return None
+
+
+class EffectCheck(Result):
+    """Effects of a file tried against the contract: shapes, symmetry, units, neutral value, speed.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py"))
+    ...     found = tps.check_effects(file)
+    >>> found.passed, found.to_dict()["effects"][0]["effect"]
+    (True, 'my_screw')
+    >>> found.to_frame()[["effect", "passed"]].values.tolist()[0]
+    ['my_screw', True]
+    """
+
+    command: ClassVar[str] = "effects"
+    shown_by: ClassVar[str] = "effects"
+
+    def __init__(self, file: str, machine: str, trials: Sequence[Trial]) -> None:
+        self.file, self.machine, self.trials = file, machine, list(trials)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every effect keeps the contract."""
+        return all(trial.passed for trial in self.trials)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Each check of each effect."""
+        rows = [
+            {"effect": t.effect.name, "passed": t.passed, "checks": [vars(outcome) for outcome in t.outcomes]}
+            for t in self.trials
+        ]
+        return {"file": self.file, "machine": self.machine, "passed": self.passed, "effects": rows}
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a check."""
+        import pandas as pd
+
+        rows = [{"effect": t["effect"], **check} for t in self.to_dict()["effects"] for check in t["checks"]]
+        return pd.DataFrame(rows)
+
+    def __str__(self) -> str:
+        return str(self.view.trials_text(self))
+
+    def _short(self) -> str:
+        return f"{self.file}, {'good' if self.passed else 'FAILS'}"

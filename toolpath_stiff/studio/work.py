@@ -217,7 +217,7 @@ def set_up(case: Any, tell: Tell, result: str) -> dict[str, Any]:
 def draft(case: Any, tell: Tell, result: str) -> dict[str, Any]:
     """What is left unexplained, as an effect file."""
     found, command = case.draft_in(result, tell)
-    document = {"reason": found.reason, "file": f"{result}/{found.name}.py" if found.text else ""}
+    document = {"reason": found.reason, "file": f"{result}/{found.name}.toml" if found.text else ""}
     return {"text": repr(found), "document": document, "command": command}
 
 

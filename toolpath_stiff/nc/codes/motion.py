@@ -26,11 +26,10 @@ from toolpath_stiff.nc.codes.points import (
     refuse_while_rotated,
 )
 from toolpath_stiff.nc.geometry import Point2
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, ToolUse
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc
 from toolpath_stiff.nc.state import POINT_WORDS, Corner, CurrentBlock, Segment, State
-from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.tables import tool_of
 from toolpath_stiff.nc.words import CORNERS, Word
-from toolpath_stiff.units import m_from_mm
 
 STILL = 1e-12  # of a coordinate, or of 1 mm if that is more: what frames' sums leave of an axis that stands
 
@@ -76,17 +75,8 @@ def record(
 
 def note_tool(state: State) -> None:
     """Keep the tool in the spindle among those that moved."""
-    if state.tool in state.used_tools:
-        return
-    entry = (state.tools or {}).get(state.tool, ToolEntry(state.tool))
-    state.used_tools[state.tool] = ToolUse(
-        state.tool,
-        m_from_mm(entry.length),
-        m_from_mm(entry.diameter),
-        entry.remark,
-        m_from_mm(entry.stick_out),
-        entry.material,
-    )
+    if state.tool not in state.used_tools:
+        state.used_tools[state.tool] = tool_of(state.tools, state.tool).in_use()
 
 
 def find_height(state: State, block: CurrentBlock, motion: int, named: bool) -> None:

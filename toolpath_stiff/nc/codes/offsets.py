@@ -11,7 +11,7 @@ from toolpath_stiff.nc.codes.code import LENGTH, M_TOOL, OFFSET, ONCE, TOOL, Ali
 from toolpath_stiff.nc.codes.motion import know_position
 from toolpath_stiff.nc.codes.points import axis_words, forget_polar, refuse_while_rotated, zero_moved
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, ToolEntry, WorkOffset
+from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, ToolEntry, WorkOffset, tool_of, tool_table_hint
 from toolpath_stiff.nc.words import Word
 
 FIRST_NUMBERED = 110  # G110 to G129
@@ -373,7 +373,7 @@ def _hold_tip(state: State, block: CurrentBlock, word: Word, hold: bool) -> None
 
     length = state.tool_length
     if math.isnan(length):
-        length = (state.tools or {}).get(state.tool, ToolEntry(state.tool)).length
+        length = tool_of(state.tools, state.tool).length
     position = switched(frames, length, hold)
     if any(map(math.isnan, position)):
         raise block.fail(word, "with a tilted head needs the tool's length", hint="add it to the tool table")
@@ -395,22 +395,18 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
             "name the control with --dialect",
         )
     tool = state.tool if number is None else int(number)
+    differ = "controls differ in whose length it takes"
     if number is None and state.named_length not in (None, state.tool):
-        raise block.fail(
-            word, f"without H after H{state.named_length:g}: controls differ in whose length it takes", "H"
-        )
+        raise block.fail(word, f"without H after H{state.named_length:g}: {differ}", "H")
     if number is None and state.renamed:
-        raise block.fail(
-            word, "without H after M61: controls differ in whose length it takes", f"G43 H{tool}, or T and M6"
-        )
+        raise block.fail(word, f"without H after M61: {differ}", f"G43 H{tool}, or T and M6")
     if number is not None and (number < 0 or number != int(number)):
         raise block.fail(block.values["H"], "is not a tool number", "a whole number")
     if state.tools is None:
         raise block.fail(
             word,
             f"needs the length of tool {tool}, and there is no tool table",
-            hint="give one with --tools tools.csv, or drop it on the studio's page first; with the length in "
-            f"mm:\ntool,length_mm\n{tool},LENGTH",
+            hint=tool_table_hint(tool),
         )
     if tool not in state.tools or math.isnan(state.tools[tool].length):
         raise block.fail(word, f"needs the length of tool {tool}", hint="add it to the tool table (--tools FILE)")

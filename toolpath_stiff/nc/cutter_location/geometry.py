@@ -203,12 +203,8 @@ def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which
     return along(flat, circle.axis, rise)
 
 
-class AxisError(Exception):
+class AxisError(ArcError):
     """What is wrong with a tool axis: found, expected."""
-
-    def __init__(self, found: str, expected: str) -> None:
-        super().__init__(found)
-        self.found, self.expected = found, expected
 
 
 def unit_axis(i: float, j: float, k: float) -> Vector:

@@ -15,8 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.cutter_location.geometry import AxisError
+from toolpath_stiff.nc.controller import Controller, Switches
 from toolpath_stiff.nc.cutter_location.modes import one_frame
 from toolpath_stiff.nc.cutter_location.motion import to_point
 from toolpath_stiff.nc.cutter_location.state import State
@@ -24,9 +23,9 @@ from toolpath_stiff.nc.cutter_location.statements import Statement, frame_in_com
 from toolpath_stiff.nc.cutter_location.vocabulary import execute, meaning_of
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program, Unsupported
-from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.nc.words import any_statement
-from toolpath_stiff.units import Pose
 
 NO_CUT = "no cutting move"
 
@@ -47,42 +46,20 @@ OnError = Callable[[InputError], None]
 OnWord = Callable[[str, int], None]
 
 
-def not_for(controller: Controller, offsets_given: bool, block_delete: bool) -> tuple[str, ...]:
+def not_for(controller: Controller, offsets: Offsets | None, block_delete: Switches) -> tuple[str, ...]:
     """Warnings about what was asked for and means nothing to a cutter-location file."""
     given = (
         ("a dialect", controller.dialect.name != "generic"),
-        ("work offsets", offsets_given),
+        ("work offsets", offsets is not None and any(offset.given for offset in offsets.table)),
         ("posted kinematics", controller.kinematics is not None),
-        ("block-delete switches", block_delete or bool(controller.switches)),
+        ("block-delete switches", bool(block_delete) or bool(controller.switches)),
         ("posted kinematics", controller.kinematics is not None),
     )
     return tuple(f"{what} mean nothing to a cutter-location file and are not used" for what, asked in given if asked)
 
 
-def read(
-    lines: tuple[str, ...],
-    name: str,
-    path: str,
-    origin: Pose | None,
-    default_origin: Pose,
-    tools: dict[int, ToolEntry] | None,
-    warnings: tuple[str, ...] = (),
-    feed: float | None = None,
-) -> Program:
-    """Read a cutter-location file.
-
-    Parameters
-    ----------
-    lines, name, path
-        The file's lines; its name for messages; where it lies.
-    origin, default_origin
-        Where program zero sits, m and rad: as asked for, and where neither the caller nor the program says so.
-    tools
-        Tool table; its lengths win over the file's.
-    warnings
-        Warnings of the reader, which come first.
-    feed
-        Of cuts before the first FEDRAT, mm/min; None: they are refused.
+def read(request: Request) -> Program:
+    r"""Read a cutter-location file; lengths of the tool table win over the file's.
 
     Raises
     ------
@@ -91,21 +68,22 @@ def read(
 
     Examples
     --------
-    >>> lines = ("UNITS/MM", "FEDRAT/600,MMPM", "FROM/0,0,50", "GOTO/0,0,0", "GOTO/40,0,0", "FINI")
-    >>> read(lines, "part.apt", "", None, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), None)
+    >>> from toolpath_stiff.nc.reader import parse_program
+    >>> parse_program("UNITS/MM\nFEDRAT/600,MMPM\nFROM/0,0,50\nGOTO/0,0,0\nGOTO/40,0,0\nFINI\n", "part.apt")
     <Program part.apt: 2 moves, read as cutter-location file>
     """
-    state = State(name, copy.deepcopy(tools), feed=feed)
-    run(state, lines)
+    state = State(request.name, copy.deepcopy(request.tools), feed=request.controller.feed)
+    run(state, request.lines)
     if not state.recorder.cuts:
-        raise _no_cut(name)
+        raise _no_cut(request.name)
+    warnings = not_for(request.controller, request.offsets, request.block_delete)
     return Program(
-        name=name,
-        path=path,
-        source=lines,
+        name=request.name,
+        path=request.path,
+        source=request.lines,
         moves=state.recorder.moves(),
-        origin=default_origin if origin is None else origin,
-        origin_source="default" if origin is None else "option",
+        origin=request.default_origin if request.origin is None else request.origin,
+        origin_source="default" if request.origin is None else "option",
         unsupported=unsupported(state),
         warnings=(*warnings, *state.warnings),
         assumptions=tuple(state.assumptions),
@@ -180,7 +158,7 @@ def _perform(state: State, statement: Statement, point: list[float] | None) -> N
             execute(state, statement)
         else:
             to_point(state, point)
-    except (ArcError, AxisError) as error:
+    except ArcError as error:
         raise state.fail(error.found, error.expected) from None
     state.last_word = statement.word or state.last_word
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -19,8 +19,7 @@ from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle
 from toolpath_stiff.nc.cutter_location.statements import Statement, number_of
 from toolpath_stiff.nc.geometry import Drilling, Vector, strokes
 from toolpath_stiff.nc.moves import ARC, CYCLE, RAPID, Arc, Recorder, ToolUse
-from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry
-from toolpath_stiff.units import m_from_mm
+from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry, tool_of
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.cutter_location.statements import Argument
@@ -334,16 +333,10 @@ def _add(
 
 def _tool_use(state: State) -> ToolUse:
     """The tool in the spindle; the tool table wins over the file."""
-    entry = (state.tools or {}).get(state.tool, ToolEntry(state.tool))
+    entry = tool_of(state.tools, state.tool)
     diameter = state.diameter if math.isnan(entry.diameter) else entry.diameter
-    return ToolUse(
-        state.tool,
-        m_from_mm(state.tool_length),
-        m_from_mm(diameter),
-        entry.remark or state.tool_name,
-        m_from_mm(entry.stick_out),
-        entry.material,
-    )
+    remark = entry.remark or state.tool_name
+    return replace(entry, length=state.tool_length, diameter=diameter, remark=remark).in_use()
 
 
 def _feed(state: State, motion: int) -> float:

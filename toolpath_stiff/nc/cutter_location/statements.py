@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from operator import itemgetter
 
-from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.tables import LARGEST_MM
 
 _NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[EeDd][+-]?\d++)?"
@@ -146,11 +146,9 @@ def _pieces(lines: tuple[str, ...], at: int, begin: int, name: str) -> tuple[lis
         code = lines[at].partition("$$")[0]
         code, continues, rest = code.partition("$")
         if rest.strip():
-            raise ProgramError(
+            raise Place(name, at + 1).fail(
                 f"{rest.strip()[:20]!r} after a $, which continues a statement on the next line",
-                expected="nothing, or $$ and a comment",
-                file=name,
-                line=at + 1,
+                "nothing, or $$ and a comment",
                 column=len(code) + 2,
             )
         pieces.append((at + 1, begin + 1, code[begin:]))
@@ -158,11 +156,9 @@ def _pieces(lines: tuple[str, ...], at: int, begin: int, name: str) -> tuple[lis
         if not continues:
             return pieces, at
         if at >= len(lines) or _NEW_STATEMENT.match(lines[at]):
-            raise ProgramError(
+            raise Place(name, pieces[-1][0]).fail(
                 "a $ at the end of a line, and no line that continues the statement",
-                expected="the rest of the statement",
-                file=name,
-                line=pieces[-1][0],
+                "the rest of the statement",
                 column=len(code) + 1,
             )
 
@@ -185,14 +181,12 @@ def _parse(pieces: list[tuple[int, int, str]], name: str) -> Statement | None:
         return Statement(line, column, "", _arguments(joined, 0, place), joined.strip())
     found = _WORD.match(joined)
     if found is None:
-        raise ProgramError(
+        raise Place(name, line).fail(
             f"{joined.strip()[:40]!r} is not a statement of a cutter-location file",
-            expected="a word, or a word and / and its arguments",
-            hint="definitions and computations need APT's processor: give the file that it or the CAM system writes"
+            "a word, or a word and / and its arguments",
+            "definitions and computations need APT's processor: give the file that it or the CAM system writes"
             if "=" in joined
             else "",
-            file=name,
-            line=line,
             column=column,
         )
     word = re.sub(r"\s*,\s*", ",", re.sub(r"\s+", " ", found[1].strip().upper()))
@@ -228,9 +222,7 @@ def number_of(argument: Argument, name: str, what: str = "a number") -> float:
     if _IS_NUMBER.fullmatch(argument.text):
         value = float(argument.text.upper().replace("D", "E"))
     if not abs(value) <= LARGEST_MM * 100.0:
-        raise ProgramError(
-            f"{argument.text[:30]!r}", expected=what, file=name, line=argument.line, column=argument.column
-        )
+        raise Place(name, argument.line).fail(f"{argument.text[:30]!r}", what, column=argument.column)
     return value
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -18,7 +18,7 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, step_in_words
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
-from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.tables import ToolEntry, tool_table_hint
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -31,6 +31,7 @@ MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
 HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
+LENGTH_WORD = re.compile(r"H0*(\d+)(?![\d.])")
 DIAMETER_WORD = re.compile(r"D0*(\d+)(?![\d.])")
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
@@ -43,7 +44,8 @@ Vector = list[float]
 class Follower:
     """Follows the canonical commands; `recorder` holds the moves in control coordinates less the `reference`.
 
-    A command of `COMMANDS` is a method, which is given the text between its parentheses.
+    A command of LinuxCNC's canonical interface (src/emc/nml_intf/canon.hh), as `rs274` spells it, is a method, `_on_`
+    before its name, which is given the text between its parentheses.
     """
 
     name: str
@@ -89,14 +91,14 @@ class Follower:
         """Take every command. Raises `InputError` for what gives no path: probing, splines, tools of unknown length."""
         for match in CALL.finditer(text):
             number, name, inner = match.groups()
-            action = COMMANDS.get(name)
+            action = getattr(self, f"_on_{name.lower()}", None)
             if action is None:
                 continue
             if number is not None:
                 self.reading = int(number)
                 if not self.tagged:
                     self.line = self.reading
-            action(self, inner)
+            action(inner)
 
     def fail(self, line: int, found: str, expected: str = "", hint: str = "") -> InputError:
         """An error of a line of the program."""
@@ -120,7 +122,7 @@ class Follower:
     def _lengths(self, inner: str) -> Vector:
         return [v * self.scale if i < 3 else v for i, v in enumerate(_numbers(inner)[:6])]
 
-    def _use_length_units(self, inner: str) -> None:
+    def _on_use_length_units(self, inner: str) -> None:
         scale = MM_PER_INCH if "INCH" in inner else 1.0
         if scale != self.scale and self.tool_z:
             raise self.fail(
@@ -133,15 +135,15 @@ class Follower:
         if self.feed_line == self.reading:  # `G20 F20`: rs274 takes F first, controls mean inches
             self.feed_scale = scale
 
-    def _set_g5x_offset(self, inner: str) -> None:
+    def _on_set_g5x_offset(self, inner: str) -> None:
         self.g5x = self._lengths(inner.partition(",")[2])
         self.frame_changed = True
 
-    def _set_g92_offset(self, inner: str) -> None:
+    def _on_set_g92_offset(self, inner: str) -> None:
         self.g92 = self._lengths(inner)
         self.frame_changed = True
 
-    def _set_xy_rotation(self, inner: str) -> None:
+    def _on_set_xy_rotation(self, inner: str) -> None:
         rotation = math.radians(_numbers(inner)[0])
         # G10 that turns the offset in force: rs274 keeps the old numbers of axes that the next move does not name.
         if rotation != self.rotation and "G10" in self._words(self.reading):
@@ -149,16 +151,23 @@ class Follower:
         self.rotation = rotation
         self.frame_changed = True
 
-    def _use_tool_length_offset(self, inner: str) -> None:
+    def _no_length(self, words: str) -> InputError:
+        """Of a G43 without a length: which tool's, unless H is computed."""
+        if self.tools is not None:
+            missing, hint = "which the tool table does not give", "give it in a tool table (--tools FILE)"
+            return self.fail(self.reading, f"G43 needs a tool's length, {missing}", hint=hint)
+        named = LENGTH_WORD.search(words)
+        tool = int(named[1]) if named and int(named[1]) else self.tool  # H0: that of the spindle
+        hint = "give one with --tools FILE" if "H" in words and not named else tool_table_hint(tool)
+        return self.fail(self.reading, "G43 needs a tool's length, and there is no tool table", hint=hint)
+
+    def _on_use_tool_length_offset(self, inner: str) -> None:
+        words = self._words(self.reading)
         x, y, z, *rest = (v * self.scale for v in _numbers(inner))
         if x or y or any(rest):
             raise self.fail(self.reading, "a tool offset in other directions than Z", "a length along Z alone")
         if z < LENGTH_UNKNOWN_BELOW_MM:
-            missing = "and there is no tool table" if self.tools is None else "which the tool table does not give"
-            raise self.fail(
-                self.reading, f"G43 needs a tool's length, {missing}", hint="give it in a tool table (--tools FILE)"
-            )
-        words = self._words(self.reading)
+            raise self._no_length(words)
         if self.renamed and "G43" in words and "H" not in words and "G43.1" not in words:
             raise self.fail(self.reading, "G43 after M61: LinuxCNC's rs274 takes the length of the tool before", "H")
         self.position = [*self.position[:2], self.position[2] + self.tool_z - z, *self.position[3:]]
@@ -168,24 +177,24 @@ class Follower:
         self.tool_length = math.nan if cancelled or not self.reading else z
         self.frame_changed = True
 
-    def _select_plane(self, inner: str) -> None:
+    def _on_select_plane(self, inner: str) -> None:
         self.plane = inner.removeprefix("CANON_PLANE_")
 
     # -- feeds and tools -------------------------------------------------------------------------------------------
 
-    def _set_feed_rate(self, inner: str) -> None:
+    def _on_set_feed_rate(self, inner: str) -> None:
         self.feed, self.feed_scale, self.feed_line = _numbers(inner)[0], self.scale, self.reading
 
-    def _set_feed_mode(self, inner: str) -> None:
+    def _on_set_feed_mode(self, inner: str) -> None:
         self.per_revolution = _numbers(inner)[-1] != 0.0
 
-    def _set_spindle_speed(self, inner: str) -> None:
+    def _on_set_spindle_speed(self, inner: str) -> None:
         self.speed = _numbers(inner)[-1]
 
-    def _start_speed_feed_sync(self, inner: str) -> None:
+    def _on_start_speed_feed_sync(self, inner: str) -> None:
         self.synchronised = abs(_numbers(inner)[0]) * self.scale
 
-    def _stop_speed_feed_synch(self, _: str) -> None:
+    def _on_stop_speed_feed_synch(self, _: str) -> None:
         self.synchronised = 0.0
 
     def _feed_of(self, start: Vector, end: Vector, arc: bool) -> float:
@@ -197,17 +206,17 @@ class Follower:
         rotary = not arc and start[:3] == end[:3]
         return self.feed if rotary else self.feed * self.feed_scale
 
-    def _change_tool(self, inner: str) -> None:
+    def _on_change_tool(self, inner: str) -> None:
         place = int(_numbers(inner)[0])
         self.tool = self.numbers[place - 1] if place else 0
         self.renamed = False
         self.lost, self.raised = self.lost + self.raised, 0.0
 
-    def _change_tool_number(self, inner: str) -> None:
-        self._change_tool(inner)
+    def _on_change_tool_number(self, inner: str) -> None:
+        self._on_change_tool(inner)
         self.renamed = True  # and rs274 goes on with the old one's length and diameter
 
-    def _dwell(self, inner: str) -> None:
+    def _on_dwell(self, inner: str) -> None:
         self.recorder.add_dwell(_numbers(inner)[0])
 
     # -- lines -----------------------------------------------------------------------------------------------------
@@ -215,7 +224,7 @@ class Follower:
     def _words(self, line: int) -> str:
         return self.lines[line - 1].plain if line else ""
 
-    def _comment(self, inner: str) -> None:
+    def _on_comment(self, inner: str) -> None:
         text = inner.strip('"')
         if text.isdigit():
             self.line, self.moves_of_line = int(text), 0
@@ -244,24 +253,24 @@ class Follower:
                 hint="give it in a tool table (--tools FILE)",
             )
 
-    def _nurbs_feed(self, _: str) -> None:
+    def _on_nurbs_feed(self, _: str) -> None:
         raise self.fail(self.reading, "a spline, whose points LinuxCNC does not print", hint="post arcs and lines")
 
-    def _straight_probe(self, _: str) -> None:
+    def _on_straight_probe(self, _: str) -> None:
         raise self.fail(self.reading, "probing: what follows depends on what is met", hint="leave probing out")
 
-    def _program_end(self, _: str) -> None:
+    def _on_program_end(self, _: str) -> None:
         self.ended = True
 
     # -- moves -----------------------------------------------------------------------------------------------------
 
-    def _straight_traverse(self, inner: str) -> None:
+    def _on_straight_traverse(self, inner: str) -> None:
         self._move(RAPID, _numbers(inner), None)
 
-    def _straight_feed(self, inner: str) -> None:
+    def _on_straight_feed(self, inner: str) -> None:
         self._move(CYCLE if self.cycle else FEED, _numbers(inner), None)
 
-    def _rigid_tap(self, inner: str) -> None:
+    def _on_rigid_tap(self, inner: str) -> None:
         """Down and, the spindle reversed, back."""
         start = [*self._program_point(), 0.0, 0.0, 0.0]
         end = _numbers(inner)
@@ -271,13 +280,10 @@ class Follower:
 
     def _program_point(self) -> Vector:
         """Where the controlled point is, in program coordinates of the active unit."""
-        x, y, z = (p - o for p, o in zip(self.position[:3], self.g5x[:3], strict=True))
-        if self.rotation:
-            cos, sin = math.cos(self.rotation), math.sin(self.rotation)
-            x, y = cos * x + sin * y, cos * y - sin * x
-        return [(v - g) / self.scale for v, g in zip((x, y, z), self.g92[:3], strict=True)]
+        unturned = self._unrotated(self.position)
+        return [(v - g) / self.scale for v, g in zip(unturned, self.g92[:3], strict=True)]
 
-    def _arc_feed(self, inner: str) -> None:
+    def _on_arc_feed(self, inner: str) -> None:
         e1, e2, c1, c2, turns, axis_end, a, b, c = _numbers(inner)
         if self.plane not in PLANES:
             raise self.fail(self.line, f"an arc in the plane {self.plane}", "G17, G18 or G19")
@@ -424,30 +430,3 @@ class Follower:
 
 def _numbers(inner: str) -> Vector:
     return [float(value) for value in NUMBER.findall(inner)]
-
-
-# The commands of LinuxCNC's canonical interface (src/emc/nml_intf/canon.hh) as `rs274` spells them.
-COMMANDS: dict[str, Callable[[Follower, str], None]] = {
-    "USE_LENGTH_UNITS": Follower._use_length_units,
-    "SET_G5X_OFFSET": Follower._set_g5x_offset,
-    "SET_G92_OFFSET": Follower._set_g92_offset,
-    "SET_XY_ROTATION": Follower._set_xy_rotation,
-    "USE_TOOL_LENGTH_OFFSET": Follower._use_tool_length_offset,
-    "SELECT_PLANE": Follower._select_plane,
-    "SET_FEED_RATE": Follower._set_feed_rate,
-    "SET_FEED_MODE": Follower._set_feed_mode,
-    "SET_SPINDLE_SPEED": Follower._set_spindle_speed,
-    "START_SPEED_FEED_SYNC": Follower._start_speed_feed_sync,
-    "STOP_SPEED_FEED_SYNCH": Follower._stop_speed_feed_synch,
-    "CHANGE_TOOL": Follower._change_tool,
-    "CHANGE_TOOL_NUMBER": Follower._change_tool_number,
-    "DWELL": Follower._dwell,
-    "COMMENT": Follower._comment,
-    "NURBS_FEED": Follower._nurbs_feed,
-    "STRAIGHT_PROBE": Follower._straight_probe,
-    "PROGRAM_END": Follower._program_end,
-    "STRAIGHT_TRAVERSE": Follower._straight_traverse,
-    "STRAIGHT_FEED": Follower._straight_feed,
-    "RIGID_TAP": Follower._rigid_tap,
-    "ARC_FEED": Follower._arc_feed,
-}

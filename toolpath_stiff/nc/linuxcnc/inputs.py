@@ -17,8 +17,18 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.tables import FIRST_OFFSET, HOME_G28, HOME_G30, OFFSET_STRIDE, ROTATION, Offsets, ToolEntry
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.tables import (
+    FIRST_OFFSET,
+    HOME_G28,
+    HOME_G30,
+    OFFSET_STRIDE,
+    ROTATION,
+    Offsets,
+    ToolEntry,
+    tool_of,
+)
 from toolpath_stiff.units import MM_PER_INCH
 
 LONGEST_LINE = 250  # rs274 reads at most 255 characters (LINELEN, interp_internal.hh)
@@ -62,19 +72,16 @@ def split(lines: Iterable[str], name: str) -> list[Line]:
 
 
 def _split_line(text: str, number: int, name: str) -> Line:
+    place = Place(name, number)
     if not any(mark in text for mark in "(;)"):
         words, comments = text, NO_COMMENTS
     else:
-        words, comments = _cut_comments(text, number, name)
+        words, comments = _cut_comments(text, place)
     compact = "".join(words.replace("\ufeff", "").split())
     if not compact.isascii():  # before upper case: of other scripts some letters become ASCII ones
         foreign = next(c for c in words if not c.isascii() and not c.isspace() and c != "\ufeff")
-        raise ProgramError(
-            f"{foreign!r} outside a comment",
-            expected="letters and digits of the NC language",
-            file=name,
-            line=number,
-            column=words.index(foreign) + 1,
+        raise place.fail(
+            f"{foreign!r} outside a comment", "letters and digits of the NC language", column=words.index(foreign) + 1
         )
     compact = compact.upper()
     optional = compact.startswith("/")
@@ -88,7 +95,7 @@ def _split_line(text: str, number: int, name: str) -> Line:
     return Line(number, compact, comments, optional, rest)
 
 
-def _cut_comments(text: str, number: int, name: str) -> tuple[str, tuple[tuple[int, str], ...]]:
+def _cut_comments(text: str, place: Place) -> tuple[str, tuple[tuple[int, str], ...]]:
     """`(` to its `)`, and outside of that `;` to the end; comments become blanks.
 
     LinuxCNC refuses a comment within a comment, which Haas' controls have; the copy has neither.
@@ -106,16 +113,14 @@ def _cut_comments(text: str, number: int, name: str) -> tuple[str, tuple[tuple[i
             start, depth = column, 1
             words.append(" ")
         elif character == ")":
-            raise ProgramError("`)` without `(`", file=name, line=number, column=column)
+            raise place.fail("`)` without `(`", column=column)
         elif character == ";":
             comments.append((column, text[column:]))
             break
         else:
             words.append(character)
     if start:
-        raise ProgramError(
-            "a comment is not closed", expected="`)` on the same line", file=name, line=number, column=start
-        )
+        raise place.fail("a comment is not closed", "`)` on the same line", column=start)
     return "".join(words), tuple(comments)
 
 
@@ -162,22 +167,17 @@ def _numbered_line(line: Line, name: str, tags: bool) -> str:
     if not line.words and not aborts:
         return ""
     if line.words.startswith(BARE_NUMBER):
-        raise ProgramError(
-            f"a block that begins with a number: {line.words[:20]!r}",
-            expected="a letter before each number",
-            file=name,
-            line=line.number,
+        raise Place(name, line.number).fail(
+            f"a block that begins with a number: {line.words[:20]!r}", "a letter before each number"
         )
     comment = f"({ABORT}stopped by the program)" if aborts else f"({line.number})" if tags else ""
     if line.words.startswith("O") and not aborts:  # after an O word some forms take no comment
         comment = ""
     text = f"N{line.number}{line.words}{comment}"
     if len(text) > LONGEST_LINE:
-        raise ProgramError(
+        raise Place(name, line.number).fail(
             f"a line of {len(text)} characters without blanks and comments",
-            expected=f"at most {LONGEST_LINE}, as LinuxCNC reads",
-            file=name,
-            line=line.number,
+            f"at most {LONGEST_LINE}, as LinuxCNC reads",
         )
     return text
 
@@ -307,20 +307,17 @@ def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
     for line in lines:
         for column, text in line.comments:
             if PYTHON.match(text):
-                raise _refused("a comment that runs Python", name, line.number, column)
+                raise _refused("a comment that runs Python", Place(name, line.number, column))
         if "M" in line.words:
             _check_m_codes(line, name)
     _check_calls(lines, name)
 
 
-def _refused(found: str, name: str, line: int, column: int | None = None) -> InputError:
-    return ProgramError(
+def _refused(found: str, place: Place) -> InputError:
+    return place.fail(
         f"{found}: LinuxCNC's interpreter is not started on such a program",
-        expected="a program that runs no other",
-        hint="remove it, or read the program with --interpreter builtin",
-        file=name,
-        line=line,
-        column=column,
+        "a program that runs no other",
+        "remove it, or read the program with --interpreter builtin",
     )
 
 
@@ -328,14 +325,14 @@ def _check_m_codes(line: Line, name: str) -> None:
     for match in M_WORD.finditer(NAMED.sub("<>", line.words)):
         digits = match[1]
         if digits is None:
-            raise _refused("an M code that is computed, and might be a user's (M100 to M199)", name, line.number)
+            raise _refused("an M code that is computed, and might be a user's (M100 to M199)", Place(name, line.number))
         try:
             code = float(digits)
         except ValueError:
-            raise ProgramError(f"M{digits} is not an M code", file=name, line=line.number) from None
+            raise Place(name, line.number).fail(f"M{digits} is not an M code") from None
         # Rounded as LinuxCNC does (interp_read.cc: the nearest integer), and to be safe both neighbours.
         if 99.0 < code < 200.0:
-            raise _refused(f"the user M code M{digits} (M100 to M199 run a program)", name, line.number)
+            raise _refused(f"the user M code M{digits} (M100 to M199 run a program)", Place(name, line.number))
 
 
 def _check_calls(lines: list[Line], name: str) -> None:
@@ -345,7 +342,7 @@ def _check_calls(lines: list[Line], name: str) -> None:
     for line in lines:
         match = SUBPROGRAM.match(line.words)
         if match and "/" in match[1]:  # it would be looked for there, if what defines it here is left out
-            raise _refused("a subprogram whose name is a path", name, line.number)
+            raise _refused("a subprogram whose name is a path", Place(name, line.number))
         if match and match[2] == "SUB":
             defined.add(_key(match[1]))
         elif match and match[2] == "CALL":
@@ -353,20 +350,18 @@ def _check_calls(lines: list[Line], name: str) -> None:
         elif NUMBER_ONLY.match(line.words):
             defined.add(_key(line.words[1:]))
         elif line.words.startswith("O") and "CALL" in NAMED.sub("<>", line.words):
-            raise _refused("a call of a subprogram whose name is computed", name, line.number)
+            raise _refused("a call of a subprogram whose name is computed", Place(name, line.number))
         elif M98.search(line.words):
             called = re.search(r"P(\d+)", line.plain)
             if called is None:
-                raise _refused("M98 without the number of its subprogram", name, line.number)
+                raise _refused("M98 without the number of its subprogram", Place(name, line.number))
             calls.append((_key(called[1]), line.number))
     for key, number in calls:
         if key not in defined:
-            raise ProgramError(
+            raise Place(name, number).fail(
                 f"subprogram O{key} is not in the program",
-                expected="subprograms in the same file",
-                hint="copy it into the program; other files are not read",
-                file=name,
-                line=number,
+                "subprograms in the same file",
+                "copy it into the program; other files are not read",
             )
 
 
@@ -437,7 +432,7 @@ def tool_file(numbers: Iterable[int], tools: dict[int, ToolEntry] | None) -> str
     """Text of the tool table for these tools; a T word without an entry is an error in rs274."""
     rows = []
     for pocket, number in enumerate(numbers, 1):
-        tool = (tools or {}).get(number, ToolEntry(number))
+        tool = tool_of(tools, number)
         length = UNKNOWN_LENGTH_MM if math.isnan(tool.length) else tool.length
         diameter = 0.0 if math.isnan(tool.diameter) else tool.diameter
         rows.append(f"T{number} P{pocket} Z{length / MM_PER_INCH:.9f} D{diameter / MM_PER_INCH:.9f} ;\n")

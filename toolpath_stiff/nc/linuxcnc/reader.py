@@ -29,9 +29,10 @@ from toolpath_stiff.nc.linuxcnc.inputs import (
 )
 from toolpath_stiff.nc.linuxcnc.runner import StoppedError, find_rs274, message_and_line, run_rs274
 from toolpath_stiff.nc.moves import Moves, ToolUse, Unsupported
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import START
-from toolpath_stiff.nc.tables import Offsets, ToolEntry
-from toolpath_stiff.units import ShopPose, m_from_mm
+from toolpath_stiff.nc.tables import Offsets, tool_of
+from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.linuxcnc.runner import Limits, Run
@@ -78,36 +79,16 @@ class Reading:
     turning: dict[str, int]  # what makes the program look like a lathe's, with its line
 
 
-def read(
-    source: Sequence[str],
-    name: str,
-    origin: ShopPose | None,
-    default_origin: ShopPose,
-    offsets: Offsets,
-    tools: dict[int, ToolEntry] | None,
-    block_delete: bool,
-    *,
-    rs274: str | None = None,
-    unconfined: bool = False,
-    limits: Limits | None = None,
-    posted: bool = False,
-    feed: float | None = None,
-) -> Reading:
-    """Read a program (lines without line ends) with `rs274`; `origin`, `default_origin` in mm and degrees.
-
-    `unconfined`: even where bubblewrap cannot be used. `posted`: it was posted for another machine, whose rotary axes
-    have one zero for program and machine. `feed`: of cuts before the first F, mm/min.
+def read(request: Request, limits: Limits | None = None) -> Reading:
+    """What `rs274` makes of a program, within the limits of its run.
 
     Raises
     ------
     InputError
         The fence, or the interpreter, refuses the program, or a limit was exceeded.
     """
-    lines, dropped = _checked(source, name)
-    session = _Session(
-        source, lines, name, offsets, tools, block_delete, find_rs274(rs274, unconfined), limits, posted, feed, dropped
-    )
-    return session.read(origin, default_origin)
+    lines, dropped = _checked(request.lines, request.name)
+    return _Session(request, lines, find_rs274(request.rs274, request.unconfined), dropped, limits).read()
 
 
 def _checked(source: Sequence[str], name: str) -> tuple[list[Line], list[Dropped]]:
@@ -131,20 +112,15 @@ def refusal(source: Sequence[str], name: str) -> InputError | None:
 
 @dataclass
 class _Session:
-    source: Sequence[str]
+    request: Request
     lines: list[Line]
-    name: str
-    offsets: Offsets
-    tools: dict[int, ToolEntry] | None
-    block_delete: bool
     rs274: str
+    dropped: Sequence[Dropped]
     limits: Limits | None
-    posted: bool
-    feed: float | None = None
-    dropped: Sequence[Dropped] = ()
 
-    def read(self, origin: ShopPose | None, default_origin: ShopPose) -> Reading:
-        offsets = copying.deepcopy(self.offsets)
+    def read(self) -> Reading:
+        origin, default_origin = self.request.zero
+        offsets = copying.deepcopy(self.request.offsets)
         shift = self._shift(origin, default_origin)
         run, follower = self._run(offsets, shift)
         # G54 as it stood at the first motion is the zero of the set-up frame.
@@ -161,7 +137,9 @@ class _Session:
         if shift == (0.0, 0.0, 0.0) and self._uses(MACHINE_CODES) and place != g54:
             raise self._machine_error()
         if not follower.recorder.cuts:
-            raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=self.name)
+            raise ProgramError(
+                "no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=self.request.name
+            )
         return Reading(
             moves=follower.recorder.moves(),
             origin=place,
@@ -169,7 +147,7 @@ class _Session:
             unsupported=tuple(self._unsupported()),
             warnings=tuple(self._warnings(says, given, follower)),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program", *self._left_out()),
-            tools=tuple(self._tool_use(number) for number in follower.used_tools),
+            tools=tuple(tool_of(self.request.tools, number).in_use() for number in follower.used_tools),
             turning=self._turning(),
         )
 
@@ -181,7 +159,7 @@ class _Session:
 
         It matters to G53, G28 and G30 alone. G10 writes offsets that are machine coordinates already: then none.
         """
-        g54 = self.offsets.table[0]
+        g54 = self.request.offsets.table[0]
         place = origin if origin is not None else None if g54.given else default_origin
         if place is None or not self._uses(MACHINE_CODES) or self._uses(OFFSET_CODES):
             return (0.0, 0.0, 0.0)
@@ -196,7 +174,7 @@ class _Session:
             "turned: LinuxCNC's interpreter knows the machine by its offsets alone",
             expected="G54 as the program or the offsets file sets it",
             hint=f"leave {both_names('--origin')} out, or read the program with --interpreter builtin",
-            file=self.name,
+            file=self.request.name,
             line=number,
         )
 
@@ -214,12 +192,12 @@ class _Session:
                 raise ProgramError(
                     "every work offset is turned: LinuxCNC's rs274 begins with wrong numbers",
                     expected="one of G54 to G59.3 without a rotation",
-                    file=self.name,
+                    file=self.request.name,
                 )
             active = plain[0]
             prefix.append("N0G54")
-        if self.feed is not None:
-            prefix.append(f"N0G21F{self.feed:.6f}")
+        if self.request.controller.feed is not None:
+            prefix.append(f"N0G21F{self.request.controller.feed:.6f}")
         if any(shift):
             x, y, z = shift
             prefix += [f"N0G21G90G53G0X{x:.6f}Y{y:.6f}Z{z:.6f}", "N0G80"]
@@ -233,28 +211,36 @@ class _Session:
         lines = self.lines
         if until is not None:
             lines = [Line(line.number, "M2") if line.number == until else line for line in lines]
-        text = numbered(lines, self.name, block_delete=self.block_delete, tags=needs_tags(self.lines), prefix=prefix)
+        text = numbered(
+            lines,
+            self.request.name,
+            block_delete=bool(self.request.switches),
+            tags=needs_tags(self.lines),
+            prefix=prefix,
+        )
         try:
             run = run_rs274(
                 text,
                 parameter_file(offsets, shift, active),
-                tool_file(tool_numbers(self.tools, self.lines), self.tools),
+                tool_file(tool_numbers(self.request.tools, self.lines), self.request.tools),
                 rs274=self.rs274,
                 limits=self.limits,
             )
         except StoppedError as error:
             loops = [str(line.number) for line in self.lines if LOOPS.match(line.words)][:MOST_NAMED]
             hint = f"loops begin in the lines {', '.join(loops)}" if loops else ""
-            raise ProgramError(str(error), hint=hint, file=self.name, line=error.line) from None
+            raise ProgramError(str(error), hint=hint, file=self.request.name, line=error.line) from None
         follower = self._follow(run, (0.0, 0.0, 0.0))
         if run.message or not follower.ended:
             raise self._refusal(run.message, len(prefix))
         return run, follower
 
     def _follow(self, run: Run, reference: tuple[float, float, float]) -> Follower:
-        numbers = tool_numbers(self.tools, self.lines)
-        follower = Follower(self.name, self.lines, self.tools, needs_tags(self.lines), numbers, reference)
-        follower.posted = self.posted
+        numbers = tool_numbers(self.request.tools, self.lines)
+        follower = Follower(
+            self.request.name, self.lines, self.request.tools, needs_tags(self.lines), numbers, reference
+        )
+        follower.posted = self.request.posted is not None
         follower.follow(run.canon)
         return follower
 
@@ -268,7 +254,7 @@ class _Session:
             line, text = unclosed(self.lines), "the end of an O word is missing"
         return ProgramError(
             f"LinuxCNC's interpreter refuses: {text or 'it stopped without a message'}",
-            file=self.name,
+            file=self.request.name,
             line=line or None,
         )
 
@@ -288,17 +274,6 @@ class _Session:
         early = [line for line in self.lines if line.number < follower.first_motion]
         zeroed = any(OFFSET_CODES.search(line.plain) and SETS_G54.search(line.plain) for line in early)
         return at_first if moved else before, given or moved or zeroed
-
-    def _tool_use(self, number: int) -> ToolUse:
-        entry = (self.tools or {}).get(number, ToolEntry(number))
-        return ToolUse(
-            number,
-            m_from_mm(entry.length),
-            m_from_mm(entry.diameter),
-            entry.remark,
-            m_from_mm(entry.stick_out),
-            entry.material,
-        )
 
     def _turning(self) -> dict[str, int]:
         found: dict[str, int] = {}
@@ -344,7 +319,7 @@ class _Session:
 
     def _column(self, line: Line, word: str) -> int:
         """Where a word stands in its line, whatever blanks are within it."""
-        text = self.source[line.number - 1]
+        text = self.request.lines[line.number - 1]
         for start, comment in line.comments:
             text = text[: start - 1] + " " * (len(comment) + 1) + text[start + len(comment) :]
         match = re.search(r"\s*".join(map(re.escape, word)), text, re.IGNORECASE)

@@ -19,7 +19,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.place import Place
 
 NGC, MACRO_B, EITHER = "RS274/NGC", "Macro B", "either family"
 
@@ -27,7 +28,7 @@ NGC, MACRO_B, EITHER = "RS274/NGC", "Macro B", "either family"
 class Variables(Protocol):
     """What expressions ask of the variables (`variables.Variables`)."""
 
-    def get(self, place: str | int, line: int, column: int, name: str) -> float | None:
+    def get(self, which: str | int, place: Place) -> float | None:
         """The value of a variable; None: empty."""
 
     def exists(self, name: str) -> bool:
@@ -69,7 +70,7 @@ class Scanner:
     ----------
     text, columns
         The block, and the column of each of its characters in the line.
-    line, name
+    place
         Where it stands, for errors.
     family
         `NGC`, `MACRO_B` or `EITHER`.
@@ -83,8 +84,7 @@ class Scanner:
 
     text: str
     columns: Sequence[int]
-    line: int
-    name: str
+    place: Place
     family: str
     of_word: bool = False
     at: int = 0
@@ -117,9 +117,7 @@ class Scanner:
 
     def fail(self, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
         """An error at a column, unless given that of the next character."""
-        return ProgramError(
-            found, expected=expected, hint=hint, file=self.name, line=self.line, column=column or self.column
-        )
+        return self.place.fail(found, expected, hint, column or self.column)
 
     def rest(self) -> str:
         """The next few characters, for errors."""
@@ -174,11 +172,10 @@ class Scanner:
 
     def variable(self) -> Value:
         """The variable after a `#`."""
-        column, line, name = self.column, self.line, self.name
-        place = self.place()
-        return lambda variables: variables.get(place(variables), line, column, name)
+        where, which = self.place._replace(column=self.column), self.which()
+        return lambda variables: variables.get(which(variables), where)
 
-    def place(self) -> Callable[[Variables], str | int]:
+    def which(self) -> Callable[[Variables], str | int]:
         """Which variable a `#` means: a number, the number that another one holds, an expression, a name."""
         column = self.column
         named = self.match(NAME)

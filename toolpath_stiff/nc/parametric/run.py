@@ -11,7 +11,7 @@ from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.interpreter import (
     DEEPEST,
@@ -34,6 +34,7 @@ from toolpath_stiff.nc.parametric.statements import (
 )
 from toolpath_stiff.nc.parametric.structure import Structure, arguments_of, loops_of, structure_of
 from toolpath_stiff.nc.parametric.variables import Level, Variables
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import Call, Flow, GoTo, State, Then
 from toolpath_stiff.nc.words import Block, Word, read_lines
 
@@ -119,16 +120,12 @@ class ParametricRun(ProgramRun):
 
     # -- blocks ----------------------------------------------------------------------------------------------------
 
-    def _place(self, at: int) -> tuple[str, int]:
+    def _place(self, at: int) -> Place:
         """File and line (from 1) of a line that is read."""
         for first, stop, name in self._files:
             if first <= at < stop:
-                return name, at - first + 1
-        return self.name, at + 1
-
-    def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
-        name, line = self._place(at)
-        return ProgramError(found, expected=expected, hint=hint, file=name, line=line, column=column)
+                return Place(name, at - first + 1)
+        return super()._place(at)
 
     def _steered(self, at: int) -> int | None:
         """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
@@ -155,8 +152,7 @@ class ParametricRun(ProgramRun):
     def _statement(self, at: int) -> Statement:
         found = self._statements.get(at)
         if found is None:
-            name, line = self._place(at)
-            found = read_statement(self.lines[at], line, name, self.family, self.state.dialect)
+            found = read_statement(self.lines[at], self._place(at), self.family, self.state.dialect)
             self._statements[at] = found
         return found
 
@@ -189,10 +185,9 @@ class ParametricRun(ProgramRun):
 
     def _assign(self, assignments: tuple[Assignment, ...], at: int) -> None:
         """Set variables, once all values are known (LinuxCNC, "Numbered Parameters")."""
-        known = [(a.place(self.variables), a.value(self.variables), a.column) for a in assignments]
-        name, line = self._place(at)
-        for place, value, column in known:
-            self.variables.set(place, value, line, column, name)
+        known = [(a.which(self.variables), a.value(self.variables), a.column) for a in assignments]
+        for which, value, column in known:
+            self.variables.set(which, value, self._place(at)._replace(column=column))
 
     def _line_of_call(self) -> int:
         """The line of the main file from which a subprogram's file is called: its moves are of that line."""
@@ -215,7 +210,7 @@ class ParametricRun(ProgramRun):
         if self._earlier is not None and self._earlier[0] == now and self._earlier[1] == self._modes():
             raise self._fail(
                 at,
-                f"the loop back to line {self._place(to)[1]} never ends: no variable or position changes in it",
+                f"the loop back to line {self._place(to).line} never ends: no variable or position changes in it",
                 "a loop whose condition becomes false",
             )
         if self._passes & (self._passes - 1) == 0:
@@ -224,11 +219,10 @@ class ParametricRun(ProgramRun):
         if moves != self._idle[0]:
             self._idle = moves, self._steps
         elif self._steps - self._idle[1] > MOST_IDLE:
-            raise self._fail(
-                at,
-                f"more than {MOST_IDLE:,} blocks of loops without a move, back to line {self._place(to)[1]} each time",
-                "a loop that ends: see whether its condition becomes false",
+            found = (
+                f"more than {MOST_IDLE:,} blocks of loops without a move, back to line {self._place(to).line} each time"
             )
+            raise self._fail(at, found, "a loop that ends: see whether its condition becomes false")
 
     def _values(self, at: int) -> list[object]:
         """Where the run is, and the numbers that a loop's condition reads."""
@@ -252,7 +246,7 @@ class ParametricRun(ProgramRun):
         try:
             return self._act(block)
         except InputError as error:
-            error.file, error.line = self._place(self._at)  # the block stands on the line that calls its file
+            error.file, error.line, _ = self._place(self._at)  # the block stands on the line that calls its file
             raise
 
     def _act(self, block: Block) -> Then:
@@ -517,7 +511,7 @@ class ParametricRun(ProgramRun):
                     self._numbers.setdefault((self._program_of(index), int(match[1] or 0)), []).append(index)
         found = self._numbers.get((self._program_of(at), round(target)), []) if target == round(target) else []
         if len(found) != 1:
-            places = ", ".join(str(self._place(index)[1]) for index in found)
+            places = ", ".join(str(self._place(index).line) for index in found)
             raise self._fail(
                 at,
                 f"the run goes on at N{target:g}, which " + (f"is in the lines {places}" if found else "no block has"),
@@ -528,7 +522,7 @@ class ParametricRun(ProgramRun):
             if start < found[0] < end and not start < at < end:
                 raise self._fail(
                     at,
-                    f"a jump into the loop that begins in line {self._place(start)[1]}",
+                    f"a jump into the loop that begins in line {self._place(start).line}",
                     "a block outside of loops",
                     column=column,
                 )

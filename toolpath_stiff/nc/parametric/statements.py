@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.controller import Dialect
 from toolpath_stiff.nc.parametric.expressions import EITHER, MACRO_B, NGC, Scanner, Value
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.words import (
     LETTERS,
     WORD,
@@ -104,12 +104,10 @@ def family_of(lines: tuple[str, ...], dialect: Dialect, name: str) -> str:
         if first is not None:
             signs[family] = first
     if len(signs) == 2:
-        raise ProgramError(
+        raise Place(name, max(signs.values())).fail(
             f"line {signs[NGC]} is of LinuxCNC's language (O words, #<name>, **), line {signs[MACRO_B]} of Macro B "
             "(IF GOTO, WHILE DO, G65)",
             hint="name the control with --dialect",
-            file=name,
-            line=max(signs.values()),
         )
     return next(iter(signs), EITHER)
 
@@ -131,9 +129,9 @@ class Label:
 
 @dataclass(frozen=True)
 class Assignment:
-    """`#place = value`."""
+    """`#which = value`."""
 
-    place: Callable[[Variables], str | int]
+    which: Callable[[Variables], str | int]
     value: Value
     column: int
 
@@ -190,32 +188,32 @@ class Statement:
     percent: bool = False
 
 
-def read_statement(text: str, line: int, name: str, family: str, dialect: Dialect) -> Statement:
+def read_statement(text: str, place: Place, family: str, dialect: Dialect) -> Statement:
     """Read one line. Raises `InputError` with line and column.
 
     Examples
     --------
     >>> from toolpath_stiff.nc.controller import GENERIC
-    >>> read_statement("o<slot> call [10] [#2]", 1, "part.ngc", NGC, GENERIC).steering.kind
+    >>> read_statement("o<slot> call [10] [#2]", Place("part.ngc", 1), NGC, GENERIC).steering.kind
     'CALL'
     """
-    compact, columns = without_comments(text, line, name, dialect.semicolon)
+    compact, columns = without_comments(text, place, dialect.semicolon)
     if not compact:
-        return Statement(line)
+        return Statement(place.line)
     if compact == "%":
-        return Statement(line, percent=True)
-    check_length(compact, line, name)
-    start, switch = block_delete(compact, 0, columns, line, name) if compact[0] == "/" else (0, 1)
-    block = Scanner(compact, columns, line, name, family, at=start)
+        return Statement(place.line, percent=True)
+    check_length(compact, place)
+    start, switch = block_delete(compact, 0, columns, place) if compact[0] == "/" else (0, 1)
+    block = Scanner(compact, columns, place, family, at=start)
     optional = start > 0
     block.match(_N_WORD)
     if block.done:
-        return Statement(line, optional=optional, switch=switch)
+        return Statement(place.line, optional=optional, switch=switch)
     steering = _steering(block)
     if steering is not None:
-        return Statement(line, steering=steering, optional=optional, switch=switch)
+        return Statement(place.line, steering=steering, optional=optional, switch=switch)
     words, assignments = _contents(block, text)
-    return Statement(line, tuple(words), tuple(assignments), None, optional, switch)
+    return Statement(place.line, tuple(words), tuple(assignments), None, optional, switch)
 
 
 def _steering(block: Scanner) -> Steering | None:
@@ -315,7 +313,7 @@ def _contents(block: Scanner, text: str) -> tuple[list[tuple[str, Value | float,
     words: list[tuple[str, Value | float, int, str]] = []
     assignments: list[Assignment] = []
     if block.text[block.at] in "O:":  # the program's number
-        (word,) = program_number(block.text[block.at :], block.column, block.line, block.name).words
+        (word,) = program_number(block.text[block.at :], block.column, block.place).words
         return [(word.letter, word.value, word.column, word.text)], assignments
     while not block.done:
         column = block.column
@@ -342,7 +340,7 @@ def _contents(block: Scanner, text: str) -> tuple[list[tuple[str, Value | float,
         words.append((letter, value, column, written))
     # The numbers that codes and tools may have, as in any other program.
     plain_words = [Word(one[0], one[1], one[2], one[3]) for one in words if isinstance(one[1], float)]
-    through_pygcode(plain_words, block.line, block.name)
+    through_pygcode(plain_words, block.place)
     return words, assignments
 
 
@@ -355,14 +353,14 @@ def _assignment(block: Scanner) -> Assignment:
     column = block.column
     if not block.next("#"):
         raise block.fail(f"{block.rest()} is not an assignment", "#1=...")
-    place = block.place()
+    which = block.which()
     if not block.next("="):
         raise block.fail(f"a variable without its letter or `=`: {block.rest()}", "X#1, or #1=...", column=column)
     if block.done:
         raise block.fail("an assignment without a value", "#1=...")
     # A whole expression in Macro B; in NGC one value, so that an operator after it is an error.
     value = block.value() if block.family == NGC else block.expression()
-    return Assignment(place, value, column)
+    return Assignment(which, value, column)
 
 
 def plain_word(letter: str, value: float, column: int, written: str, computed: bool) -> Word:

@@ -12,10 +12,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.motion import know_height
 from toolpath_stiff.nc.codes.points import know_place
 from toolpath_stiff.nc.parametric.expressions import EITHER, MACRO_B, NGC
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, ToolEntry
 from toolpath_stiff.nc.words import AXES, Block, Word
@@ -67,13 +67,13 @@ class Variables:
 
     # -- reading ---------------------------------------------------------------------------------------------------
 
-    def get(self, place: str | int, line: int, column: int, name: str) -> float | None:
+    def get(self, which: str | int, place: Place) -> float | None:
         """The value of a variable; None: empty. Raises `InputError` for one that is not known."""
         try:
-            return self._named(place) if isinstance(place, str) else self._numbered(place, line, column, name)
+            return self._named(which) if isinstance(which, str) else self._numbered(which, place)
         except LookupError as error:
             found, hint = error.args
-            raise ProgramError(found, hint=hint, file=name, line=line, column=column) from None
+            raise place.fail(found, hint=hint) from None
 
     def exists(self, name: str) -> bool:
         """Whether a named variable has a value."""
@@ -97,7 +97,7 @@ class Variables:
             f"the variable #<{name.lower()}> is read before it is set", "set it before, in the same subprogram"
         )
 
-    def _numbered(self, number: int, line: int, column: int, name: str) -> float | None:
+    def _numbered(self, number: int, place: Place) -> float | None:
         if number == 0 and self.family != NGC:
             return None
         if 1 <= number <= LOCALS[self.family]:
@@ -111,7 +111,7 @@ class Variables:
             )
         else:
             system = self._ngc_system if self.family == NGC else self._macro_system
-            return system(number, Word("#", float(number), column, f"#{number}"), line, name)
+            return system(number, place)
         if number in found:
             return found[number]
         return self._unset(number)
@@ -144,25 +144,20 @@ class Variables:
 
     # -- writing ---------------------------------------------------------------------------------------------------
 
-    def set(self, place: str | int, value: float | None, line: int, column: int, name: str) -> None:
+    def set(self, which: str | int, value: float | None, place: Place) -> None:
         """Set a variable. Raises `InputError` for one that a program cannot set."""
-        if isinstance(place, str):
+        if isinstance(which, str):
             assert value is not None
-            if place in PREDEFINED:
-                raise self._refused(f"#<{place.lower()}> is the control's own", "another name", line, column, name)
-            (self.named if place.startswith("_") else self.levels[-1].named)[place] = value
-        elif 1 <= place <= LOCALS[self.family]:
-            self.levels[-1].numbered[place] = value
-        elif self._settable(place):
-            self.common[place] = value
-        elif self.family == MACRO_B and value is not None and self._set_macro_system(place, value, line, column, name):
-            pass
-        else:
+            if which in PREDEFINED:
+                raise place.fail(f"#<{which.lower()}> is the control's own", "another name")
+            (self.named if which.startswith("_") else self.levels[-1].named)[which] = value
+        elif 1 <= which <= LOCALS[self.family]:
+            self.levels[-1].numbered[which] = value
+        elif self._settable(which):
+            self.common[which] = value
+        elif self.family != MACRO_B or value is None or not self._set_macro_system(which, value, place):
             known = f"#31 to #{NGC_LAST}" if self.family == NGC else "#1 to #33, #100 to #199, #500 to #999"
-            raise self._refused(f"#{place} cannot be set here", known, line, column, name)
-
-    def _refused(self, found: str, expected: str, line: int, column: int, name: str) -> InputError:
-        return ProgramError(found, expected=expected, file=name, line=line, column=column)
+            raise place.fail(f"#{which} cannot be set here", known)
 
     # -- what the control keeps ------------------------------------------------------------------------------------
 
@@ -176,10 +171,11 @@ class Variables:
             return degrees + 360.0
         raise ValueError("controls differ in angles below 0: name the control with --dialect")
 
-    def position(self, axis: int, word: Word, line: int, name: str) -> float:
+    def position(self, axis: int, shown: str, place: Place) -> float:
         """The present point in program coordinates and units; refused where controls may have another one."""
         state, frames = self.state, self.state.frames
-        block = CurrentBlock(name, Block(line, (word,)))
+        word = Word("#", 0.0, place.column or 1, shown)
+        block = CurrentBlock(place.name, Block(place.line, (word,)))
         if axis == 2:
             know_height(state, block, word)
         if axis < 2:
@@ -193,9 +189,9 @@ class Variables:
         value = frames.to_program(frames.position)[axis]
         return value / state.length_scale if axis < 3 else value
 
-    def _ngc_system(self, number: int, word: Word, line: int, name: str) -> float:
+    def _ngc_system(self, number: int, place: Place) -> float:
         if NGC_POSITION <= number < NGC_POSITION + 6:
-            return self.position(number - NGC_POSITION, word, line, name)
+            return self.position(number - NGC_POSITION, f"#{number}", place)
         if NGC_POSITION + 6 <= number < NGC_POSITION + 9:
             return 0.0  # U, V, W, which this machine does not have
         if number == NGC_TOOL:
@@ -207,7 +203,7 @@ class Variables:
             "put the number into the program",
         )
 
-    def _macro_system(self, number: int, word: Word, line: int, name: str) -> float:
+    def _macro_system(self, number: int, place: Place) -> float:
         state = self.state
         for first in MACRO_POSITIONS:
             axis = number - first
@@ -216,7 +212,7 @@ class Variables:
                     raise LookupError(
                         f"#{number} under a tool length, where controls differ", f"#{MACRO_POSITIONS[0] + axis}"
                     )
-                return self.position(axis, word, line, name)
+                return self.position(axis, f"#{number}", place)
         if number in TOOL_LENGTHS:
             tool = (state.tools or {}).get(number - TOOL_LENGTHS.start + 1)
             if tool is None or math.isnan(tool.length):
@@ -261,34 +257,27 @@ class Variables:
             raise LookupError(f"the modal state #{number} is not known here", "put the number into the program")
         return value
 
-    def _set_macro_system(self, number: int, value: float, line: int, column: int, name: str) -> bool:
+    def _set_macro_system(self, number: int, value: float, place: Place) -> bool:
         """Set a system variable of Macro B; whether it is one."""
         state = self.state
-        word = Word("#", float(number), column, f"#{number}")
         if number == 3000:
-            raise self._refused(
-                f"the program stops with its alarm {value:g} (#3000)", "a program that runs through", line, column, name
-            )
+            raise place.fail(f"the program stops with its alarm {value:g} (#3000)", "a program that runs through")
         if number in (3003, 3004, 3006):
-            state.note(line, word, "single block, feed hold or a message: the path does not depend on it")
+            word = Word("#", float(number), place.column or 1, f"#{number}")
+            state.note(place.line, word, "single block, feed hold or a message: the path does not depend on it")
             return True
         if number in TOOL_LENGTHS:
             state.tools = {} if state.tools is None else state.tools
             tool = number - TOOL_LENGTHS.start + 1
             state.tools.setdefault(tool, ToolEntry(tool)).length = value * state.length_scale
             return True
-        place = self._offset_place(number)
-        if place is None:
+        offset_place = self._offset_place(number)
+        if offset_place is None:
             return False
-        index, axis = place
+        index, axis = offset_place
         if index == state.frames.active:
-            raise self._refused(
-                f"#{number} changes the work offset in force",
-                f"G10 L2 P{index + 1}, whose effect is defined",
-                line,
-                column,
-                name,
-            )
+            expected = f"G10 L2 P{index + 1}, whose effect is defined"
+            raise place.fail(f"#{number} changes the work offset in force", expected)
         offset = state.frames.offsets.table[index]
         offset.axes[axis] = value * (state.length_scale if axis < 3 else 1.0)
         offset.given = True
@@ -296,10 +285,8 @@ class Variables:
 
 
 def _axis(axis: int) -> Callable[[Variables], float]:
-    letter = AXES[axis]
-    return lambda variables: variables.position(
-        axis, Word("#", 0.0, 1, f"#<_{letter.lower()}>"), variables.line, variables.state.name
-    )
+    shown = f"#<_{AXES[axis].lower()}>"
+    return lambda variables: variables.position(axis, shown, Place(variables.state.name, variables.line, 1))
 
 
 def _motion_mode(variables: Variables) -> float:

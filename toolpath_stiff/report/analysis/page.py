@@ -30,14 +30,13 @@ from toolpath_stiff.report.words import (
     duration,
     headline_text,
     length_in_moves,
-    number,
     only_plunges,
     plain,
     plunges_beside,
     shortened,
     span_of,
 )
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
@@ -45,42 +44,14 @@ if TYPE_CHECKING:
 SCRIPTS = ("stage.js", "viewer.js", "profile.js", "analysis.js")
 
 
-def page(
-    analysis: Analysis,
-    summary: Mapping[str, Any],
-    *,
-    required: float | None = None,
-    other: Analysis | None = None,
-    show_plunges: bool = False,
-) -> str:
-    """The page as text; arguments as of `page_pieces`."""
-    return "".join(page_pieces(analysis, summary, required=required, other=other, show_plunges=show_plunges))
+def page(analysis: Analysis, *, show_plunges: bool = False) -> str:
+    """The page as text."""
+    return "".join(page_pieces(analysis, show_plunges=show_plunges))
 
 
-def page_pieces(
-    analysis: Analysis,
-    summary: Mapping[str, Any],
-    *,
-    required: float | None = None,
-    other: Analysis | None = None,
-    show_plunges: bool = False,
-) -> Iterator[str]:
-    """The page in pieces of text.
-
-    Parameters
-    ----------
-    analysis
-        What to show.
-    summary
-        As in `summary.json`, for the tables.
-    required
-        N/m: drawn in the profile.
-    other
-        The same program on another machine: a second curve.
-    show_plunges
-        How the switch stands that lets plunges set the axis and the colour scale.
-    """
-    data = page_data(analysis, required, other)
+def page_pieces(analysis: Analysis, *, show_plunges: bool = False) -> Iterator[str]:
+    """The page in pieces of text; `show_plunges`: how the switch stands that lets plunges set axis and colour scale."""
+    summary, data = analysis.to_dict(), page_data(analysis)
     return render_pieces(
         "analysis.html",
         styles=["viewer.css", "analysis.css"],
@@ -293,7 +264,7 @@ NONE = 65535  # a value that does not exist
 OUT_OF_REACH, PLUNGE = 8, 16  # flags beside the motion
 
 
-def page_data(analysis: Analysis, required: float | None, other: Analysis | None) -> dict[str, Any]:
+def page_data(analysis: Analysis) -> dict[str, Any]:
     """What the page's script reads: lengths in mm, angles in degrees, stiffness in N/mm.
 
     Positions are 16-bit fractions of the path's own box (`frame`: a 1 m box gives 0.015 mm), stiffness and margin of
@@ -326,14 +297,14 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "kind": _base64(kind.astype("u1")),
         "tools": [[int(i), int(samples.tool[i])] for i in tool_starts],
         "operations": _operation_starts(analysis, samples.move),
-        "weakest": [int(np.searchsorted(rows, row)) for row in analysis.weakest],
+        "weakest": [int(np.searchsorted(rows, row)) for row in analysis.weakest_rows],
         "scale": _scale(analysis, False),
         "scale_with_plunges": _scale(analysis, True) if analysis.set_aside.any() else None,
         "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
         **page_colours(),
         "mean": stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"],
-        "required": None if required is None else n_per_mm_from_n_per_m(required),
-        "other": None if other is None else _other_curve(other),
+        "required": None if analysis.required is None else n_per_mm_from_n_per_m(analysis.required),
+        "other": None if analysis.on_other is None else _other_curve(analysis.on_other),
     }
 
 
@@ -358,7 +329,7 @@ def page_rows(analysis: Analysis) -> IntArray:
     extremes = [extremes_by_column(np.arange(n, dtype=float), k, MOST_SAMPLES // part) for k, part in curves]
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too
     firsts = np.searchsorted(analysis.samples.move, [row.first_move for row in analysis.operations.rows])
-    wanted = np.array([0, *analysis.weakest], dtype=np.int64)
+    wanted = np.array([0, *analysis.weakest_rows], dtype=np.int64)
     return np.unique(np.concatenate([*extremes, even, ends, wanted, firsts, np.maximum(firsts - 1, 0)]))
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.report.captions import add_heading, add_legend, add_words
 from toolpath_stiff.report.figure import (
     CLASSES,
     COLOUR_MAP,
@@ -21,9 +19,8 @@ from toolpath_stiff.report.figure import (
     new_figure,
     picture,
 )
-from toolpath_stiff.report.painting import add_scales, add_strokes, label_places, new_pen, paint, painted_axes
-from toolpath_stiff.report.words import number
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.painting import add_heading, add_legend, label_places
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,6 +54,7 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     that is seen of them from above; with `show_plunges` they are on the colour scale like the rest.
     """
     from matplotlib import colormaps
+    from matplotlib.collections import LineCollection
 
     samples, limits = analysis.samples, scale_limits(analysis, show_plunges)
     points, strokes, lines = _coloured_lines(
@@ -64,16 +62,19 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     )
     middle, span = _frame(*cutting_box(samples))
     figure, views, corner = _lay_out(span)
-    places = analysis.weakest
+    places = analysis.weakest_rows
     for axes, (across, up, title) in zip(
         views, ((0, 1, "XY  top"), (0, 2, "XZ  front"), (1, 2, "YZ  side, from +X")), strict=True
     ):
         box = axes.get_position()
-        add_words(figure, box.x0, box.y1 + TITLE / POINTS / figure.get_figheight(), title, size=11.0, weight="bold")
+        figure.text(box.x0, box.y1 + TITLE / POINTS / figure.get_figheight(), title, size=11.0, weight="bold")
         _set_up(axes, across, up, middle, span)
         seen = points[:, [across, up]]
         shown = _thinned(seen, strokes, axes) if len(points) > MOST_LINES else strokes
-        add_strokes(axes, [(_polyline(seen, rows), colour) for rows, colour in shown], STROKE, zorder=3)
+        curves, colours = [_polyline(seen, rows) for rows, _ in shown], [colour for _, colour in shown]
+        axes.add_collection(
+            LineCollection(curves, colors=colours, linewidths=STROKE, capstyle="round", zorder=3), autolim=False
+        )
         for xyz, style in lines:
             axes.plot(xyz[:, across], xyz[:, up], **style)
         spots = [(float(x), float(y)) for x, y in mm_from_m(samples.position[places][:, [across, up]])]
@@ -190,7 +191,7 @@ def _lay_out(span: FloatArray) -> tuple[Figure, list[Axes], tuple[float, float, 
     figure = new_figure(WIDTH, height)
 
     def view(across: float, up: float, wide: float, tall: float) -> Axes:
-        return painted_axes(figure, (across / WIDTH, up / height, wide / WIDTH, tall / height))
+        return figure.add_axes((across / WIDTH, up / height, wide / WIDTH, tall / height))
 
     upper, second = BOTTOM + z * scale + BETWEEN, left + x * scale + BETWEEN
     views = [
@@ -212,7 +213,6 @@ def _set_up(axes: Axes, across: int, up: int, middle: FloatArray, span: FloatArr
     box = axes.get_window_extent()
     axes.xaxis.set_major_locator(MaxNLocator(max(2, int(box.width // 75)), steps=[1, 2, 2.5, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(max(2, int(box.height // 50)), steps=[1, 2, 2.5, 5, 10]))
-    add_scales(axes)
 
 
 def _legend(
@@ -238,7 +238,9 @@ def _legend(
         keys.append((Line2D([], [], color=UNREACHABLE_RED, linewidth=2.2), "out of reach"))
     ring = Line2D([], [], color="none", linestyle="none", marker="o", markersize=8, markeredgecolor=INK)
     keys.append((ring, "weakest places"))
-    add_legend(figure, keys, ((x - 0.1) / width, (middle - 0.45) / height), rows=across <= 4.0, colour=MUTED)
+    columns = 1 if across <= 4.0 else len(keys)
+    place = (x - 0.1) / width, (middle - 0.45) / height
+    add_legend(figure, keys, place, loc="upper left", ncols=columns, labelcolor=MUTED)
 
 
 def _colour_scale(
@@ -246,44 +248,18 @@ def _colour_scale(
 ) -> None:
     """The colours and what they stand for; `box` (x, y, width, height in inches) holds the points at its ends too."""
     from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     (width, height), (x, y, wide, tall) = figure.get_size_inches(), box
-    left, right = extend in ("min", "both"), extend in ("max", "both")
-    inside = wide / (1.0 + POINT * (left + right))
-    start = x + POINT * inside * left
-    axes = painted_axes(figure, (start / width, y / height, inside / width, tall / height))
-    axes.set_xlim(*limits)
-    axes.set_xlabel("stiffness along the load, N/mm")
-    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(wide / 0.75)), steps=[1, 2, 2.5, 5, 10]))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if limits[1] - limits[0] > 5 else 2)))
-    axes.grid(visible=False)
-    axes.patch.set_visible(False)
-    axes.spines[:].set_visible(False)
-    colours = colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES))
-    paint(axes, partial(_paint_colours, colours=colours, left=left, right=right), zorder=1.0)
-    add_scales(axes, ("bottom",))
-
-
-def _paint_colours(renderer: Any, axes: Axes, colours: FloatArray, left: bool, right: bool) -> None:
-    """Fields beside each other, on whole pixels, so that no line shows between them; points at ends beyond."""
-    from matplotlib.path import Path
-    from matplotlib.transforms import IdentityTransform
-
-    low, high = round(axes.bbox.y0), round(axes.bbox.y1)
-    edges = np.round(np.linspace(axes.bbox.x0, axes.bbox.x1, len(colours) + 1)).tolist()
-    reach, middle = POINT * (edges[-1] - edges[0]), (low + high) / 2.0
-    fields = [
-        (colour, [(a, low), (b, low), (b, high), (a, high)])
-        for colour, a, b in zip(colours, edges[:-1], edges[1:], strict=True)
-    ]
-    if left:
-        fields.append((colours[0], [(edges[0], low), (edges[0], high), (edges[0] - reach, middle)]))
-    if right:
-        fields.append((colours[-1], [(edges[-1], low), (edges[-1] + reach, middle), (edges[-1], high)]))
-    for colour, corners in fields:
-        with new_pen(renderer, None, colour, 0.0) as pen:
-            renderer.draw_path(pen, Path(corners), IdentityTransform(), tuple(colour))
+    axes = figure.add_axes((x / width, y / height, wide / width, tall / height))
+    figure.colorbar(
+        ScalarMappable(Normalize(*limits), colormaps[COLOUR_MAP].resampled(CLASSES)), cax=axes,
+        orientation="horizontal", extend=extend, extendfrac=POINT, label="stiffness along the load, N/mm",
+        ticks=MaxNLocator(max(2, int(wide / 0.75)), steps=[1, 2, 2.5, 5, 10]),
+        format=FuncFormatter(lambda value, _: number(value, 0 if limits[1] - limits[0] > 5 else 2)),
+    )  # fmt: skip
 
 
 def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float, float]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import math
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
+from toolpath_stiff.analysis.document import compare_summaries
+from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
 from toolpath_stiff.files import Content
-from toolpath_stiff.hints import both_names
+from toolpath_stiff.report.analysis.page import page_pieces
+from toolpath_stiff.report.analysis.path import path_picture
+from toolpath_stiff.report.profile import profile_picture
 from toolpath_stiff.report.words import (
     FIGURES,
     LABEL,
@@ -21,13 +23,13 @@ from toolpath_stiff.report.words import (
     labelled,
     length_in_moves,
     machine_text,
-    number,
     only_plunges,
     plain,
     plunges_beside,
     shortened,
 )
-from toolpath_stiff.units import n_per_mm_from_n_per_m
+from toolpath_stiff.results import one_of
+from toolpath_stiff.units import number
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis.results import Analysis
@@ -38,113 +40,41 @@ def names(plots: bool = True, table: str = "csv") -> tuple[str, ...]:
     return (f"samples.{table}", "summary.json", *(("path.png", "profile.png", "report.html") if plots else ()))
 
 
-def files(
-    analysis: Analysis,
-    *,
-    plots: bool = True,
-    table: Literal["csv", "parquet"] = "csv",
-    required: float | None = None,
-    other: Analysis | None = None,
-    show_plunges: bool = False,
-    summary: Mapping[str, Any] | None = None,
-) -> dict[str, Callable[[], Content]]:
-    """Name of each file -> what makes it: samples, summary, pictures and page.
+def files(analysis: Analysis, plots: bool, table: str, show_plunges: bool) -> dict[str, Callable[[], Content]]:
+    """Name of each file -> what makes it: samples as "csv" or "parquet", summary, with `plots` pictures and page.
 
-    Parameters
-    ----------
-    analysis
-        What to report.
-    plots
-        `path.png`, `profile.png` and `report.html` too.
-    table
-        Format of the samples.
-    required
-        Stiffness that every cutting move should have, N/m: drawn and listed.
-    other
-        The same program on another machine, for comparison.
-    show_plunges
-        The axes and colour scales of pictures and page hold the plunges beside the headline figures too.
-    summary
-        `summary_with_options` of the same, where it has been made already.
+    With `show_plunges` axes and colour scales hold the plunges beside the headline figures too.
     """
-    from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
-
-    document = summary_with_options(analysis, required, other) if summary is None else summary
+    samples = TABLES[one_of("table", table, tuple(TABLES))]
     contents: dict[str, Callable[[], Content]] = {
-        f"samples.{table}": lambda: samples_parquet(analysis) if table == "parquet" else samples_csv(analysis),
-        "summary.json": lambda: json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        f"samples.{table}": lambda: samples(analysis),
+        "summary.json": analysis.to_json,
     }
     if plots:
-        from toolpath_stiff.report.analysis.page import page_pieces
-        from toolpath_stiff.report.analysis.path import path_picture
-        from toolpath_stiff.report.profile import profile_picture
-
         contents["path.png"] = lambda: path_picture(analysis, show_plunges=show_plunges)
-        contents["profile.png"] = lambda: profile_picture(
-            analysis, other=other, required=required, show_plunges=show_plunges
-        )
-        contents["report.html"] = lambda: page_pieces(
-            analysis, document, required=required, other=other, show_plunges=show_plunges
-        )
+        contents["profile.png"] = lambda: profile_picture(analysis, show_plunges=show_plunges)
+        contents["report.html"] = lambda: page_pieces(analysis, show_plunges=show_plunges)
     return contents
 
 
-def text(summary: Mapping[str, Any], source: Sequence[str] = (), other: Mapping[str, Any] | None = None) -> str:
-    """What the terminal shows: the figures, the other machine beside them, the lines below the required stiffness.
-
-    `summary` and `other` (the other machine's) as in `summary.json`; `source` the program's lines.
-    """
-    lines = [terminal_table(summary), *([comparison_table(summary, other)] if other is not None else [])]
+def text(analysis: Analysis) -> str:
+    """What the terminal shows: the figures, the other machine beside them, the lines below the required stiffness."""
+    summary, source = analysis.to_dict(), analysis.program.source
+    lines = [terminal_table(summary)]
+    if analysis.on_other is not None:
+        lines.append(comparison_table(summary, analysis.on_other.to_dict()))
     required = summary.get("required") or {"below": []}
     if required["below"]:
         lines.append(f"below the required {required['required_N_per_mm']:g} N/mm:")
         for entry in required["below"]:
             shown = source[entry["line"] - 1].strip() if source else ""
             lowest = entry["min_N_per_mm"]
-            found = "no stiffness (out of reach, or no motion)" if lowest is None else f"{lowest:.0f} N/mm"
-            lines.append(f"  line {entry['line']}: {found}  {shown}")
+            stiffness = "no stiffness (out of reach, or no motion)" if lowest is None else f"{lowest:.0f} N/mm"
+            lines.append(f"  line {entry['line']}: {stiffness}  {shown}")
     return "\n".join(lines)
 
 
-def summary_with_options(analysis: Analysis, required: float | None, other: Analysis | None) -> dict[str, Any]:
-    """`analysis.summary()`, with `required` and `compare` where these were asked for; no nan, no infinity."""
-    from toolpath_stiff.analysis.results import required_stiffness_missed
-
-    summary = dict(analysis.summary())
-    if required is not None:
-        summary["required"] = {
-            "required_N_per_mm": n_per_mm_from_n_per_m(required),
-            "below": [
-                {"line": line, "min_N_per_mm": lowest} for line, lowest in required_stiffness_missed(analysis, required)
-            ],
-        }
-    if other is not None:
-        found = dict(other.summary())
-        summary["compare"] = compare_summaries(summary, found)
-        summary["warnings"] = [*analysis.warnings, *_of_other(found)]
-    finite: dict[str, Any] = _without_nan(summary)
-    return finite
-
-
-def _of_other(summary: Mapping[str, Any]) -> list[str]:
-    """What the other machine's effects wait for: without them the two machines may look the same."""
-    return [
-        f"{both_names('--compare', summary['machine'])}: {one['effect']} does not act: {one['reason']}"
-        for one in summary["effects_idle"]
-    ]
-
-
-def _without_nan(value: Any) -> Any:
-    """The same with None for every float that JSON cannot hold."""
-    if isinstance(value, dict):
-        return {key: _without_nan(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
+TABLES = {"csv": samples_csv, "parquet": samples_parquet}
 MOST_OPERATIONS = 12  # rows; all are in summary.json
 
 
@@ -337,32 +267,3 @@ def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
     return (
         aligned(first_column_fitted(rows)) + notes + ([f"and {more} more operations in summary.json"] if more else [])
     )
-
-
-def compare_summaries(summary: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """The entry `compare` of `summary.json`.
-
-    The other machine's figures, and `difference_percent`: how much higher each is than the first machine's
-    (None where a figure is missing, or the first machine's is zero); the same for the mean of the plunges.
-    """
-    difference = {
-        name.partition("_N_per")[0].removesuffix("_um"): _higher(summary.get(name), other.get(name)) for name in FIGURES
-    }
-    plunges = [(one.get("plunges") or {}).get("mean_N_per_mm") for one in (summary, other)]
-    return {
-        "machine": other["machine"],
-        "effects": list(other.get("effects") or ()),
-        **{name: other.get(name) for name in FIGURES},
-        "weakest": other.get("weakest"),
-        "out_of_reach_samples": other.get("out_of_reach_samples"),
-        "extrapolated_share": other.get("extrapolated_share"),
-        "difference_percent": difference,
-        "headline": other.get("headline"),
-        "plunges": other.get("plunges"),
-        "plunges_difference_percent": _higher(*plunges),
-    }
-
-
-def _higher(first: float | None, second: float | None) -> float | None:
-    """By how much the second is higher, in percent of the first; None where that cannot be said."""
-    return None if first is None or second is None or not first else (second - first) / first * 100.0

@@ -1,4 +1,4 @@
-// ---------------------------------------------------------------- data
+// Data.
 const data = JSON.parse(document.getElementById("data").textContent);
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
 const NONE = 65535, RAPID = 0, OUT = 8, PLUNGE = 16;
@@ -19,7 +19,8 @@ const margin = unpack(data.margin, data.margin_range);
 const angles = data.angles && data.angles.map((text, axis) => unpack(text, data.angle_ranges[axis]));
 const line = new Uint32Array(bytes(data.line)), s = new Float32Array(bytes(data.s));
 const kind = new Uint8Array(bytes(data.kind));
-const other = data.other && { s: new Float32Array(bytes(data.other.s)), k: new Float32Array(bytes(data.other.stiffness)), plunge: new Uint8Array(bytes(data.other.plunge)) };
+const other = data.other && { s: new Float32Array(bytes(data.other.s)),
+  k: new Float32Array(bytes(data.other.stiffness)), plunge: new Uint8Array(bytes(data.other.plunge)) };
 const cutting = (i) => (kind[i] & 7) !== RAPID;
 // Plunges along the tool axis: unless the switch is on they set neither the colours nor the axis of the profile.
 const rapidsBox = document.getElementById("rapids"), plungesBox = document.getElementById("plunges");
@@ -34,11 +35,11 @@ const operationRange = (k) => [operations[k][0], k + 1 < operations.length ? ope
 const operationName = (k) => `${k + 1} ${operations[k][1]}`;
 function operationOf(i) {
   let low = 0, high = operations.length;
-  while (low < high) { const middle = (low + high) >> 1; if (operations[middle][0] <= i) low = middle + 1; else high = middle; }
+  while (low < high) { const middle = (low + high) >> 1; if (operations[middle][0] <= i) low = middle + 1;
+    else high = middle; }
   return low - 1;
 }
-
-// ---------------------------------------------------------------- colours
+// Colours.
 const CLASSES = data.colours.length;
 const scaleNow = () => plungesBox.checked && data.scale_with_plunges || data.scale;
 const coloursNow = () => (theme.dark ? data.colours_dark : data.colours);
@@ -63,7 +64,8 @@ const firstOf = new Map(), lowestOf = new Map(), lowestPlungeOf = new Map(), unr
 for (let i = 0; i < n; i++) {
   if (!firstOf.has(line[i])) firstOf.set(line[i], i);
   const lowest = kind[i] & PLUNGE ? lowestPlungeOf : lowestOf;
-  if (cutting(i) && !Number.isNaN(stiffness[i])) lowest.set(line[i], Math.min(stiffness[i], lowest.get(line[i]) ?? Infinity));
+  if (cutting(i) && !Number.isNaN(stiffness[i])) lowest.set(line[i], Math.min(stiffness[i], lowest.get(line[i])
+    ?? Infinity));
   if (cutting(i) && kind[i] & OUT) unreached.add(line[i]);
 }
 // Colour of a line's bar; undefined where nothing is cut.
@@ -73,8 +75,7 @@ function lineColour(number) {
   if (!lowestPlungeOf.has(number)) return undefined;
   return plungesBox.checked ? coloursNow()[classOf(lowestPlungeOf.get(number))] : ink.plunge;
 }
-
-// ---------------------------------------------------------------- what is pointed at
+// What is pointed at.
 let here = -1, chosenLine = 0;
 const status = document.getElementById("status");
 function describe(i) {
@@ -83,7 +84,8 @@ function describe(i) {
   const tool = data.tools.reduce((found, [start, number]) => start <= i ? number : found, 0);
   const k = kind[i] & OUT ? "out of reach" : `${group(stiffness[i])} N/mm`;
   return [`line ${line[i]} \u00b7 ${k}`, `X${x} Y${y} Z${z}${turned} mm${angles ? ", deg" : ""}`,
-    `margin ${margin[i].toFixed(3)} \u00b7 T${tool} \u00b7 ${MOTIONS[kind[i] & 7]}${kind[i] & PLUNGE ? ", plunge" : ""} \u00b7 ${group(s[i], 1)} mm along`,
+    `margin ${margin[i].toFixed(3)} \u00b7 T${tool} \u00b7 ${MOTIONS[kind[i] & 7]}${kind[i] & PLUNGE ? ", plunge" : ""}`
+      + ` \u00b7 ${group(s[i], 1)} mm along`,
     ...(operations.length > 1 ? [`operation ${operationName(operationOf(i))}`] : [])];
 }
 function point(i, stage) {
@@ -103,7 +105,8 @@ function choose(number) {
   const i = firstOf.get(number);
   if (i !== undefined) point(i); else {
     here = -1;
-    status.textContent = `line ${number}: ${n < data.samples ? "no sample of it in this thinned drawing" : "no motion"}`;
+    status.textContent =
+      `line ${number}: ${n < data.samples ? "no sample of it in this thinned drawing" : "no motion"}`;
     showLine(number);
     view.drawOverlay();
     profile.drawOverlay();
@@ -114,8 +117,7 @@ function step(by) {
   while (!rapidsBox.checked && !cutting(i) && i + by >= 0 && i + by < n) i += by;
   point(i, view);
 }
-
-// ---------------------------------------------------------------- the path in 3-D
+// The path in 3-D.
 const scene = {
   paths: [path],
   heavy: n > 20000,
@@ -158,7 +160,8 @@ const scene = {
       ring(g, x, y, 6, ink.panel, 4);
       ring(g, x, y, 6, ink.ink, 1.6);
       let ty = y - 14;
-      while (taken.some(([a, b, w, h]) => Math.abs(b - ty) < h && x + 11 < a + w + 6 && a < x + 11 + wide + 6)) ty += 17;
+      while (taken.some(([a, b, w, h]) => Math.abs(b - ty) < h && x + 11 < a + w + 6 && a < x + 11 + wide + 6)) ty +=
+        17;
       taken.push([x + 11, ty, wide, 17]);
       g.globalAlpha = 0.85;
       g.fillStyle = ink.panel;
@@ -187,8 +190,7 @@ const scene = {
   },
   nearest: (x, y) => path.nearest(x, y, (i) => cutting(i) || rapidsBox.checked),
 };
-
-// ---------------------------------------------------------------- stiffness along the path
+// Stiffness along the path.
 const curve = new Float32Array(n), plungeCurve = new Float32Array(n);
 // The curve, and beside it the plunges that neither belong to it nor set the axis.
 function split() {
@@ -202,7 +204,8 @@ split();
 const model = {
   s,
   value: (i) => (setAside(i) ? plungeCurve[i] : curve[i]),
-  curves: () => [...(other ? [{ s: other.s, k: other.curve, colour: ink.second }] : []), { s, k: curve, colour: ink.curve }],
+  curves: () => [...(other ? [{ s: other.s, k: other.curve, colour: ink.second }] : []),
+    { s, k: curve, colour: ink.curve }],
   beside: () => ({ k: plungeCurve, colour: ink.plunge }),
   levels: () => [
     ...(data.mean !== null ? [{ value: data.mean, colour: ink.ink, dash: [6, 4] }] : []),
@@ -225,15 +228,15 @@ const model = {
   },
   here: () => here,
 };
-
-// ---------------------------------------------------------------- the program; only the rows in sight exist
+// The program; only the rows in sight exist.
 const ROW = 19;
 const listing = document.getElementById("listing"), space = document.getElementById("listing-space");
 const source = data.source;
 let lineHere = 0;
 listing.style.setProperty("--digits", String(source.length).length);
 space.style.height = `${source.length * ROW}px`;
-document.getElementById("program-note").textContent = `${group(source.length)} lines; the bar is the line's lowest stiffness`;
+document.getElementById("program-note").textContent =
+  `${group(source.length)} lines; the bar is the line's lowest stiffness`;
 function drawListing() {
   const first = Math.max(0, Math.floor(listing.scrollTop / ROW) - 5);
   const last = Math.min(source.length, Math.ceil((listing.scrollTop + listing.clientHeight) / ROW) + 5), rows = [];
@@ -271,8 +274,7 @@ listing.addEventListener("keydown", (e) => {
   e.preventDefault();
 });
 new ResizeObserver(drawListing).observe(listing);
-
-// ---------------------------------------------------------------- everything together
+// Everything together.
 const legendRamp = document.getElementById("legend-ramp");
 function retheme() {
   legendRamp.style.background = ramp(coloursNow());
@@ -331,15 +333,16 @@ addKey("", data.machine);
 if (other) addKey("second-key", data.other.machine);
 if (data.mean !== null) addKey("mean-key", `mean ${group(data.mean)} N/mm`);
 if (data.required !== null) addKey("required-key", `required ${group(data.required)} N/mm`);
-if (data.scale_with_plunges) addKey("plunge-key", `plunges ${group(data.plunges[0])} to ${group(data.plunges[1])} N/mm`);
+if (data.scale_with_plunges) addKey("plunge-key",
+  `plunges ${group(data.plunges[0])} to ${group(data.plunges[1])} N/mm`);
 showLegend();
-
-
-// ---------------------------------------------------------------- one operation alone: in the path, in the profile
-const operationRows = [...document.querySelectorAll("[data-operation]")], operationShown = document.getElementById("operation-shown");
+// One operation alone: in the path, in the profile.
+const operationRows = [...document.querySelectorAll("[data-operation]")], operationShown = document.getElementById(
+  "operation-shown");
 function chooseOperation(k) {
   chosenOperation = k === chosenOperation ? -1 : k;
-  for (const row of operationRows) row.closest("tr").classList.toggle("chosen", Number(row.dataset.operation) === chosenOperation);
+  for (const row of operationRows) row.closest("tr").classList.toggle("chosen",
+    Number(row.dataset.operation) === chosenOperation);
   operationShown.hidden = chosenOperation < 0;
   if (chosenOperation < 0) profile.all();
   else {

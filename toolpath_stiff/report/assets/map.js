@@ -1,8 +1,9 @@
-// ---------------------------------------------------------------- a stiffness map: surfaces above their planes
+// A stiffness map: surfaces above their planes.
 const data = JSON.parse(document.getElementById("data").textContent), $ = (id) => document.getElementById(id);
 const { x: xs, y: ys, z: planes, values } = data, across = xs.length, deep = ys.length, CLASSES = data.colours.length;
 const known = values.flat().filter((v) => v !== null);
-const least = known.reduce((a, b) => Math.min(a, b), Infinity), most = known.reduce((a, b) => Math.max(a, b), -Infinity);
+const least = known.reduce((a, b) => Math.min(a, b), Infinity), most = known.reduce((a, b) => Math.max(a, b),
+  -Infinity);
 const share = (v) => (v - least) / (most - least || 1);
 const coloursNow = () => (theme.dark ? data.colours_dark : data.colours);
 const colourOf = (v) => coloursNow()[Math.min(CLASSES - 1, Math.floor(share(v) * CLASSES))];
@@ -31,8 +32,10 @@ const scene = {
         return [...seen, v];
       });
       for (let j = 0; j + 1 < deep; j++) for (let i = 0; i + 1 < across; i++) {
-        const corners = [at[j * across + i], at[j * across + i + 1], at[(j + 1) * across + i + 1], at[(j + 1) * across + i]];
-        if (corners.every(Boolean)) quads.push({ corners, near: corners[0][2] + corners[2][2], v: corners.reduce((sum, c) => sum + c[3], 0) / 4 });
+        const corners = [at[j * across + i], at[j * across + i + 1], at[(j + 1) * across + i + 1],
+          at[(j + 1) * across + i]];
+        if (corners.every(Boolean)) quads.push({ corners, near: corners[0][2] + corners[2][2], v: corners
+          .reduce((sum, c) => sum + c[3], 0) / 4 });
       }
     });
     quads.sort((one, other) => one.near - other.near);
@@ -46,7 +49,8 @@ const scene = {
       g.stroke();
     }
   },
-  // Planes, their heights at the right, X and Y at the corners of the lowest; the hindmost corner is behind the surfaces.
+  // Planes, their heights at the right, X and Y at the corners of the lowest; the hindmost corner is behind the
+  // surfaces.
   label(g, viewer) {
     const corners = [[0, 0], [across - 1, 0], [across - 1, deep - 1], [0, deep - 1]];
     planes.forEach((z, layer) => {
@@ -64,7 +68,8 @@ const scene = {
       at.forEach((p, i) => {
         if (p === behind) return;
         const side = p === left ? "right" : p === right ? "left" : "middle";
-        viewer.write(g, `X ${xs[corners[i][0]]} Y ${ys[corners[i][1]]}`, p[0] + (p === left ? -6 : p === right ? 6 : 0), p[1] + 14, side);
+        viewer.write(g, `X ${xs[corners[i][0]]} Y ${ys[corners[i][1]]}`, p[0] + (p === left ? -6 : p === right ? 6 : 0),
+          p[1] + 14, side);
       });
     });
   },
@@ -95,4 +100,5 @@ view = new Viewer($("view"), scene, {
 });
 view.resize();
 retheme();
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => view.turnTo(button.dataset.view));
+for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click",
+  () => view.turnTo(button.dataset.view));

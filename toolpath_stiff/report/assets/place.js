@@ -1,4 +1,5 @@
-// ---------------------------------------------------------------- placements: where the work sits, and what that brings
+// Placements: where the work sits, and what that.
+// brings
 const d = JSON.parse(document.getElementById("data").textContent), $ = (id) => document.getElementById(id);
 const coloursNow = () => (theme.dark ? d.colours_dark : d.colours), CLASSES = d.colours.length;
 function make(parent, name, attributes, text) {
@@ -9,28 +10,32 @@ function make(parent, name, attributes, text) {
 }
 // The front is as wide as its element, so that letters keep their size.
 const widthOf = (svg) => Math.max(280, svg.clientWidth || 400);
-
-// ---------------------------------------------------------------- placing: p' = o + Q p, Q = Rz(C) Ry(B) Rx(A)
+// Placing: p' = o + Q p, Q = Rz(C) Ry(B) Rx(A).
 function turnOf(row) {
-  const [a, b, c] = [row.a_deg, row.b_deg, row.rotation_deg].map((v) => v * Math.PI / 180), [sa, ca, sb, cb, sc, cc] = [a, b, c].flatMap((v) => [Math.sin(v), Math.cos(v)]);
-  return [[cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa], [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa], [-sb, cb * sa, cb * ca]];
+  const [a, b, c] = [row.a_deg, row.b_deg, row.rotation_deg].map((v) => v * Math.PI / 180), [sa, ca, sb, cb, sc, cc] =
+    [a, b, c].flatMap((v) => [Math.sin(v), Math.cos(v)]);
+  return [[cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa], [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca
+    - cc * sa], [-sb, cb * sa, cb * ca]];
 }
 const times = (q, p) => q.map((r) => r[0] * p[0] + r[1] * p[1] + r[2] * p[2]);
 // Where the path and program zero are, the program's axes there, and the tool's direction where it leans.
 function placed(row, stiffness) {
-  const q = turnOf(row), zero = [row.x_mm, row.y_mm, row.z_mm], points = d.position.map((p) => times(q, p).map((v, i) => v + zero[i]));
+  const q = turnOf(row), zero = [row.x_mm, row.y_mm, row.z_mm], points = d.position.map((p) => times(q, p)
+    .map((v, i) => v + zero[i]));
   const leans = d.axis !== null || row.a_deg !== 0 || row.b_deg !== 0;
   const tools = leans ? d.position.map((_, i) => times(q, d.axis ? d.axis[i] : [0, 0, 1])) : null;
-  return { row, zero, stiffness, xyz: [0, 1, 2].map((k) => Float32Array.from(points, (p) => p[k])), axes: [0, 1, 2].map((k) => q.map((r) => r[k])), tools };
+  return { row, zero, stiffness, xyz: [0, 1, 2].map((k) => Float32Array.from(points, (p) => p[k])), axes: [0, 1, 2]
+    .map((k) => q.map((r) => r[k])), tools };
 }
 let chosen = d.chosen;
 const places = d.front.map((row, i) => placed(row, d.stiffness[i]));
 const before = d.before ? placed(d.before, d.stiffness[d.stiffness.length - 1]) : null;
 const n = d.position.length;
-
-// ---------------------------------------------------------------- boxes that are shown: [low, high] of each axis
-const join = (boxes) => [0, 1, 2].map((k) => [Math.min(...boxes.map((b) => b[k][0])), Math.max(...boxes.map((b) => b[k][1]))]);
-const around = ({ xyz }) => xyz.map((axis) => axis.reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)], [Infinity, -Infinity]));
+// Boxes that are shown: [low, high] of each axis.
+const join = (boxes) => [0, 1, 2].map((k) => [Math.min(...boxes.map((b) => b[k][0])),
+  Math.max(...boxes.map((b) => b[k][1]))]);
+const around = ({ xyz }) => xyz.map((axis) => axis.reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)],
+  [Infinity, -Infinity]));
 const everywhere = join([...places, ...(before ? [before] : [])].map(around));
 everywhere[0] = [Math.min(0, everywhere[0][0]), Math.max(0, everywhere[0][1])];  // the machine's axis is in sight
 everywhere[1] = [Math.min(0, everywhere[1][0]), Math.max(0, everywhere[1][1])];
@@ -46,9 +51,9 @@ function boxOf(place) {
     return [(low + high) / 2 - half, (low + high) / 2 + half];
   });
 }
-
-// ---------------------------------------------------------------- a placement in the viewer
-const classOf = (v) => Math.min(CLASSES - 1, Math.max(0, Math.floor((v - d.scale[0]) / (d.scale[1] - d.scale[0]) * CLASSES)));
+// A placement in the viewer.
+const classOf = (v) => Math.min(CLASSES - 1,
+  Math.max(0, Math.floor((v - d.scale[0]) / (d.scale[1] - d.scale[0]) * CLASSES)));
 let here = -1;  // the point of the path that is pointed at, in both placements
 const known = (i, place) => place.stiffness[i] !== null && place.stiffness[i - 1] !== null && d.cut[i] === d.cut[i - 1];
 function sceneOf(placeNow) {
@@ -61,17 +66,21 @@ function sceneOf(placeNow) {
     take() {
       const place = placeNow();
       path.move(place.xyz);
-      path.classify((i) => (known(i, place) ? classOf((place.stiffness[i] + place.stiffness[i - 1]) / 2) : -1), CLASSES);
+      path.classify((i) => (known(i, place) ? classOf((place.stiffness[i] + place.stiffness[i - 1]) / 2) : -1),
+        CLASSES);
     },
     draw(g, viewer) {
       const place = placeNow(), reach = Math.max(...viewer.box.map(([low, high]) => high - low));
       if (bounded && zoomed() === "workspace") viewer.edges(g, workspace, ink.muted, 1, [6, 4]);
-      for (const { name, box } of d.keepouts) this.keepOut(g, viewer, name, [0, 1, 2].map((k) => [box[0][k], box[1][k]]));
-      viewer.segment(g, [0, 0, viewer.box[2][0]], [0, 0, viewer.box[2][1]], ink.muted, 1, [12, 3, 2, 3]);  // the machine's axis
+      for (const { name, box } of d.keepouts) this.keepOut(g, viewer, name, [0, 1, 2]
+        .map((k) => [box[0][k], box[1][k]]));
+      // the machine's axis
+      viewer.segment(g, [0, 0, viewer.box[2][0]], [0, 0, viewer.box[2][1]], ink.muted, 1, [12, 3, 2, 3]);
       if (place.tools) this.drawTools(g, viewer, place, 0.08 * reach);
       for (let c = CLASSES - 1; c >= 0; c--) path.stroke(g, c, coloursNow()[c], 2.2);
       place.axes.forEach((axis, k) => {
-        const tip = place.zero.map((z, m) => z + 0.09 * reach * axis[m]), [x, y] = viewer.project(tip), [x0, y0] = viewer.project(place.zero);
+        const tip = place.zero.map((z, m) => z + 0.09 * reach * axis[m]), [x, y] = viewer.project(tip),
+          [x0, y0] = viewer.project(place.zero);
         if (Math.hypot(x - x0, y - y0) < 3) return;
         viewer.segment(g, place.zero, tip, ink.second, 2);
         g.fillStyle = ink.second;
@@ -84,7 +93,8 @@ function sceneOf(placeNow) {
     drawTools(g, viewer, place, length) {
       g.beginPath();
       for (let i = 0; i < n; i += Math.max(1, Math.ceil(n / 40))) {
-        const foot = place.xyz.map((axis) => axis[i]), tip = viewer.project(foot.map((c, k) => c + length * place.tools[i][k]));
+        const foot = place.xyz.map((axis) => axis[i]), tip = viewer.project(foot.map((c, k) => c
+          + length * place.tools[i][k]));
         g.moveTo(...path.at(i));
         g.lineTo(tip[0], tip[1]);
       }
@@ -92,7 +102,8 @@ function sceneOf(placeNow) {
     },
     keepOut(g, viewer, name, box) {
       viewer.edges(g, box, ink.bad, 1.5);
-      const corners = cornersOf(box).map((corner) => viewer.project(corner)), [x, y] = corners.reduce((a, b) => (b[1] < a[1] ? b : a));
+      const corners = cornersOf(box).map((corner) => viewer.project(corner)), [x, y] = corners
+        .reduce((a, b) => (b[1] < a[1] ? b : a));
       if (x > 0 && x < viewer.width && y > 0 && y < viewer.height) viewer.write(g, name, x, y - 9, "middle");
     },
     overlay(g) {
@@ -103,49 +114,67 @@ function sceneOf(placeNow) {
     nearest: (x, y) => path.nearest(x, y),
   };
 }
-
-// ---------------------------------------------------------------- the front
+// The front.
 const front = $("front"), rowsShown = d.front.concat(d.before ? [d.before] : []);
-const span = (values) => { const a = Math.min(...values), b = Math.max(...values), e = 0.06 * (b - a) || 1e-3 * b || 1; return [a - e, b + e]; };
+const span = (values) => { const a = Math.min(...values), b = Math.max(...values), e = 0.06 * (b - a) || 1e-3 * b || 1;
+  return [a - e, b + e]; };
 const meanSpan = span(rowsShown.map((r) => r.mean_N_per_mm)), rangeSpan = span(rowsShown.map((r) => r.range_N_per_mm));
 function grid(svg, { values, digits }, vertical, map, a, b) {
   for (const v of values) {
-    make(svg, "line", vertical ? { x1: map(v), x2: map(v), y1: a, y2: b, class: "grid" } : { x1: a, x2: b, y1: map(v), y2: map(v), class: "grid" });
-    make(svg, "text", vertical ? { x: map(v), y: b + 16, "text-anchor": "middle" } : { x: a - 6, y: map(v) + 4, "text-anchor": "end" }, group(v, digits));
+    make(svg, "line", vertical ? { x1: map(v), x2: map(v), y1: a, y2: b, class: "grid" } : { x1: a, x2: b, y1: map(v),
+      y2: map(v), class: "grid" });
+    make(svg, "text", vertical ? { x: map(v), y: b + 16, "text-anchor": "middle" } : { x: a - 6, y: map(v) + 4,
+      "text-anchor": "end" }, group(v, digits));
   }
 }
 const title = (node, text) => make(node, "title", {}, text);
 const weakest = rowsShown.map((r) => r.min_N_per_mm), weakEnds = [Math.min(...weakest), Math.max(...weakest)];
-const weakColour = (v) => coloursNow()[Math.min(d.colours.length - 1, Math.floor((v - weakEnds[0]) / (weakEnds[1] - weakEnds[0] || 1) * d.colours.length))];
-const nameOf = (row, i) => `number ${row.number}: mean ${group(row.mean_N_per_mm)}, range ${group(row.range_N_per_mm)}, weakest ${group(row.min_N_per_mm)} N/mm` + (i === d.recommended ? ", recommended" : "") + (i === d.chosen && i !== d.recommended ? ", picked" : "");
+const weakColour = (v) => coloursNow()[Math.min(d.colours.length - 1,
+  Math.floor((v - weakEnds[0]) / (weakEnds[1] - weakEnds[0] || 1) * d.colours.length))];
+const nameOf = (row, i) =>
+  `number ${row.number}: mean ${group(row.mean_N_per_mm)}, range ${group(row.range_N_per_mm)}, `
+    + `weakest ${group(row.min_N_per_mm)} N/mm` + (i === d.recommended ? ", recommended" : "")
+    + (i === d.chosen && i !== d.recommended ? ", picked" : "");
 let dots = [];
 function drawFront() {
-  const W = widthOf(front), H = Math.round(Math.min(340, 0.85 * W)), [L, R, T, B] = [66, 14, 24, 44], focused = document.activeElement && front.contains(document.activeElement);
-  const X = (v) => L + (W - L - R) * (v - meanSpan[0]) / (meanSpan[1] - meanSpan[0]), Y = (v) => H - B - (H - B - T) * (v - rangeSpan[0]) / (rangeSpan[1] - rangeSpan[0]);
+  const W = widthOf(front), H = Math.round(Math.min(340, 0.85 * W)), [L, R, T, B] = [66, 14, 24, 44],
+    focused = document.activeElement && front.contains(document.activeElement);
+  const X = (v) => L + (W - L - R) * (v - meanSpan[0]) / (meanSpan[1] - meanSpan[0]), Y = (v) => H - B
+    - (H - B - T) * (v - rangeSpan[0]) / (rangeSpan[1] - rangeSpan[0]);
   front.replaceChildren(); front.setAttribute("viewBox", `0 0 ${W} ${H}`); front.setAttribute("height", H);
-  grid(front, ticks(...meanSpan, W > 340 ? 5 : 3), true, X, T, H - B); grid(front, ticks(...rangeSpan, 4), false, Y, L, W - R);
-  make(front, "text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" }, "mean stiffness, N/mm (more is better)");
+  grid(front, ticks(...meanSpan, W > 340 ? 5 : 3), true, X, T, H - B); grid(front, ticks(...rangeSpan, 4), false, Y, L,
+    W - R);
+  make(front, "text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" },
+    "mean stiffness, N/mm (more is better)");
   make(front, "text", { x: 4, y: 14 }, "range, N/mm (less is better)");
-  if (d.before) title(make(front, "rect", { x: X(d.before.mean_N_per_mm) - 6, y: Y(d.before.range_N_per_mm) - 6, width: 12, height: 12, fill: weakColour(d.before.min_N_per_mm), stroke: "currentColor", "stroke-width": 2 }), "present placement, weakest " + group(d.before.min_N_per_mm) + " N/mm");
+  if (d.before) title(make(front, "rect", { x: X(d.before.mean_N_per_mm) - 6, y: Y(d.before.range_N_per_mm) - 6,
+    width: 12, height: 12, fill: weakColour(d.before.min_N_per_mm), stroke: "currentColor", "stroke-width": 2 }),
+    "present placement, weakest " + group(d.before.min_N_per_mm) + " N/mm");
   dots = d.front.map((row, i) => {
-    const dot = make(front, "circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot", fill: weakColour(row.min_N_per_mm), role: "radio", "aria-label": nameOf(row, i) });
+    const dot = make(front, "circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot",
+      fill: weakColour(row.min_N_per_mm), role: "radio", "aria-label": nameOf(row, i) });
     title(dot, nameOf(row, i)); dot.addEventListener("click", () => choose(i, true)); return dot;
   });
   const best = d.front[d.recommended];
-  make(front, "text", { x: X(best.mean_N_per_mm), y: Y(best.range_N_per_mm) - 8, "text-anchor": "middle", class: "star" }, "\u2605");
+  make(front, "text", { x: X(best.mean_N_per_mm), y: Y(best.range_N_per_mm) - 8, "text-anchor": "middle",
+    class: "star" }, "\u2605");
   mark(); if (focused) dots[chosen].focus();
 }
 function mark() {
-  dots.forEach((dot, k) => { dot.classList.toggle("on", k === chosen); dot.setAttribute("aria-checked", k === chosen); dot.setAttribute("tabindex", k === chosen ? 0 : -1); });
+  dots.forEach((dot, k) => { dot.classList.toggle("on", k === chosen); dot.setAttribute("aria-checked", k === chosen);
+    dot.setAttribute("tabindex", k === chosen ? 0 : -1); });
 }
-$("front-key").textContent = "\u2605 recommended" + (d.before ? "  \u25a1 present" : ". No present placement to compare with: " + d.before_reason) + ". No placement is better in mean, range and weakest place at once. Arrow keys step along the front.";
+$("front-key").textContent = "\u2605 recommended" + (d.before ? "  \u25a1 present"
+  : ". No present placement to compare with: " + d.before_reason)
+  + ". No placement is better in mean, range and weakest place at once. Arrow keys step along the front.";
 front.addEventListener("keydown", (event) => {
-  const step = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key], jump = { Home: 0, End: dots.length - 1 }[event.key];
+  const step = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key],
+    jump = { Home: 0, End: dots.length - 1 }[event.key];
   if (step === undefined && jump === undefined) return;
-  event.preventDefault(); choose(jump !== undefined ? jump : (chosen + step + dots.length) % dots.length, true); dots[chosen].focus();
+  event.preventDefault(); choose(jump !== undefined ? jump : (chosen + step + dots.length) % dots.length, true);
+    dots[chosen].focus();
 });
-
-// ---------------------------------------------------------------- the profile
+// The profile.
 // Plunges along the tool axis are stiffer by far and would take all of the axis; a switch puts them on it. Between two
 // cuts stands a row without a value, so that the curve breaks there.
 const rows = [], plunges = $("plunges"), isPlunge = (i) => d.plunge !== null && d.plunge[i];
@@ -153,53 +182,67 @@ for (let i = 0; i < n; i++) {
   if (i && d.cut[i] !== d.cut[i - 1]) rows.push(-1);
   rows.push(i);
 }
-const rowOf = new Map(rows.map((i, row) => [i, row])), s = Float32Array.from(rows, (i, row) => d.s[i < 0 ? rows[row - 1] : i]);
-const valuesOf = (place, holds) => Float32Array.from(rows, (i) => (i < 0 || place.stiffness[i] === null || !holds(i) ? NaN : place.stiffness[i]));
+const rowOf = new Map(rows.map((i, row) => [i, row])), s = Float32Array.from(rows, (i, row) => d.s[i < 0 ? rows[row - 1]
+  : i]);
+const valuesOf = (place, holds) => Float32Array.from(rows, (i) => (i < 0 || place.stiffness[i] === null || !holds(i)
+  ? NaN : place.stiffness[i]));
 const onScale = (i) => plunges.checked || !isPlunge(i);
 $("plunge-switch").hidden = d.plunge === null;
 const model = {
   s,
   value: (row) => (rows[row] < 0 ? NaN : places[chosen].stiffness[rows[row]] ?? NaN),
-  curves: () => [...(before ? [{ s, k: valuesOf(before, onScale), colour: ink.muted }] : []), { s, k: valuesOf(places[chosen], onScale), colour: ink.curve }],
+  curves: () => [...(before ? [{ s, k: valuesOf(before, onScale), colour: ink.muted }] : []),
+    { s, k: valuesOf(places[chosen], onScale), colour: ink.curve }],
   beside: () => (d.plunge === null ? null : { k: valuesOf(places[chosen], (i) => !onScale(i)), colour: ink.plunge }),
-  levels: () => [...(before ? [[before, ink.muted]] : []), [places[chosen], ink.curve]].map(([{ row }, colour]) => ({ value: row.mean_N_per_mm, colour, dash: [7, 5] })),
+  levels: () => [...(before ? [[before, ink.muted]] : []), [places[chosen], ink.curve]].map(([{ row }, colour]) =>
+    ({ value: row.mean_N_per_mm, colour, dash: [7, 5] })),
   ends: () => d.scale,
   here: () => (here < 0 ? -1 : rowOf.get(here)),
 };
 plunges.addEventListener("change", () => profile.redraw());
-
-// ---------------------------------------------------------------- figures
+// Figures.
 function drawFacts(row) {
-  const columns = d.before ? [row, d.before] : [row], table = $("facts"), figure = (key, digits) => columns.map((r) => (r[key] === undefined || r[key] === null ? "\u2013" : group(r[key], digits)));
-  const rows = [["mean, N/mm", figure("mean_N_per_mm")], ["range, N/mm", figure("range_N_per_mm")], ["weakest, N/mm", figure("min_N_per_mm")],
-    [`mean deflection at ${d.force} N, \u00b5m`, figure("mean_deflection_um", 2)], ["program zero X, mm", figure("x_mm", 3)], ["Y, mm", figure("y_mm", 3)], ["Z, mm", figure("z_mm", 3)], ["turned by, degrees", figure("rotation_deg", 3)]];
-  if (columns.some((r) => r.plunge_mean_N_per_mm !== null)) rows.splice(3, 0, ["plunges along the tool axis: mean, N/mm", figure("plunge_mean_N_per_mm")]);
-  if (columns.some((r) => r.a_deg || r.b_deg)) rows.push(["tilt A, degrees", figure("a_deg", 3)], ["tilt B, degrees", figure("b_deg", 3)]);
-  if (row.extrapolated_share !== undefined) rows.push(["strut law extrapolated, % of samples", columns.map((r) => group(100 * r.extrapolated_share, 1))]);
+  const columns = d.before ? [row, d.before] : [row], table = $("facts"), figure = (key, digits) => columns
+    .map((r) => (r[key] === undefined || r[key] === null ? "\u2013" : group(r[key], digits)));
+  const rows = [["mean, N/mm", figure("mean_N_per_mm")], ["range, N/mm", figure("range_N_per_mm")],
+    ["weakest, N/mm", figure("min_N_per_mm")],
+    [`mean deflection at ${d.force} N, \u00b5m`, figure("mean_deflection_um", 2)], ["program zero X, mm",
+      figure("x_mm", 3)], ["Y, mm", figure("y_mm", 3)], ["Z, mm", figure("z_mm", 3)], ["turned by, degrees",
+      figure("rotation_deg", 3)]];
+  if (columns.some((r) => r.plunge_mean_N_per_mm !== null)) rows.splice(3, 0,
+    ["plunges along the tool axis: mean, N/mm", figure("plunge_mean_N_per_mm")]);
+  if (columns.some((r) => r.a_deg || r.b_deg)) rows.push(["tilt A, degrees", figure("a_deg", 3)], ["tilt B, degrees",
+    figure("b_deg", 3)]);
+  if (row.extrapolated_share !== undefined) rows.push(["strut law extrapolated, % of samples", columns
+    .map((r) => group(100 * r.extrapolated_share, 1))]);
   table.replaceChildren();
-  const line = (parent, name, cells, tag) => { const tr = parent.appendChild(document.createElement("tr")); const th = tr.appendChild(document.createElement("th")); th.textContent = name; th.scope = "row"; for (const c of cells) tr.appendChild(document.createElement(tag)).textContent = c; return tr; };
+  const line = (parent, name, cells, tag) => { const tr = parent.appendChild(document.createElement("tr"));
+    const th = tr.appendChild(document.createElement("th")); th.textContent = name; th.scope = "row";
+    for (const c of cells) tr.appendChild(document.createElement(tag)).textContent = c; return tr; };
   line(table.createTHead(), "", d.before ? ["shown", "present"] : ["shown"], "th");
   const body = table.createTBody(); for (const [name, cells] of rows) line(body, name, cells, "td");
-  const origin = document.createElement("code"), last = body.appendChild(document.createElement("tr")).appendChild(document.createElement("th"));
-  last.colSpan = columns.length + 1; origin.textContent = "--origin " + [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6)).join(",") + ` or --pick ${row.number}`; last.appendChild(origin);
+  const origin = document.createElement("code"), last = body.appendChild(document.createElement("tr")).appendChild(
+    document.createElement("th"));
+  last.colSpan = columns.length + 1; origin.textContent = "--origin " + [row.x_mm, row.y_mm, row.z_mm, row.a_deg,
+    row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6)).join(",") + ` or --pick ${row.number}`;
+    last.appendChild(origin);
 }
-
-// ---------------------------------------------------------------- what is pointed at, in both drawings and the profile
+// What is pointed at, in both drawings and the profile.
 function point(i, stage) {
   here = i;
   for (const tip of document.querySelectorAll(".tip")) tip.hidden = true;
   if (i >= 0 && stage) {
     const told = (place) => (place.stiffness[i] === null ? "out of reach" : `${group(place.stiffness[i])} N/mm`);
     const place = stage === beforeView ? before : places[chosen];
-    const lines = [`${told(places[chosen])}${before ? `, present ${told(before)}` : ""}`, `${group(d.s[i], 1)} mm along${isPlunge(i) ? ", plunge" : ""}`];
+    const lines = [`${told(places[chosen])}${before ? `, present ${told(before)}` : ""}`,
+      `${group(d.s[i], 1)} mm along${isPlunge(i) ? ", plunge" : ""}`];
     if (stage !== profile) lines.push(place.xyz.map((axis, k) => `${"XYZ"[k]}${axis[i].toFixed(2)}`).join(" "));
     stage.tell(stage === profile ? profile.at(rowOf.get(i)) : stage.scene.path.at(i), lines);
   }
   for (const one of [...views, profile]) one.drawOverlay();
 }
 const step = (by) => point(Math.max(0, Math.min(n - 1, here + by)), profile);
-
-// ---------------------------------------------------------------- choosing
+// Choosing.
 function refit() {
   for (const view of views) { view.scene.take(); view.fit(); view.redraw(); }
 }
@@ -209,12 +252,14 @@ function draw() {
   profile.redraw();
   drawFacts(place.row);
   mark();
-  $("chosen-title").textContent = (chosen === d.recommended ? "Recommended placement, " : chosen === d.chosen ? "Picked placement, " : "Placement ") + `${chosen + 1} of ${places.length}`;
+  $("chosen-title").textContent = (chosen === d.recommended ? "Recommended placement, " : chosen === d.chosen
+    ? "Picked placement, " : "Placement ") + `${chosen + 1} of ${places.length}`;
   chosenView.overlay.setAttribute("aria-label", "Path, coloured by stiffness; " + nameOf(place.row, chosen));
   $("weak-ramp").style.background = $("ramp").style.background = ramp(coloursNow());
 }
 function drawAll() { drawFront(); draw(); }
-function choose(i, remember) { chosen = i; if (remember) history.replaceState(null, "", i === d.recommended ? "#recommended" : "#" + (i + 1)); draw(); }
+function choose(i, remember) { chosen = i; if (remember) history.replaceState(null, "", i === d.recommended
+  ? "#recommended" : "#" + (i + 1)); draw(); }
 $("weak-low").textContent = group(weakEnds[0]);
 $("weak-high").textContent = group(weakEnds[1]);
 // #recommended or #7, the seventh of the front; a zoom may follow: #7,workspace
@@ -227,22 +272,24 @@ const { digits } = ticks(d.scale[0], d.scale[1], 30);
 $("low").textContent = (d.beyond[0] ? "\u2264 " : "") + group(d.scale[0], digits);
 $("high").textContent = (d.beyond[1] ? "\u2265 " : "") + group(d.scale[1], digits);
 if (!before) { $("before-panel").remove(); $("old-key").remove(); $("main").classList.add("alone"); }
-
-// ---------------------------------------------------------------- everything together
+// Everything together.
 let ready = false;
 watchTheme(() => { if (ready) drawAll(); });
 // Turned or brought nearer, one placement takes the other along.
 const together = (moved) => { for (const view of views) if (view !== moved) view.follow(moved); };
 const viewerOf = (id, placeNow) => {
-  const view = new Viewer($(id), sceneOf(placeNow), { point: (i) => point(i, i < 0 ? null : view), step, moved: together });
+  const view = new Viewer($(id), sceneOf(placeNow), { point: (i) => point(i, i < 0 ? null : view), step,
+    moved: together });
   view.scene.take();
   return view;
 };
-const chosenView = viewerOf("chosen", () => places[chosen]), beforeView = before ? viewerOf("before", () => before) : null;
+const chosenView = viewerOf("chosen", () => places[chosen]), beforeView = before ? viewerOf("before", () => before)
+  : null;
 const views = [chosenView, ...(beforeView ? [beforeView] : [])];
 const profile = new Profile($("profile"), model, { point: (row) => point(rows[row], profile), step });
 for (const stage of [...views, profile]) stage.resize();
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => { for (const view of views) view.turnTo(button.dataset.view); });
+for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click",
+  () => { for (const view of views) view.turnTo(button.dataset.view); });
 for (const radio of document.querySelectorAll("input[name=zoom]")) radio.addEventListener("change", refit);
 addEventListener("hashchange", fromAddress);
 addEventListener("resize", drawFront);

@@ -22,8 +22,10 @@ class Profile extends Stage {
   get last() { return this.model.s[this.model.s.length - 1]; }
   all() { this.show(this.model.s[0], this.last); }
   show(from, to) { this.from = from; this.to = to > from ? to : from + 1; }
-  x(value) { return this.pad.left + (value - this.from) / (this.to - this.from) * (this.width - this.pad.left - this.pad.right); }
-  y(value) { return this.height - this.pad.bottom - (value - this.low) / (this.high - this.low) * (this.height - this.pad.top - this.pad.bottom); }
+  x(value) { return this.pad.left + (value - this.from) / (this.to - this.from) * (this.width - this.pad.left
+    - this.pad.right); }
+  y(value) { return this.height - this.pad.bottom - (value - this.low) / (this.high - this.low) * (this.height
+    - this.pad.top - this.pad.bottom); }
   at(i) {
     const k = this.model.value(i), bottom = this.height - this.pad.bottom;
     return [this.x(this.model.s[i]), Number.isNaN(k) ? bottom : Math.max(this.pad.top, Math.min(bottom, this.y(k)))];
@@ -31,7 +33,8 @@ class Profile extends Stage {
   draw() {
     const g = this.clear(this.base), { model } = this;
     this.setHeights();
-    const left = this.pad.left, right = this.width - this.pad.right, top = this.pad.top, bottom = this.height - this.pad.bottom;
+    const left = this.pad.left, right = this.width - this.pad.right, top = this.pad.top, bottom = this.height
+      - this.pad.bottom;
     const within = (paint) => {
       g.save();
       g.beginPath();
@@ -40,7 +43,8 @@ class Profile extends Stage {
       paint();
       g.restore();
     };
-    within(() => { for (const { holds, colour } of model.shades?.() ?? []) this.shade(g, holds, colour, top, bottom); });
+    within(() => { for (const { holds, colour } of model.shades?.() ?? []) this.shade(g, holds, colour, top, bottom);
+      });
     this.drawScales(g, left, right, top, bottom);
     within(() => {
       for (const { value, colour, dash } of model.levels()) this.level(g, value, colour, dash);
@@ -52,7 +56,8 @@ class Profile extends Stage {
         this.drawBeyond(g, beside, top, bottom);
       }
       for (const { s, k, colour } of model.curves()) this.curve(g, s, k, colour);
-      for (const i of model.rings?.() ?? []) { ring(g, ...this.at(i), 5, ink.panel, 4); ring(g, ...this.at(i), 5, ink.ink, 1.6); }
+      for (const i of model.rings?.() ?? []) { ring(g, ...this.at(i), 5, ink.panel, 4);
+        ring(g, ...this.at(i), 5, ink.ink, 1.6); }
     });
     this.drawTools(g, left, right, top);
     if (this.strip) this.drawOperations(g, left, right, top);
@@ -69,7 +74,8 @@ class Profile extends Stage {
     for (const { s, k } of this.model.curves()) see(s, k);
     if (low > high && beside) see(this.model.s, beside.k);  // nothing else is in sight
     if (low > high) [low, high] = this.model.ends();
-    for (const { value, held } of this.model.levels()) if (held) { low = Math.min(low, value); high = Math.max(high, value); }
+    for (const { value, held } of this.model.levels()) if (held) { low = Math.min(low, value);
+      high = Math.max(high, value); }
     const pad = Math.max((high - low) * 0.1, high * 0.002);
     this.low = low - pad;
     this.high = high + pad;
@@ -140,7 +146,8 @@ class Profile extends Stage {
       g.moveTo(x, top);
       g.lineTo(x, this.height - this.pad.bottom);
       if (start > 0) g.stroke();
-      if (number && x - last > 28 && x > left + 40 && x < right - 20) { g.fillText(`T${number}`, x, top - 2 - this.strip); last = x; }
+      if (number && x - last > 28 && x > left + 40 && x < right - 20) { g.fillText(`T${number}`, x, top - 2
+        - this.strip); last = x; }
     }
     g.setLineDash([]);
   }
@@ -202,11 +209,13 @@ class Profile extends Stage {
     g.stroke();
   }
   drawOverlay() {
-    const g = this.clear(this.overlay), bottom = this.height - this.pad.bottom, marked = this.model.marked?.(), here = this.model.here?.() ?? -1;
+    const g = this.clear(this.overlay), bottom = this.height - this.pad.bottom, marked = this.model.marked?.(),
+      here = this.model.here?.() ?? -1;
     g.fillStyle = ink.accent;
     if (marked) {
       g.globalAlpha = 0.3;
-      const a = Math.max(this.pad.left, this.x(this.model.s[marked[0]])), b = Math.min(this.width - this.pad.right, this.x(this.model.s[marked[1]]));
+      const a = Math.max(this.pad.left, this.x(this.model.s[marked[0]])), b = Math.min(this.width - this.pad.right,
+        this.x(this.model.s[marked[1]]));
       if (b >= a) g.fillRect(a - 1, this.pad.top, b - a + 2, bottom - this.pad.top);
       g.globalAlpha = 1;
     }
@@ -218,13 +227,15 @@ class Profile extends Stage {
     ring(g, x, y, 4, ink.accent, 2.5);
   }
   rowUnder(x) {
-    const { s } = this.model, value = this.from + (x - this.pad.left) / (this.width - this.pad.left - this.pad.right) * (this.to - this.from);
+    const { s } = this.model, value = this.from + (x - this.pad.left) / (this.width - this.pad.left
+      - this.pad.right) * (this.to - this.from);
     const i = Math.min(s.length - 1, rowAt(s, value));
     return i > 0 && value - s[i - 1] < s[i] - value ? i - 1 : i;
   }
   zoomAt(factor, x) {
     const first = this.model.s[0], last = this.last > first ? this.last : first + 1;
-    const fixed = this.from + (x - this.pad.left) / (this.width - this.pad.left - this.pad.right) * (this.to - this.from);
+    const fixed = this.from + (x - this.pad.left) / (this.width - this.pad.left - this.pad.right) * (this.to
+      - this.from);
     const span = Math.max((last - first) * 1e-5, Math.min(last - first, (this.to - this.from) / factor));
     this.from = Math.max(first, Math.min(last - span, fixed - (fixed - this.from) * span / (this.to - this.from)));
     this.to = this.from + span;
@@ -240,7 +251,8 @@ class Profile extends Stage {
     const canvas = this.overlay;
     canvas.addEventListener("pointerdown", (e) => canvas.setPointerCapture(e.pointerId));
     canvas.addEventListener("click", (e) => {
-      if (this.strip && e.offsetY < this.pad.top && e.offsetY >= this.pad.top - this.strip) this.on.operation?.(this.rowUnder(e.offsetX));
+      if (this.strip && e.offsetY < this.pad.top && e.offsetY >= this.pad.top - this.strip) this.on.operation?.(
+        this.rowUnder(e.offsetX));
     });
     canvas.addEventListener("pointermove", (e) => {
       if (e.buttons) this.move(-e.movementX / (this.width - this.pad.left - this.pad.right) * (this.to - this.from));

@@ -12,12 +12,14 @@ function ticks(low, high, most) {
   const rough = (high - low) / Math.max(1, most), power = 10 ** Math.floor(Math.log10(rough));
   const pitch = power * [1, 2, 2.5, 5, 10].find((m) => m * power >= rough), out = [];
   for (let k = Math.ceil(low / pitch); k * pitch <= high; k++) out.push(k * pitch);
-  return { values: out, digits: Math.max(0, Math.min(4, Math.ceil(-Math.log10(pitch) + (pitch / power === 2.5 ? 1 : 0)))) };
+  return { values: out, digits: Math.max(0, Math.min(4, Math.ceil(-Math.log10(pitch) + (pitch / power === 2.5 ? 1
+    : 0)))) };
 }
 // First row of an ascending array that is not below `value`.
 function rowAt(array, value) {
   let low = 0, high = array.length;
-  while (low < high) { const middle = (low + high) >> 1; if (array[middle] < value) low = middle + 1; else high = middle; }
+  while (low < high) { const middle = (low + high) >> 1; if (array[middle] < value) low = middle + 1;
+    else high = middle; }
   return low;
 }
 // The text, cut to so many pixels; if next to nothing of it is left, `least`, or nothing at all.
@@ -35,8 +37,7 @@ function ring(g, x, y, radius, colour, width) {
   g.lineWidth = width;
   g.stroke();
 }
-
-// ---------------------------------------------------------------- the colours of the page, light, dark or on paper
+// The colours of the page, light, dark or on paper.
 const INKS = { panel: "card", ink: "ink", muted: "muted", line: "line", soft: "soft", accent: "pink", curve: "blue",
   second: "orange", bad: "red", "bad-soft": "pale-red", rapid: "grey", plunge: "slate" };
 const ink = {};
@@ -60,8 +61,7 @@ function watchTheme(changed) {
   addEventListener("afterprint", again(false));
 }
 const ramp = (colours) => `linear-gradient(to right, ${colours.join(",")})`;
-
-// ---------------------------------------------------------------- a pair of stacked canvases, and a tip over them
+// A pair of stacked canvases, and a tip over them.
 class Stage {
   constructor(element) {
     this.element = element;

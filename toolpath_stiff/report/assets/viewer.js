@@ -40,9 +40,11 @@ class Viewer extends Stage {
     this.zoom = 1;
     this.cx = this.cy = 0;
     const seen = cornersOf(this.box).map((corner) => this.project(corner));
-    const wide = Math.max(...seen.map((p) => Math.abs(p[0]))) * 2, tall = Math.max(...seen.map((p) => Math.abs(p[1]))) * 2;
+    const wide = Math.max(...seen.map((p) => Math.abs(p[0]))) * 2,
+      tall = Math.max(...seen.map((p) => Math.abs(p[1]))) * 2;
     const beside = Math.min(this.scene.beside ?? 90, 0.45 * this.width);
-    this.zoom = Math.max(1e-6, Math.min((this.width - beside) / Math.max(wide, 1e-3), (this.height - 70) / Math.max(tall, 1e-3)));
+    this.zoom = Math.max(1e-6, Math.min((this.width - beside) / Math.max(wide, 1e-3), (this.height - 70) / Math.max(
+      tall, 1e-3)));
     this.cx = this.width / 2;
     this.cy = this.height / 2;
   }
@@ -78,25 +80,29 @@ class Viewer extends Stage {
     g.fillStyle = ink.muted;
     g.textAlign = "left";
     g.textBaseline = "top";
-    const text = this.box.map(([low, high], axis) => `${"XYZ"[axis]} ${low.toFixed(1)} to ${high.toFixed(1)}`).join("    ");
+    const text = this.box.map(([low, high], axis) => `${"XYZ"[axis]} ${low.toFixed(1)} to ${high.toFixed(1)}`)
+      .join("    ");
     g.fillText(`${text}  mm`, 4, 4);
     if (flat) this.drawTicks(g, ...{ top: [0, 1], front: [0, 2], side: [1, 2] }[flat]);
   }
   // Seen along an axis the box is a frame with a scale, as on a drawing.
   drawTicks(g, across, up) {
     const at = (axis, value) => this.project(this.box.map(([low], k) => (k === axis ? value : low)));
-    const [left, bottom] = this.project(this.box.map(([low]) => low)), [right] = at(across, this.box[across][1]), [, top] = at(up, this.box[up][1]);
+    const [left, bottom] = this.project(this.box.map(([low]) => low)), [right] = at(across, this.box[across][1]),
+      [, top] = at(up, this.box[up][1]);
     g.strokeStyle = ink.muted;
     g.lineWidth = 1;
     const line = (x, y, dx, dy) => { g.beginPath(); g.moveTo(x, y); g.lineTo(x + dx, y + dy); g.stroke(); };
     const horizontal = ticks(...this.box[across], Math.max(2, Math.abs(right - left) / 60));
     g.textAlign = "center";
     g.textBaseline = "top";
-    for (const v of horizontal.values) { const [x] = at(across, v); line(x, bottom, 0, 4); g.fillText(v.toFixed(horizontal.digits), x, bottom + 6); }
+    for (const v of horizontal.values) { const [x] = at(across, v); line(x, bottom, 0, 4);
+      g.fillText(v.toFixed(horizontal.digits), x, bottom + 6); }
     const vertical = ticks(...this.box[up], Math.max(2, Math.abs(bottom - top) / 40));
     g.textAlign = "right";
     g.textBaseline = "middle";
-    for (const v of vertical.values) { const [, y] = at(up, v); line(left, y, -4, 0); g.fillText(v.toFixed(vertical.digits), left - 6, y); }
+    for (const v of vertical.values) { const [, y] = at(up, v); line(left, y, -4, 0);
+      g.fillText(v.toFixed(vertical.digits), left - 6, y); }
   }
   // The twelve edges of a box.
   edges(g, box, colour, width, dash = []) {
@@ -202,7 +208,8 @@ class Viewer extends Stage {
     });
     const up = (e) => {
       const down = fingers.delete(e.pointerId);
-      if (down && e.type === "pointerup" && moved < 4) this.on.pick?.(this.scene.nearest?.(e.offsetX, e.offsetY, this) ?? -1);
+      if (down && e.type === "pointerup" && moved < 4) this.on.pick?.(this.scene.nearest?.(e.offsetX, e.offsetY, this)
+        ?? -1);
     };
     for (const type of ["pointerup", "pointercancel"]) canvas.addEventListener(type, up);
     canvas.addEventListener("pointerleave", () => { this.tip.hidden = true; });
@@ -231,8 +238,7 @@ class Viewer extends Stage {
 function cornersOf(box) {
   return [0, 1, 2, 3, 4, 5, 6, 7].map((c) => box.map(([low, high], axis) => ((c >> axis) & 1 ? high : low)));
 }
-
-// ---------------------------------------------------------------- a path: points, and the lines between them by class
+// A path: points, and the lines between them by class.
 class Path {
   // xyz: three arrays of n coordinates, mm
   constructor(xyz) { this.move(xyz); }
@@ -258,7 +264,8 @@ class Path {
   }
   has(which) { return this.starts[which] < this.starts[which + 1]; }
   project(camera) {
-    const { n, sx, sy, xyz: [X, Y, Z] } = this, [r, u] = camera.axes(), [mx, my, mz] = camera.middle, { cx, cy, zoom } = camera;
+    const { n, sx, sy, xyz: [X, Y, Z] } = this, [r, u] = camera.axes(), [mx, my, mz] = camera.middle, { cx, cy, zoom } =
+      camera;
     for (let i = 0; i < n; i++) {
       const x = X[i] - mx, y = Y[i] - my;
       sx[i] = cx + zoom * (x * r[0] + y * r[1]);

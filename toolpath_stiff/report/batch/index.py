@@ -16,9 +16,10 @@ from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.files import Content
-from toolpath_stiff.report.batch.programs import RESERVED, _figure, summary_csv, terminal_summary
+from toolpath_stiff.report.batch.programs import RESERVED, _figure, summary_csv
 from toolpath_stiff.report.pages import markup, render
-from toolpath_stiff.report.words import ONLY_PLUNGES, counted, duration, number, only_plunges, plain, shortened
+from toolpath_stiff.report.words import ONLY_PLUNGES, counted, duration, only_plunges, plain, shortened
+from toolpath_stiff.units import number
 
 if TYPE_CHECKING:
     from toolpath_stiff.report.batch.programs import Outcome
@@ -319,11 +320,6 @@ def _value(one: Outcome, name: str) -> str:
 def _link(path: str) -> str:
     """A relative path as an address; names need not be UTF-8, nor free of what addresses take otherwise."""
     return quote(os.fsencode(path))
-
-
-def text(outcomes: Sequence[Outcome]) -> str:
-    """What the terminal shows: a line a program, then the failures."""
-    return terminal_summary(outcomes)
 
 
 def names() -> tuple[str, ...]:

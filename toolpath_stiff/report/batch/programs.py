@@ -16,7 +16,8 @@ from typing import Any
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.report.words import counted, duration, number, only_plunges, plain, shortened
+from toolpath_stiff.report.words import counted, duration, only_plunges, plain, shortened
+from toolpath_stiff.units import number
 
 # Endings of NC programs and of nothing else: `.txt` is as often a note or a tool list.
 NC_ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min")
@@ -240,13 +241,6 @@ COLUMNS: Mapping[str, int | None] = {
 PLUNGE_KEYS = ("length_mm", "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm")
 
 
-SAME_NAME = (
-    "machine", "load", "force_N", "samples", "cutting_length_mm", "rapid_length_mm", "time_s", "mean_N_per_mm",
-    "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um", "headline", "min_margin", "min_margin_line",
-    "out_of_reach_samples", "extrapolated_share",
-)  # fmt: skip
-
-
 @dataclass(frozen=True)
 class Outcome:
     """What became of a program.
@@ -281,7 +275,7 @@ class Outcome:
 
 def figures_of(summary: Mapping[str, Any]) -> dict[str, Any]:
     """The values of `COLUMNS` from a `summary.json`: small, however long the program."""
-    found = {name: summary[name] for name in SAME_NAME}
+    found = {name: summary[name] for name in COLUMNS if name in summary}
     place = summary["weakest"]
     if place is not None:
         keys = ("line", "text", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions, planes
-from toolpath_stiff.inference.fits import deviation_percent
+from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.report.compare.pictures import heading, near_rows
 from toolpath_stiff.report.figure import (

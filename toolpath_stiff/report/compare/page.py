@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import directions, planes
 from toolpath_stiff.files import Content
-from toolpath_stiff.inference.fits import deviation_percent
+from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.compare.machine import machine_png
 from toolpath_stiff.report.compare.pictures import measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare.variables import load_path_png, variables_png
@@ -260,8 +259,9 @@ def _noise(document: ComparisonDocument) -> Markup:
 MOST_NAMED = 5  # readings far off, on the terminal
 
 
-def text(document: ComparisonDocument) -> str:
-    """Errors, findings, checks, in lines."""
+def text(found: Comparison) -> str:
+    """Errors, findings, checks, in lines, and the commands that go on from here."""
+    document = found.document
     lines = [document["text"], ""]
     lines += _table(document)
     base, refit = document["baseline"], document["baseline"]["strut_law_refitted"]
@@ -300,7 +300,8 @@ def text(document: ComparisonDocument) -> str:
             lines.append(f"  and {len(document['outliers']) - MOST_NAMED} more, in compare.json")
     lines += [""] + [f"warning: {plain(text)}" for text in document["warnings"]]
     lines += [f"note: {plain(text)}" for text in document["notes"]]
-    return "\n".join(line for i, line in enumerate(lines) if line or lines[i - 1 : i] != [""]).rstrip() + "\n"
+    shown = [line for i, line in enumerate(lines) if line or lines[i - 1 : i] != [""]]
+    return "\n".join(["\n".join(shown).rstrip(), "", *document["next"]])
 
 
 def _table(document: ComparisonDocument) -> list[str]:
@@ -363,7 +364,7 @@ def names(plots: bool = True) -> tuple[str, ...]:
 def files(found: Comparison, *, plots: bool = True) -> dict[str, Content]:
     """Everything as JSON, one row a reading, and with `plots` pictures and page."""
     contents: dict[str, Content] = {
-        "compare.json": json.dumps(found.document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        "compare.json": found.to_json(),
         "residuals.csv": residuals_csv(found),
     }
     if plots:

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions, planes
-from toolpath_stiff.inference.fits import deviation_percent
+from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.figure import FAINT, INK, MUTED, UNREACHABLE_RED, WITHIN, drawn, house_style, new_figure
 from toolpath_stiff.report.residuals import BAND, DIRECTION_COLOURS, RESIDUAL_MAP
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
-from toolpath_stiff.units import n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain, shortened
+from toolpath_stiff.units import n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import directions
 from toolpath_stiff.comparison.structure import SIGNIFICANT
-from toolpath_stiff.inference.fits import deviation_percent
+from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.compare.pictures import RESIDUAL_AXIS, count_of, heading
 from toolpath_stiff.report.figure import (
     BLUE,

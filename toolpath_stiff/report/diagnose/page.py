@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -10,14 +9,14 @@ import numpy as np
 from markupsafe import Markup
 
 from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.documents import Document
 from toolpath_stiff.files import Content
-from toolpath_stiff.inference.fits import deviation_percent
+from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, envelope_png, ladder_png
 from toolpath_stiff.report.diagnose.portrait import portrait_png, portrait_section
 from toolpath_stiff.report.explanations import (
     HEADLINES,
     best_explanation,
-    entries,
     explanations,
     figure_of,
     floor_text,
@@ -36,15 +35,15 @@ from toolpath_stiff.report.explanations import (
     row_name,
     significant,
 )
+from toolpath_stiff.report.explanations import text as explanations_text
 from toolpath_stiff.report.loops import loops_section
 from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
 from toolpath_stiff.report.residuals import before_after_png
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, machine_text, number
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, machine_text
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
-    from toolpath_stiff.diagnosis.diagnose import Diagnosis
-    from toolpath_stiff.diagnosis.document import DiagnosisDocument
+    from toolpath_stiff.diagnosis.result import Diagnosis
 
 
 # Picture -> the question that it answers, and how it is read.
@@ -80,7 +79,7 @@ QUESTIONS = {
 }
 
 
-def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) -> str:
+def diagnose_html(document: Document, pictures: Mapping[str, bytes]) -> str:
     """The page's text.
 
     Parameters
@@ -90,12 +89,11 @@ def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) ->
     pictures
         File name -> PNG; those in `QUESTIONS` are shown.
     """
-    verdict = str(document.get("verdict") or "-")
-    files = ", ".join(str(name) for name in entries(document, "data"))
-    readings = figure_of(document, "readings")
-    about = [counted(readings, "reading") if readings is not None else "", files, f"machine {machine_text(document)}"]
+    verdict, files = document["verdict"], ", ".join(document["data"])
+    about = [counted(document["readings"], "reading"), files, f"machine {machine_text(document)}"]
+    beside = document["not_excluded_text"]
     sections = [
-        section("Why", bullets(entries(document, "why"))),
+        section("Why", bullets(document["why"])),
         picture("ladder.png", pictures, QUESTIONS),
         section("What the missing thing looks like", portrait_section(document)),
         picture("portrait.png", pictures, QUESTIONS),
@@ -109,44 +107,44 @@ def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) ->
         section("How much the choice matters on the tool path", _path(document)),
         picture("envelope.png", pictures, QUESTIONS),
         section("How much readings scatter", _noise(document)),
-        section("Assumptions", bullets([*entries(document, "assumptions"), *entries(document, "notes")])),
+        section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
     ]
     return page(
-        title=f"Diagnosis: {files or verdict}",
+        title=f"Diagnosis: {files}",
         verdict=verdict,
         headline=headline(document),
-        text=" ".join(filter(None, (document.get("text"), _beside(document)))),
+        text=" ".join(filter(None, (document["text"], f"May be there beside it: {beside}." if beside else ""))),
         about=about,
         figures=_figures(document),
-        warnings=entries(document, "warnings"),
+        warnings=document["warnings"],
         sections=sections,
-        footer=markup("<code>{}</code> seed {}", document.get("command") or "", document.get("seed", "-")),
+        footer=markup("<code>{}</code> seed {}", document["command"], document["seed"]),
         verdict_class=verdict if verdict in HEADLINES else "",
     )
 
 
-def _figures(document: DiagnosisDocument) -> list[tuple[str, str]]:
+def _figures(document: Document) -> list[tuple[str, str]]:
     """The few figures that say it all."""
     base = document["baseline"]
     best = best_explanation(document)
     key = "mean_abs_error_percent"
-    found = [(percent(figure_of(base.get("as_given"), key), 2), "mean error as given")]
+    found = [(percent(base["as_given"][key], 2), "mean error as given")]
     found.append((percent(figure_of(base, key), 2), "mean error, strut law refitted"))
-    if best is not None and document.get("verdict") in ("identified", "described", "ambiguous"):
+    if best is not None and document["verdict"] in ("identified", "described", "ambiguous"):
         found.append((percent(figure_of(best, key), 2), f"mean error with {name_text(best)}"))
         found.append((percent(figure_of(best, "held_out_error_percent"), 2), "the same at points left out"))
     found.append((floor_text(document), "would be left by scatter alone"))
     standing = explanations(document)
-    described = document.get("verdict") == "described"
+    described = document["verdict"] == "described"
     remark = "are left standing" if len(standing) > 1 else "describes it" if described else "is the explanation"
     found.append((plausible_text(standing), remark) if standing else ("no effect", "of the catalogue is left standing"))
     return found
 
 
-def _candidates(document: DiagnosisDocument) -> Markup:
+def _candidates(document: Document) -> Markup:
     """As given, strut law refitted, pairs and all candidates."""
     rows = []
-    for entry in [*model_rows(document), *entries(document, "pairs"), *entries(document, "candidates")]:
+    for entry in [*model_rows(document), *document["pairs"], *document["candidates"]]:
         name, title = row_name(entry), str(entry.get("finding") or entry.get("title") or "")
         gain = figure_of(entry, "held_out_gain_in_se")
         kind = "plausible" if is_plausible(entry, document) else "" if is_offered(entry, document) else "out"
@@ -171,10 +169,10 @@ def _candidates(document: DiagnosisDocument) -> Markup:
     return table(head, rows, range(2, 6))
 
 
-def _next(document: DiagnosisDocument) -> Markup:
+def _next(document: Document) -> Markup:
     """What to do, and the readings that tell most."""
-    readings = [entry for entry in entries(document, "next_measurements") if isinstance(entry, Mapping)]
-    body = hint_list(entries(document, "next"))
+    readings = document["next_measurements"]
+    body = hint_list(document["next"])
     if readings:
         keys = list(dict.fromkeys(key for entry in readings for key in entry if key != "why"))
         keys = [key for key in keys if any(entry.get(key) not in ("", None) for entry in readings)]
@@ -194,39 +192,30 @@ def _cell(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _cannot_test(document: DiagnosisDocument) -> Markup:
+def _cannot_test(document: Document) -> Markup:
     rows = []
-    for entry in entries(document, "cannot_test"):
-        columns = Markup(", ").join(markup("<code>{}</code>", name) for name in entry.get("missing") or [])
-        rows.append(("", [str(entry.get("effect", "?")), columns or "nothing in these data depends on it"]))
+    for entry in document["cannot_test"]:
+        columns = Markup(", ").join(markup("<code>{}</code>", name) for name in entry["missing"])
+        rows.append(("", [entry["effect"], columns or "nothing in these data depends on it"]))
     # 80 % power is what `detectable` asks for.
-    never = [e for e in entries(document, "detectable") if isinstance(e, Mapping) and e.get("detectable") is False]
-    rows += [
-        (
-            "",
-            [
-                hidden_name(e),
-                "even at its largest possible size these data would show it less than four times in five",
-            ],
-        )
-        for e in never
-    ]
+    never = "even at its largest possible size these data would show it less than four times in five"
+    rows += [("", [hidden_name(e), never]) for e in document["detectable"] if not e["detectable"]]
     return table(("effect", "the column that is missing"), rows) if rows else Markup()
 
 
-def _path(document: DiagnosisDocument) -> Markup:
+def _path(document: Document) -> Markup:
     """What the plausible explanations predict on the path."""
     text = path_text(document)
     if not text:
         return Markup()
-    explanations = (document.get("path") or {}).get("explanations") or {}
+    explanations = (document["path"] or {}).get("explanations") or {}
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
     rows = [("", [name, *(number(figure_of(one, key)) for key in keys)]) for name, one in explanations.items()]
     listed = table(("explanation", "mean N/mm", "range N/mm", "weakest N/mm"), rows, (1, 2, 3)) if rows else Markup()
     return markup("<p>{}.</p>", text[0].upper() + text[1:]) + listed
 
 
-def _noise(document: DiagnosisDocument) -> Markup:
+def _noise(document: Document) -> Markup:
     """Where the noise comes from, and the verdict under each guess."""
     noise = document["noise"]
     parts = [
@@ -237,22 +226,14 @@ def _noise(document: DiagnosisDocument) -> Markup:
     ]  # fmt: skip
     if (joints := figure_of(noise, "joint_error_mm")) is not None:
         parts.append(f"joints {significant(joints, 2)} mm")
-    origin = str(noise.get("origin") or "")
-    body = markup("<p>Standard deviations: {}. {}</p>", ", ".join(parts), origin) if parts else Markup()
-    found = document.get("by_noise") or {}
-    if found:
-        rows = []
-        for name, one in found.items():
-            likely = one.get("probability")
-            shown = [f"{key} {probability_text(value)}" for key, value in likely.items()] if likely else []
-            rows.append(
-                ("", [str(cell) for cell in (
-                    name, percent(figure_of(one, "noise_percent")), one.get("verdict", "-"),
-                    plausible_text(one.get("plausible") or []), ", ".join(shown[:4]),
-                )])
-            )  # fmt: skip
-        body += table(("noise", "one reading", "verdict", "plausible", "probability"), rows, (1,))
-    if len(found) > 1:
+    body = markup("<p>Standard deviations: {}. {}</p>", ", ".join(parts), noise["origin"]) if parts else Markup()
+    rows = []
+    for name, judged in document["by_noise"].items():
+        shown = [f"{key} {probability_text(value)}" for key, value in judged["probability"].items()]
+        cells = [name, percent(judged["noise_percent"]), judged["verdict"], plausible_text(judged["plausible"])]
+        rows.append(("", [*cells, ", ".join(shown[:4])]))
+    body += table(("noise", "one reading", "verdict", "plausible", "probability"), rows, (1,))
+    if len(rows) > 1:
         body += markup(
             '<p class="muted">{}</p>', "The noise is a guess: the verdict is what both guesses have in common."
         )
@@ -266,17 +247,17 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return (*data, *pictures, "report.html") if plots else data
 
 
-def files(diagnosis: Diagnosis, document: DiagnosisDocument, *, plots: bool = True) -> dict[str, Content]:
-    """`document` as JSON, one row a reading, and with `plots` pictures and page."""
-    contents: dict[str, Content] = {
-        "diagnose.json": json.dumps(document, indent=2, ensure_ascii=False) + "\n",
-        "residuals.csv": residuals_csv(diagnosis),
-    }
-    return contents | (_pictures(document, diagnosis) if plots else {})
+def text(diagnosis: Diagnosis) -> str:
+    """The diagnosis in some 25 lines."""
+    return explanations_text(diagnosis.document)
 
 
-def _pictures(document: DiagnosisDocument, diagnosis: Diagnosis) -> dict[str, Content]:
-    """The pictures that have something to show, and the page with them."""
+def files(diagnosis: Diagnosis, *, plots: bool = True) -> dict[str, Content]:
+    """The document as JSON, one row a reading, and with `plots` the pictures that have something to show, and page."""
+    contents: dict[str, Content] = {"diagnose.json": diagnosis.to_json(), "residuals.csv": residuals_csv(diagnosis)}
+    if not plots:
+        return contents
+    document = diagnosis.document
     pictures: dict[str, bytes | None] = {
         "ladder.png": ladder_png(document),
         "portrait.png": portrait_png(document, diagnosis.data, diagnosis.portrait),
@@ -286,7 +267,7 @@ def _pictures(document: DiagnosisDocument, diagnosis: Diagnosis) -> dict[str, Co
         "envelope.png": envelope_png(document),
     }
     drawn = {name: picture for name, picture in pictures.items() if picture is not None}
-    return {**drawn, "report.html": diagnose_html(document, drawn)}
+    return {**contents, **drawn, "report.html": diagnose_html(document, drawn)}
 
 
 def residuals_csv(diagnosis: Diagnosis) -> str:
@@ -309,9 +290,3 @@ def residuals_csv(diagnosis: Diagnosis) -> str:
         numbers += [f"{float(deviation_percent(np.array(r))):.3f}" for r in own]
         rows.append([str(data.file[i]), int(data.line[i]), str(data.point[i]), *numbers])
     return csv_text(head, rows)
-
-
-def _beside(document: DiagnosisDocument) -> str:
-    """What the readings neither show nor exclude, as a sentence of the page."""
-    said = document.get("not_excluded_text")
-    return f"May be there beside it: {said}." if said else ""

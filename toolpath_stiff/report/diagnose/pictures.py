@@ -1,19 +1,18 @@
 """Pictures of a diagnosis: the candidate ladder, what cannot be told apart, what could hide, is the fit good enough.
 
-Each takes the content of `diagnose.json` and copes with entries that are absent or None.
+Each takes the content of `diagnose.json`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolpath_stiff.documents import Document
 from toolpath_stiff.report.explanations import (
     AS_GIVEN,
     NONE,
-    entries,
     explanations,
     figure_of,
     floor_text,
@@ -45,14 +44,12 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.painting import painted_axes
 from toolpath_stiff.report.words import plain, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.diagnosis.document import DiagnosisDocument
 
 ROW = 0.47  # inch a candidate
 OUTSIDE = "outside the catalogue"
@@ -62,7 +59,7 @@ BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and 
 
 
 @drawn
-def ladder_png(document: DiagnosisDocument) -> Figure:
+def ladder_png(document: Document) -> Figure:
     """PNG: every explanation with its error at left-out points and its probability, best first."""
     rows = ladder_rows(document)
     height = 1.75 + ROW * len(rows)
@@ -70,11 +67,11 @@ def ladder_png(document: DiagnosisDocument) -> Figure:
         figure = new_figure(14.0, height)
         _title(figure, "Which effect explains the data, and how surely?", _ladder_note(document))
         bottom, top = 0.62 / height, 1.0 - 1.1 / height
-        shade = painted_axes(figure, (0.01, bottom, 0.985, top - bottom))
-        labels = painted_axes(figure, (0.02, bottom, 0.34, top - bottom))
+        shade = figure.add_axes((0.01, bottom, 0.985, top - bottom))
+        labels = figure.add_axes((0.02, bottom, 0.34, top - bottom))
         errors = figure.add_axes((0.35, bottom, 0.31, top - bottom))
         chances = figure.add_axes((0.69, bottom, 0.13, top - bottom))
-        words = painted_axes(figure, (0.845, bottom, 0.15, top - bottom))
+        words = figure.add_axes((0.845, bottom, 0.15, top - bottom))
         for axes in (shade, labels, words):
             axes.set_axis_off()
             axes.set_xlim(0.0, 1.0)
@@ -95,24 +92,24 @@ def ladder_png(document: DiagnosisDocument) -> Figure:
         return figure
 
 
-def ladder_rows(document: DiagnosisDocument) -> list[Mapping[str, Any]]:
+def ladder_rows(document: Document) -> list[Document]:
     """As given, strut law refitted, what no effect describes (if it was weighed), then pairs and effects."""
     models = model_rows(document)
     outside = figure_of(models[-1], "probability_outside")
     beyond = [{"effect": OUTSIDE, "title": "a smooth unknown", "probability": outside}] if outside else []
-    return [*models, *beyond, *entries(document, "pairs")[:MOST_PAIRS], *entries(document, "candidates")]
+    return [*models, *beyond, *document["pairs"][:MOST_PAIRS], *document["candidates"]]
 
 
-def _ladder_note(document: DiagnosisDocument) -> str:
+def _ladder_note(document: Document) -> str:
     standing = len(explanations(document))
     shown = f"shaded: {standing} explanation{'s' if standing > 1 else ''} left standing" if standing else "none left"
     return (
-        f"verdict: {plain(str(document.get('verdict', '-')))}   ·   {shown}   ·   bar at a dot: standard error "
+        f"verdict: {document['verdict']}   ·   {shown}   ·   bar at a dot: standard error "
         "of its fall from the refitted strut law   ·   grey: not offered"
     )
 
 
-def _ladder_labels(axes: Axes, rows: list[Mapping[str, Any]], document: DiagnosisDocument) -> None:
+def _ladder_labels(axes: Axes, rows: list[Document], document: Document) -> None:
     for y, row in enumerate(rows):
         name = row_name(row)
         small = ", ".join(parameter_texts(row, intervals=False)) or plain(str(row.get("title") or ""))
@@ -123,8 +120,8 @@ def _ladder_labels(axes: Axes, rows: list[Mapping[str, Any]], document: Diagnosi
         axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=MUTED if offered else RAPID_GREY, size=8)
 
 
-def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: DiagnosisDocument) -> None:
-    base = figure_of(document.get("baseline"), "held_out_error_percent")
+def _ladder_errors(axes: Axes, rows: list[Document], document: Document) -> None:
+    base = figure_of(document["baseline"], "held_out_error_percent")
     held = [figure_of(row, "held_out_error_percent") for row in rows]
     inside = [figure_of(row, "mean_abs_error_percent") for row in rows]
     known = [value for value in (*held, *inside) if value is not None]
@@ -171,7 +168,7 @@ def standard_error(base: float | None, outside: float | None, gain_in_se: float 
     return abs((base - outside) / gain_in_se)
 
 
-def _row_colour(row: Mapping[str, Any], document: DiagnosisDocument) -> str:
+def _row_colour(row: Document, document: Document) -> str:
     if not is_offered(row, document):
         return RAPID_GREY
     if is_plausible(row, document):
@@ -179,7 +176,7 @@ def _row_colour(row: Mapping[str, Any], document: DiagnosisDocument) -> str:
     return INK if row.get("effect") in (AS_GIVEN, NONE) else MUTED
 
 
-def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]], document: DiagnosisDocument) -> None:
+def _ladder_chances(axes: Axes, rows: list[Document], document: Document) -> None:
     axes.set_xlim(0.0, 1.0)
     for y, row in enumerate(rows):
         value = figure_of(row, "probability")
@@ -193,7 +190,7 @@ def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]], document: Diagnos
     axes.set_xlabel("probability", size=9)
 
 
-def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]], document: DiagnosisDocument) -> None:
+def _ladder_words(axes: Axes, rows: list[Document], document: Document) -> None:
     import textwrap
 
     for y, row in enumerate(rows):
@@ -202,7 +199,7 @@ def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]], document: Diagnosis
 
 
 @drawn
-def confounding_png(document: DiagnosisDocument) -> Figure:
+def confounding_png(document: Document) -> Figure:
     """PNG: how alike the effects' signatures are on this design; effects that cannot be told apart stand in boxes."""
     from matplotlib.colors import to_rgb
 
@@ -255,23 +252,19 @@ def _box(corner: float, count: int) -> Any:
 
 
 def confounding_in_order(
-    given: Mapping[str, Any],
+    given: Document,
 ) -> tuple[list[str], np.ndarray[Any, np.dtype[np.float64]], list[tuple[int, int]]]:
     """Names and matrix with the sets beside each other, the largest first, and (first place, size) of each set.
 
     Within a set and after the sets, each effect follows the one that it is most like. An effect in several sets stands
     with the first.
     """
-    names = [plain(str(name)) for name in given.get("effects") or []]
-    matrix = np.array(given.get("matrix") or np.zeros((0, 0)), dtype=float)
-    if matrix.shape != (len(names), len(names)):
-        names = []
-        matrix = np.zeros((0, 0))
+    names = [plain(name) for name in given["effects"]]
+    matrix = np.array(given["matrix"], dtype=float).reshape(len(names), len(names))
     order: list[int] = []
     boxes = []
-    for members in sorted(given.get("sets") or [], key=len, reverse=True):
-        places = [names.index(str(m)) for m in members if str(m) in names]
-        places = [place for place in places if place not in order]
+    for members in sorted(given["sets"], key=len, reverse=True):
+        places = [place for member in members if (place := names.index(member)) not in order]
         if len(places) > 1:
             boxes.append((len(order), len(places)))
             order += _chain(places, matrix)
@@ -293,14 +286,13 @@ def _chain(places: list[int], matrix: np.ndarray[Any, np.dtype[np.float64]]) -> 
 
 
 @drawn
-def detectable_png(document: DiagnosisDocument) -> Figure:
+def detectable_png(document: Document) -> Figure:
     """PNG: the smallest size of each effect that these data would show, as the change of stiffness that it makes."""
     from matplotlib.ticker import LogLocator, NullLocator
 
-    given = [entry for entry in entries(document, "detectable") if isinstance(entry, Mapping)]
+    given = document["detectable"]
     seen = sorted(
-        (e for e in given if e.get("detectable") is not False and figure_of(e, "rms_percent") is not None),
-        key=lambda e: figure_of(e, "rms_percent") or 0.0,
+        (e for e in given if e["detectable"] and e["rms_percent"] is not None), key=lambda e: float(e["rms_percent"])
     )
     never = [e for e in given if e not in seen]
     rows = [*seen, *never]
@@ -347,12 +339,12 @@ def detectable_png(document: DiagnosisDocument) -> Figure:
         return figure
 
 
-def envelope_png(document: DiagnosisDocument) -> Drawing | None:
+def envelope_png(document: Document) -> Drawing | None:
     """PNG: the base model's weighted sum of squares among simulated ones; None where `gates` does not hold them."""
     from matplotlib.ticker import MaxNLocator, NullLocator
 
     gates = document["gates"]
-    simulated = np.asarray(gates.get("simulated_squares") or [], dtype=float)
+    simulated = np.asarray(gates["simulated_squares"], dtype=float)
     if not (simulated > 0.0).any():
         return None
     observed = figure_of(gates, "squares")

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
 
-from toolpath_stiff.inference.fits import deviation_percent
-from toolpath_stiff.report.explanations import entries, figure_of, percent, probability_text, significant
+from toolpath_stiff.documents import Document
+from toolpath_stiff.inference.errors import deviation_percent
+from toolpath_stiff.report.explanations import figure_of, percent, probability_text, significant
 from toolpath_stiff.report.figure import (
     BLUE,
     FAINT,
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from toolpath_stiff.diagnosis.document import DiagnosisDocument
     from toolpath_stiff.portrait.portrait import Portrait
     from toolpath_stiff.readings.measurements import Measurements
 
@@ -43,18 +43,18 @@ COLOURS = (BLUE, SECOND_ORANGE, MUTED, RAPID_GREY)
 MOST_BARS = 8
 
 
-def portrait_section(document: DiagnosisDocument) -> Markup:
+def portrait_section(document: Document) -> Markup:
     """The portrait in words, its terms, and what else would look the same; nothing where there is none."""
-    portrait = document.get("portrait")
+    portrait = document["portrait"]
     if not portrait:
         return Markup()
     body = markup("<p>{}</p>", portrait["text"])
-    rows = [("", [*_row(one), "1"]) for one in entries(portrait, "terms")]
+    rows = [("", [*_row(one), "1"]) for one in portrait["terms"]]
     rows[1:] = [("", [*cells[:-1], "beside it"]) for _, cells in rows[1:]]
     rows[:1] = [("plausible", [*cells[:-1], "leading"]) for _, cells in rows[:1]]
     rows += [
         ("", [*_row(one), f"instead, {probability_text(figure_of(one, 'probability'))}"])
-        for one in entries(portrait, "indistinguishable")
+        for one in portrait["indistinguishable"]
     ]
     if not rows:
         return body
@@ -62,7 +62,7 @@ def portrait_section(document: DiagnosisDocument) -> Markup:
     return body + table(head, rows, (4,))
 
 
-def _row(one: Mapping[str, Any]) -> list[str]:
+def _row(one: Document) -> list[str]:
     low, high = (significant(end, 3) for end in one["interval"])
     size = f"{significant(one['size'], 3)} {one['unit']} ({low} to {high})"
     return [
@@ -71,7 +71,7 @@ def _row(one: Mapping[str, Any]) -> list[str]:
     ]  # fmt: skip
 
 
-def portrait_png(document: DiagnosisDocument, data: Measurements, portrait: Portrait | None) -> Drawing | None:
+def portrait_png(document: Document, data: Measurements, portrait: Portrait | None) -> Drawing | None:
     """PNG: what is left of the readings over what the leading term varies with; how surely it is which link."""
     if portrait is None or not portrait.terms or portrait.before is None or portrait.after is None:
         return None
@@ -122,7 +122,7 @@ def _by_direction(data: Measurements) -> list[NDArray[np.bool_]]:
     return [*along, ~np.any(along, axis=0)]
 
 
-def _bars(axes: Axes, links: Sequence[Mapping[str, Any]], variables: Sequence[Mapping[str, Any]]) -> None:
+def _bars(axes: Axes, links: Sequence[Document], variables: Sequence[Document]) -> None:
     """Probabilities of links and variables."""
     rows = [(str(one["link"]), one["probability"], BLUE) for one in links]
     rows += [(str(one["variable"]), one["probability"], SECOND_ORANGE) for one in variables]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,19 +12,14 @@ from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.placement.document import placement_of
-from toolpath_stiff.placement.evaluator import Keepout
 from toolpath_stiff.placement.paths import DrawnPath, drawn_path
+from toolpath_stiff.placement.result import Placement
+from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
 from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, setup_sheet, workspace_picture
-from toolpath_stiff.report.words import machine_text, number, plain
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
-
-if TYPE_CHECKING:
-    from toolpath_stiff.placement.placing import Placed
-
+from toolpath_stiff.report.words import machine_text, plain
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 POINTS = (150, 800)  # of the path on the page, fewest and most
 
@@ -35,40 +30,27 @@ ENDS = (0.05, 0.95)  # of the path's length, all placements together, between wh
 VALUES = 48_000  # points times placements that the page holds, some 300 kB
 
 
-def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepouts: Sequence[Keepout] = ()) -> str:
-    """The page's text.
-
-    Parameters
-    ----------
-    summary
-        As in `placement.json`.
-    best
-        The analysis at the chosen placement: model, load, force and step are taken from it.
-    program
-        In the set-up frame, as read.
-    keepouts
-        Boxes to draw.
-    """
-    front = summary["front"]
-    shown = front + ([summary["before"]] if summary["before"] else [])
-    placements = np.array([placement_of(row) for row in shown])
+def place_page(placed: Placement) -> str:
+    """The page's text."""
+    best, present = placed.best, placed.present
+    shown = [*placed.front, *([present] if present else [])]
     path = drawn_path(
         best.model,
-        program,
-        placements,
+        placed.program,
+        np.array([row.origin for row in shown]),
         best.load,
         force=best.force,
         step=best.step,
         points=int(np.clip(VALUES // len(shown), *POINTS)),
     )
     data = {
-        "front": front,
-        "chosen": summary["chosen"]["number"] - 1,
-        "recommended": summary["recommended"]["number"] - 1,
-        "before": summary["before"],
-        "before_reason": plain(summary["before_reason"] or ""),
+        "front": [vars(row) for row in placed.front],
+        "chosen": (placed.chosen.number or 0) - 1,
+        "recommended": placed.search["recommended"] - 1,
+        "before": present.figures() if present else None,
+        "before_reason": plain(placed.present_reason),
         "force": best.force,
-        "keepouts": [{"name": plain(box.name), "box": _box(box.low, box.high)} for box in keepouts],
+        "keepouts": [{"name": plain(box.name), "box": _box(box.low, box.high)} for box in placed.task.rules.keepouts],
         "workspace": _workspace(best),
         **_drawn(path),
         **page_colours(),
@@ -78,12 +60,12 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
         styles=["viewer.css", "place.css"],
         scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
         data=data,
-        title=f"Placements of {summary['program']}",
-        about=f"machine {machine_text(summary)} · load {summary['load']}, {summary['force_N']:g} N",
-        objective=summary["objective"],
-        load=summary["load"],
+        title=f"Placements of {placed.program.name}",
+        about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
+        objective=placed.objective,
+        load=str(best.load),
         note=_note(path),
-        warnings=summary["warnings"],
+        warnings=placed.warnings,
     )
 
 
@@ -151,60 +133,49 @@ def _note(path: DrawnPath) -> str:
     )
 
 
-def text(summary: dict[str, Any]) -> str:
-    """What got worse, the placement, what it brings, what it costs; `summary` as in `placement.json`."""
-    best, before = summary["chosen"], summary["before"]
-    first = len(summary["worse"]) + bool(summary["search"].get("nothing_better"))
-    which = f"placement {best['number']} of {len(summary['front'])}, picked" if summary["picked"] else "recommended"
+def text(placed: Placement) -> str:
+    """What got worse, the placement, what it brings, what it costs."""
+    best, present, count = placed.chosen, placed.present, len(placed.front)
+    first = len(placed.worse) + bool(placed.search.get("nothing_better"))
+    label = "picked" if placed.picked else "recommended"
+    which = f"placement {best.number} of {count}, picked" if placed.picked else f"objective {placed.objective}"
     lines = [
-        *(f"warning         {text}" for text in summary["warnings"][:first]),
-        f"program         {summary['program']} on {machine_text(summary)}, load {summary['load']}",
-        f"{'picked' if summary['picked'] else 'recommended':<16}X{best['x_mm']:.3f} Y{best['y_mm']:.3f} "
-        f"Z{best['z_mm']:.3f}, turned by {best['rotation_deg']:.3f} degrees "
-        f"({which if summary['picked'] else 'objective ' + summary['objective']})",
+        *(f"warning         {warning}" for warning in placed.warnings[:first]),
+        f"program         {placed.program.name} on {machine_text(placed.machine_stated)}, load {placed.best.load}",
+        f"{label:<16}X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees "
+        f"({which})",
     ]
-    if best["a_deg"] or best["b_deg"]:
-        lines.append(f"                set-up tilted by A{best['a_deg']:.3f} B{best['b_deg']:.3f} degrees")
-    for name, row in (("  stiffness", best), ("  before", before)):
-        lines.append(f"{name:<16}{_figures_words(row) if row else 'out of reach: ' + summary['before_reason']}")
-    lines += _plunges_words(best, before)
-    for goal, cost in summary["trade_offs"].items():
+    if best.a_deg or best.b_deg:
+        lines.append(f"                set-up tilted by A{best.a_deg:.3f} B{best.b_deg:.3f} degrees")
+    lines.append(f"  stiffness     {_figures_words(best)}")
+    lines.append(f"  before        {_figures_words(present) if present else f'out of reach: {placed.present_reason}'}")
+    if best.plunge_mean_N_per_mm is not None:
+        now = f", before {number(present.plunge_mean_N_per_mm)}" if present else ""
+        mean = number(best.plunge_mean_N_per_mm)
+        lines.append(f"  plunges       mean {mean}{now} N/mm, along the tool axis, not counted above")
+    for goal, cost in placed.trade_offs.items():
         lines.append(
             f"  best {goal:<9} {number(cost['best_on_front_N_per_mm'])} on the front, "
             f"{number(cost['chosen_N_per_mm'])} here, N/mm"
         )
-    lines.append(f"  margin        {100.0 * _smallest_margin(best):.1f} % of a limit's span at least, rapids included")
-    blocks = summary["offset_blocks"]
-    lines.append(f"LinuxCNC        {blocks['linuxcnc'] or blocks['linuxcnc_reason']}")
-    fanuc = (blocks["fanuc"] or blocks["fanuc_reason"]).replace("\n", "\n                ")
+    margin = min(value for value in (best.margin, best.rapid_margin, 1.0) if value is not None)
+    lines.append(f"  margin        {100.0 * margin:.1f} % of a limit's span at least, rapids included")
+    blocks = placed.offsets
+    lines.append(f"LinuxCNC        {blocks.linuxcnc or blocks.linuxcnc_reason}")
+    fanuc = (blocks.fanuc or blocks.fanuc_reason).replace("\n", "\n                ")
     lines.append(f"Fanuc-style     {fanuc}")
-    evaluated = summary["search"]["pose_evaluations"]
-    lines.append(f"front           {len(summary['front'])} placements, {number(evaluated)} poses evaluated")
-    lines += _written(summary["written"]) if summary["written"] else []
-    lines += [f"warning         {text}" for text in summary["warnings"][first:]]
+    evaluated = placed.search["pose_evaluations"]
+    lines.append(f"front           {count} placements, {number(evaluated)} poses evaluated")
+    lines += _written(placed.written) if placed.written else []
+    lines += [f"warning         {warning}" for warning in placed.warnings[first:]]
     return "\n".join(lines)
 
 
-def _figures_words(row: dict[str, Any]) -> str:
+def _figures_words(row: PlacementRow) -> str:
     return (
-        f"mean {number(row['mean_N_per_mm'])}, range {number(row['range_N_per_mm'])}, "
-        f"weakest {number(row['min_N_per_mm'])} N/mm, "
-        f"deflection {row['mean_deflection_um']:.1f} um"
+        f"mean {number(row.mean_N_per_mm)}, range {number(row.range_N_per_mm)}, "
+        f"weakest {number(row.min_N_per_mm)} N/mm, deflection {row.mean_deflection_um:.1f} um"
     )
-
-
-def _plunges_words(best: dict[str, Any], before: dict[str, Any] | None) -> list[str]:
-    """The plunges, where they stand beside the other figures."""
-    if best["plunge_mean_N_per_mm"] is None:
-        return []
-    now = f", before {number(before['plunge_mean_N_per_mm'])}" if before else ""
-    return [
-        f"  plunges       mean {number(best['plunge_mean_N_per_mm'])}{now} N/mm, along the tool axis, not counted above"
-    ]
-
-
-def _smallest_margin(row: dict[str, Any]) -> float:
-    return float(min(value for value in (row["margin"], row["rapid_margin"], 1.0) if value is not None))
 
 
 def _written(written: dict[str, Any]) -> list[str]:
@@ -226,22 +197,18 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return (*data, "report.html", "front.png", "profiles.png", "map.png", "setup.pdf") if plots else data
 
 
-def files(placed: Placed, *, plots: bool = True) -> dict[str, Content]:
+def files(placed: Placement, *, plots: bool = True) -> dict[str, Content]:
     """The front as a table, everything as JSON, and with `plots` page, pictures and set-up sheet."""
-    from toolpath_stiff.placement.document import COLUMNS
-
-    summary = placed.summary
-    rows = [[_cell(row[name]) for name in COLUMNS] for row in summary["front"]]
     contents: dict[str, Content] = {
-        "placements.csv": csv_text(COLUMNS, rows),
-        "placement.json": json.dumps(summary, indent=2) + "\n",
+        "placements.csv": csv_text(COLUMNS, ([_cell(value) for value in vars(row).values()] for row in placed.front)),
+        "placement.json": json.dumps(placed.to_dict(), indent=2) + "\n",
     }
     if plots:
-        contents["report.html"] = place_page(summary, placed.best, placed.program, placed.task.rules.keepouts)
-        contents["front.png"] = front_picture(summary)
+        contents["report.html"] = place_page(placed)
+        contents["front.png"] = front_picture(placed)
         contents["profiles.png"] = profiles_picture(placed.best, placed.before)
         contents["map.png"] = workspace_picture(placed.best, placed.before)
-        contents["setup.pdf"] = setup_sheet(summary, placed.best)
+        contents["setup.pdf"] = setup_sheet(placed)
     return contents
 
 

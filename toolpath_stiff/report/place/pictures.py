@@ -6,18 +6,19 @@ import io
 import sys
 import textwrap
 from importlib.util import LazyLoader, find_spec, module_from_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolpath_stiff.analysis.grid import map_stiffness
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.placement.document import FIGURES
+from toolpath_stiff.placement.result import Placement
+from toolpath_stiff.placement.rows import FIGURES, PlacementRow
 from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.report.profile import profile_curve
-from toolpath_stiff.report.words import machine_text, number, plain
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.report.words import machine_text, plain
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,30 +29,30 @@ AROUND = 0.06  # m of the workspace shown about the paths
 
 
 @picture
-def front_picture(summary: dict[str, Any]) -> Figure:
+def front_picture(placed: Placement) -> Figure:
     """PNG of range against mean, coloured by the weakest place: the front, the chosen placement, the present one."""
-    front, best, before = summary["front"], summary["chosen"], summary["before"]
+    best, before = placed.chosen, placed.present
     with house_style():
         figure = new_figure(9.0, 6.2)
         axes = figure.add_axes((0.12, 0.12, 0.7, 0.69))
-        mean, spread, weakest = ([row[key] for row in front] for key in FIGURES.values())
-        everything = [*weakest, *([before["min_N_per_mm"]] if before else [])]
+        mean, spread, weakest = ([getattr(row, key) for row in placed.front] for key in FIGURES.values())
+        everything = [*weakest, *([before.min_N_per_mm] if before else [])]
         scale = {"vmin": min(everything), "vmax": max(*everything, min(everything) * (1.0 + 1e-6))}
         dots = axes.scatter(mean, spread, s=34, c=weakest, cmap=COLOUR_MAP, ec=INK, lw=0.4, zorder=2, **scale)
         dots.set_label("front: no placement is better in all three")
         axes.plot(
-            best["mean_N_per_mm"],
-            best["range_N_per_mm"],
+            best.mean_N_per_mm,
+            best.range_N_per_mm,
             "o",
             ms=16,
             mfc="none",
             mec=SECOND_ORANGE,
             mew=2.5,
-            label=f"{'picked' if summary['picked'] else 'recommended'}, number {best['number']}",
+            label=f"{'picked' if placed.picked else 'recommended'}, number {best.number}",
         )
         if before:
             axes.scatter(
-                [before["mean_N_per_mm"]], [before["range_N_per_mm"]], marker="s", s=90, c=[before["min_N_per_mm"]],
+                [before.mean_N_per_mm], [before.range_N_per_mm], marker="s", s=90, c=[before.min_N_per_mm],
                 cmap=COLOUR_MAP, ec=INK, lw=1.8, zorder=3, label="present placement", **scale,
             )  # fmt: skip
         axes.margins(0.08)
@@ -64,9 +65,10 @@ def front_picture(summary: dict[str, Any]) -> Figure:
         figure.colorbar(dots, cax=bar, label="weakest place, N/mm (more is better)")
         bar.yaxis.set_major_formatter(lambda value, _: number(value))
         bar.grid(visible=False)
-        title = f"Placements of {plain(summary['program'])}"
+        title = f"Placements of {plain(placed.program.name)}"
         figure.text(0.12, 0.94, title, fontsize=14, weight="bold")
-        text = f"machine {machine_text(summary)}   ·   load {summary['load']}   ·   objective {summary['objective']}"
+        text = f"machine {machine_text(placed.machine_stated)}   ·   load {placed.best.load}"
+        text += f"   ·   objective {placed.objective}"
         figure.text(0.12, 0.895, text, fontsize=10, color=MUTED)
         return figure
 
@@ -158,13 +160,13 @@ SMALLEST_SKETCH = 0.2  # of the height
 UNDERLAY = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}  # of names over the path
 
 
-def setup_sheet(summary: dict[str, Any], best: Analysis) -> bytes:
+def setup_sheet(placed: Placement) -> bytes:
     """PDF of one page (more where warnings are many): what `placement.json` says of the chosen placement."""
     _put_off("fontTools", "subset")  # a third of the sheet's time; asked for where fonts are embedded as Type 42
     from matplotlib.backends.backend_pdf import PdfPages
 
-    warnings = [line for text in summary["warnings"] for line in _bullet(plain(text))]
-    rows = _rows(summary, best)
+    warnings = [line for text in placed.warnings for line in _bullet(plain(text))]
+    rows = _rows(placed)
     buffer = io.BytesIO()
     empty = {"CreationDate": None, "Producer": None, "Creator": None}
     with house_style(), PdfPages(buffer, metadata=empty) as pages:
@@ -175,14 +177,14 @@ def setup_sheet(summary: dict[str, Any], best: Analysis) -> bytes:
         if rest:
             shown = [*shown, "(more warnings on the next page)"]
         figure = new_figure(WIDTH, HEIGHT)
-        at = _heading(figure, summary, best)
+        at = _heading(figure, placed)
         at = _paragraph(figure, at, shown)
-        _sketch(figure, (0.16, below + 0.045, 0.72, at - below - 0.085), summary["chosen"], best)
+        _sketch(figure, (0.16, below + 0.045, 0.72, at - below - 0.085), placed)
         _table(figure, below - 0.01, rows)
         pages.savefig(figure)
         while rest:
             figure = new_figure(WIDTH, HEIGHT)
-            _paragraph(figure, _heading(figure, summary, best), rest[:40])
+            _paragraph(figure, _heading(figure, placed), rest[:40])
             pages.savefig(figure)
             rest = rest[40:]
     return buffer.getvalue()
@@ -199,16 +201,15 @@ def _put_off(package: str, name: str) -> None:
         setattr(sys.modules[package], name, sys.modules[full])  # else the import machinery looks into it at once
 
 
-def _heading(figure: Figure, summary: dict[str, Any], best: Analysis) -> float:
+def _heading(figure: Figure, placed: Placement) -> float:
     """Title and machine; returns how far down the page it reaches."""
     at = 0.945
-    for line in textwrap.wrap(f"Set-up of {plain(summary['program'])}", 52):
+    for line in textwrap.wrap(f"Set-up of {plain(placed.program.name)}", 52):
         figure.text(LEFT, at, line, fontsize=18, weight="bold")
         at -= 0.026
-    about = f"machine {machine_text(summary)}: {plain(best.machine.title)}"
-    row = summary["chosen"]
-    which = "picked from the front" if summary["picked"] else f"recommended, objective {summary['objective']}"
-    about = f"{about}\nplacement {row['number']} of {len(summary['front'])}, {which}"
+    about = f"machine {machine_text(placed.machine_stated)}: {plain(placed.best.machine.title)}"
+    which = "picked from the front" if placed.picked else f"recommended, objective {placed.objective}"
+    about = f"{about}\nplacement {placed.chosen.number} of {len(placed.front)}, {which}"
     for line in (part for text in about.splitlines() for part in textwrap.wrap(text, FULL_LETTERS)):
         figure.text(LEFT, at, line, fontsize=10, color=MUTED)
         at -= 0.0165
@@ -226,20 +227,20 @@ def _paragraph(figure: Figure, at: float, lines: list[str]) -> float:
     return at
 
 
-def _rows(summary: dict[str, Any], best: Analysis) -> list[tuple[str, list[str]]]:
+def _rows(placed: Placement) -> list[tuple[str, list[str]]]:
     """Names and the lines of their values."""
-    row, blocks = summary["chosen"], summary["offset_blocks"]
+    row, blocks, best = placed.chosen, placed.offsets, placed.best
     heights = mm_from_m(best.samples.position[best.samples.cutting, 2])
-    fanuc = blocks["fanuc"] or blocks["fanuc_reason"]
-    plunges = row["plunge_mean_N_per_mm"]
-    before, written = summary["before"], summary["written"]
+    fanuc = blocks.fanuc or blocks.fanuc_reason
+    plunges = row.plunge_mean_N_per_mm
+    before, written = placed.present, placed.written
     lines = [
-        ("program zero (G54)", f"X {row['x_mm']:.4f}   Y {row['y_mm']:.4f}   Z {row['z_mm']:.4f} mm"),
-        ("turn of the work about Z", f"{row['rotation_deg']:.4f} degrees"),
+        ("program zero (G54)", f"X {row.x_mm:.4f}   Y {row.y_mm:.4f}   Z {row.z_mm:.4f} mm"),
+        ("turn of the work about Z", f"{row.rotation_deg:.4f} degrees"),
         *_tilt_line(row),
         ("heights of the cut", f"Z {heights.min():.3f} to {heights.max():.3f} mm (machine)"),
-        ("LinuxCNC", blocks["linuxcnc"] or blocks["linuxcnc_reason"]),
-        ("Fanuc-style", fanuc + (f"\n{G68_NOTE}" if "G68" in (blocks["fanuc"] or "") else "")),
+        ("LinuxCNC", blocks.linuxcnc or blocks.linuxcnc_reason),
+        ("Fanuc-style", fanuc + (f"\n{G68_NOTE}" if "G68" in blocks.fanuc else "")),
         *([("program written", written["file"])] if written and "refused" not in written else []),
         ("mean stiffness", _both(row, before, "mean_N_per_mm")),
         ("range", _both(row, before, "range_N_per_mm")),
@@ -247,15 +248,15 @@ def _rows(summary: dict[str, Any], best: Analysis) -> list[tuple[str, list[str]]
         *([] if plunges is None else [("plunges, mean", f"{number(plunges)} N/mm along the tool axis")]),
         (
             "mean deflection",
-            f"{row['mean_deflection_um']:.1f} um under {summary['force_N']:g} N, load {summary['load']}",
+            f"{row.mean_deflection_um:.1f} um under {best.force:g} N, load {best.load}",
         ),
     ]
     return [(name, _wrapped(value)) for name, value in lines]
 
 
-def _both(row: dict[str, Any], before: dict[str, Any] | None, key: str) -> str:
-    now = f" (present placement {number(before[key])})" if before else ""
-    return f"{number(row[key])} N/mm{now}"
+def _both(row: PlacementRow, before: PlacementRow | None, key: str) -> str:
+    now = f" (present placement {number(getattr(before, key))})" if before else ""
+    return f"{number(getattr(row, key))} N/mm{now}"
 
 
 def _table(figure: Figure, at: float, rows: list[tuple[str, list[str]]]) -> None:
@@ -267,13 +268,13 @@ def _table(figure: Figure, at: float, rows: list[tuple[str, list[str]]]) -> None
         at -= 0.006
 
 
-def _sketch(figure: Figure, box: tuple[float, float, float, float], row: dict[str, Any], best: Analysis) -> None:
+def _sketch(figure: Figure, box: tuple[float, float, float, float], placed: Placement) -> None:
     """The path from above in machine coordinates, program zero and its axes, the machine's axis."""
-    axes = figure.add_axes(box)
+    axes, row, best = figure.add_axes(box), placed.chosen, placed.best
     position = mm_from_m(best.samples.position[best.samples.cutting])
     axes.plot(position[:, 0], position[:, 1], color=BLUE, lw=1.0)
-    x, y = row["x_mm"], row["y_mm"]
-    turn = np.deg2rad(row["rotation_deg"])
+    x, y = row.x_mm, row.y_mm
+    turn = np.deg2rad(row.rotation_deg)
     reach = 0.25 * max(float(np.ptp(position[:, :2], axis=0).max()), 1.0)
     for angle, name in ((turn, "program X"), (turn + np.pi / 2, "program Y")):
         along = np.array([np.cos(angle), np.sin(angle)])
@@ -307,12 +308,10 @@ def _name_zero(axes: Axes, zero: tuple[float, float], turn: float) -> None:
     )
 
 
-def _tilt_line(row: dict[str, Any]) -> list[tuple[str, str]]:
-    if not (row["a_deg"] or row["b_deg"]):
+def _tilt_line(row: PlacementRow) -> list[tuple[str, str]]:
+    if not (row.a_deg or row.b_deg):
         return []
-    return [
-        ("tilt of the set-up", f"A {row['a_deg']:.4f}, B {row['b_deg']:.4f} degrees (about X first, then Y, then Z)")
-    ]
+    return [("tilt of the set-up", f"A {row.a_deg:.4f}, B {row.b_deg:.4f} degrees (about X first, then Y, then Z)")]
 
 
 def _wrapped(text: str) -> list[str]:

@@ -12,15 +12,17 @@ from markupsafe import Markup
 
 from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.strut_law import bar_curve_csv
+from toolpath_stiff.documents import Document
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.report.pages import bullets, hint_list, markup, picture, readings_page, section, table
 from toolpath_stiff.report.residuals import before_after_png
 from toolpath_stiff.report.update.pictures import error_ladder_png, figure3_png
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, machine_text, number, plain
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, machine_text, plain
+from toolpath_stiff.units import number
 
 if TYPE_CHECKING:
-    from toolpath_stiff.correction.document import LawEntry, StepEntry, UpdateDocument
+    from toolpath_stiff.correction.document import LawEntry, UpdateDocument
     from toolpath_stiff.correction.ladder import Update
     from toolpath_stiff.correction.strut_law import BarCurve
     from toolpath_stiff.machine.model import Machine
@@ -221,7 +223,7 @@ def _ladder(document: UpdateDocument) -> list[str]:
     return found
 
 
-def result_step(document: UpdateDocument) -> StepEntry:
+def result_step(document: UpdateDocument) -> Document:
     """The model that comes out: the last step, the machine file as given where nothing is added."""
     return document["steps"][0 if document["verdict"] == "nothing added" else -1]
 
@@ -313,7 +315,8 @@ def _pictures(found: UpdateDocument, update: Update, bars: BarCurve | None) -> d
     called = f"with {' + '.join(last['effects'])}" if last["effects"] else last["name"]
     entry = {"effect": called, "held_out_error_percent": last["held_out_error_percent"]}
     drawn = before_after_png(
-        {"verdict": found["verdict"], "baseline": found["strut_law_refitted"], "candidates": [entry], "best": called},
+        {"verdict": found["verdict"], "baseline": found["strut_law_refitted"], "candidates": [entry], "pairs": [],
+         "best": called},
         update.data.of_tip, update.steps[0].residual, update.steps[-1].residual, names=("as given", called),
     )  # fmt: skip
     pictures: dict[str, bytes] = {}
@@ -334,7 +337,7 @@ def ladder(found: UpdateDocument) -> tuple[Any, ...]:
     return [_rung(step) for step in found["steps"]], floor, question, turned_down
 
 
-def _rung(step: StepEntry) -> dict[str, Any]:
+def _rung(step: Document) -> dict[str, Any]:
     """A step with what its effect acts on below the effect's name."""
     choices = re.findall(r"\(([^)]*)\)", step["name"])
     return {**step, "name": re.sub(r" \([^)]*\)", "", step["name"]), "remark": ", ".join(choices)}

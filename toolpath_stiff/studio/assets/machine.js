@@ -16,7 +16,8 @@ function errorColour(percent, scale) {
   return mix(ink.rapid, to, 0.15 + 0.85 * share);
 }
 function mix(a, b, t) {
-  const parse = (c) => { const h = c.length === 4 ? c.replace(/[\da-f]/gi, "$&$&") : c; return [1, 3, 5].map((i) => parseInt(h.slice(i, i + 2), 16)); };
+  const parse = (c) => { const h = c.length === 4 ? c.replace(/[\da-f]/gi, "$&$&") : c;
+    return [1, 3, 5].map((i) => parseInt(h.slice(i, i + 2), 16)); };
   const [p, q] = [parse(a), parse(b)];
   return `rgb(${p.map((v, i) => Math.round(v + (q[i] - v) * t)).join(",")})`;
 }
@@ -38,7 +39,8 @@ class MachineScene {
   get joints() { return this.state.machine.joints; }
   box() {
     const box = [0, 1, 2].map(() => [Infinity, -Infinity]);
-    const see = (p) => p.forEach((v, i) => { if (i < 3 && v !== null) { box[i][0] = Math.min(box[i][0], v); box[i][1] = Math.max(box[i][1], v); } });
+    const see = (p) => p.forEach((v, i) => { if (i < 3 && v !== null) { box[i][0] = Math.min(box[i][0], v);
+      box[i][1] = Math.max(box[i][1], v); } });
     if (!this.state) return box.map(() => [-1, 1]);
     if (this.focus === "machine") this.joints.frame.forEach(see);
     for (const row of this.state.machine.reach) row.forEach(see);
@@ -52,7 +54,8 @@ class MachineScene {
     return { turn, joints, middle, nose: moved(this.pose, turn, [0, 0, this.joints.tool]) };
   }
   islit(link, number) {
-    return this.lit.some((one) => one.link === link && (one.number === undefined || number === undefined || one.number === number));
+    return this.lit.some((one) => one.link === link && (one.number === undefined || number === undefined
+      || one.number === number));
   }
   draw(g, view) {
     if (!this.state) return;
@@ -83,15 +86,18 @@ class MachineScene {
   // Joints of one vertex stand above each other: the frame is a ring through the vertices, with legs to the floor.
   drawFrame(g, view) {
     const joints = this.joints.frame, floor = Math.min(...this.state.machine.reach.flat().map((p) => p[2]));
-    const order = joints.map((p, i) => i).sort((i, k) => Math.atan2(joints[i][1], joints[i][0]) - Math.atan2(joints[k][1], joints[k][0]) || i - k);
+    const order = joints.map((p, i) => i).sort((i, k) => Math.atan2(joints[i][1], joints[i][0])
+      - Math.atan2(joints[k][1], joints[k][0]) || i - k);
     const colour = this.islit("frame") ? ink.accent : ink.rapid, width = Math.max(2, Math.min(9, 160 * view.zoom));
     g.globalAlpha = 0.55;
     this.polyline(g, view, order.map((i) => joints[i]), colour, width, true);
-    if (this.focus === "machine") for (const i of order) this.polyline(g, view, [joints[i], [joints[i][0], joints[i][1], floor]], colour, width * 0.6);
+    if (this.focus === "machine") for (const i of order) this.polyline(g, view, [joints[i], [joints[i][0], joints[i][1],
+      floor]], colour, width * 0.6);
     g.globalAlpha = 1;
     if (this.islit("table")) {
       const [x, y] = this.state.machine.origin, z = floor;
-      this.polyline(g, view, [[x - 400, y - 400, z], [x + 400, y - 400, z], [x + 400, y + 400, z], [x - 400, y + 400, z]], ink.accent, 3, true);
+      this.polyline(g, view, [[x - 400, y - 400, z], [x + 400, y - 400, z], [x + 400, y + 400, z],
+        [x - 400, y + 400, z]], ink.accent, 3, true);
     }
   }
   drawPath(g, view) {
@@ -111,19 +117,22 @@ class MachineScene {
       items.push({ depth: (p[2] + q[2]) / 2, paint: (g) => {
         const wide = width(mm, low, high);
         for (const [c, w] of [[ink.panel, wide + 2], [colour, wide], [core, wide * 0.35]]) {
-          g.beginPath(); g.moveTo(p[0], p[1]); g.lineTo(q[0], q[1]); g.strokeStyle = c; g.lineWidth = w; g.lineCap = "butt"; g.stroke();
+          g.beginPath(); g.moveTo(p[0], p[1]); g.lineTo(q[0], q[1]); g.strokeStyle = c; g.lineWidth = w;
+            g.lineCap = "butt"; g.stroke();
         }
       } });
     };
     this.joints.frame.forEach((top, i) => {
-      const lit = this.islit("struts", i + 1), colour = lit ? ink.accent : mix(ink.plunge, ink.panel, 0.15), core = lit ? ink.panel : mix(ink.rapid, ink.panel, 0.55);
+      const lit = this.islit("struts", i + 1), colour = lit ? ink.accent : mix(ink.plunge, ink.panel, 0.15), core = lit
+        ? ink.panel : mix(ink.rapid, ink.panel, 0.55);
       const cut = between(top, joints[i], 0.58);
       bar(top, cut, 150, colour, core, 4, 16);
       bar(cut, joints[i], 85, lit ? ink.accent : ink.rapid, core, 2.5, 9);
       for (const [at, frame] of [[top, true], [joints[i], false]]) {
         const [x, y, depth] = view.project(at), on = this.islit("joints", i + 1);
         items.push({ depth: depth + 20, paint: (g) => {
-          g.beginPath(); g.arc(x, y, width(frame ? 130 : 75, 3, 10), 0, 7); g.fillStyle = on ? ink.accent : ink.plunge; g.fill();
+          g.beginPath(); g.arc(x, y, width(frame ? 130 : 75, 3, 10), 0, 7); g.fillStyle = on ? ink.accent : ink.plunge;
+            g.fill();
           g.strokeStyle = ink.panel; g.lineWidth = 1; g.stroke();
         } });
       }
@@ -135,7 +144,8 @@ class MachineScene {
       g.beginPath();
       outline.forEach(([x, y], i) => { if (i) g.lineTo(x, y); else g.moveTo(x, y); });
       g.closePath();
-      g.globalAlpha = 0.82; g.fillStyle = this.islit("platform") || this.islit("geometry") ? ink.accent : mix(ink.plunge, ink.panel, 0.35); g.fill(); g.globalAlpha = 1;
+      g.globalAlpha = 0.82; g.fillStyle = this.islit("platform") || this.islit("geometry") ? ink.accent
+        : mix(ink.plunge, ink.panel, 0.35); g.fill(); g.globalAlpha = 1;
       g.strokeStyle = ink.ink; g.lineWidth = 1.2; g.stroke();
     } });
     const tool = this.islit("tool") ? ink.accent : ink.plunge;
@@ -149,8 +159,10 @@ class MachineScene {
     if (!r) return this.plan(view);
     if (r.line.length > MANY) return [this.cloud(r, view), ...this.plan(view)];
     for (let i = 0; i < r.line.length; i++) {
-      const at = [r.x_mm[i], r.y_mm[i], r.z_mm[i]], [x, y, depth] = view.project(at), gone = r.aside[i], chosen = i === this.selected;
-      const along = [r.dx[i], r.dy[i], r.dz[i]], size = BESIDE / view.zoom, [px, py] = view.project(at.map((v, k) => v + along[k] * size));
+      const at = [r.x_mm[i], r.y_mm[i], r.z_mm[i]], [x, y, depth] = view.project(at), gone = r.aside[i],
+        chosen = i === this.selected;
+      const along = [r.dx[i], r.dy[i], r.dz[i]], size = BESIDE / view.zoom, [px, py] = view.project(at.map((v, k) => v
+        + along[k] * size));
       // Readings of one pose stand apart along their directions, so that each can be pointed at.
       const percent = this.deviation[i] ?? 0, big = this.radius(gone, percent);
       this.spots.push([px, py, i]);
@@ -158,7 +170,8 @@ class MachineScene {
         const colour = gone ? ink.line : errorColour(percent, this.scale);
         g.beginPath(); g.moveTo(x, y); g.lineTo(px, py); g.strokeStyle = colour; g.lineWidth = 1.3; g.stroke();
         g.beginPath(); g.arc(px, py, big, 0, 7);
-        if (gone) { g.strokeStyle = ink.muted; g.lineWidth = 1.4; g.stroke(); } else { g.fillStyle = colour; g.fill(); g.strokeStyle = ink.panel; g.lineWidth = 0.8; g.stroke(); }
+        if (gone) { g.strokeStyle = ink.muted; g.lineWidth = 1.4; g.stroke(); } else { g.fillStyle = colour; g.fill();
+          g.strokeStyle = ink.panel; g.lineWidth = 0.8; g.stroke(); }
         if (chosen) ring(g, px, py, big + 4, ink.ink, 2);
       } });
     }
@@ -167,21 +180,28 @@ class MachineScene {
   radius(gone, percent) { return gone ? 3 : 2.2 + 4 * Math.min(1, Math.abs(percent) / this.scale); }
   // Thousands of readings: dots above the rest without bars, those of a shade as one path; the largest errors last.
   cloud(r, view) {
-    const [right, up] = view.axes(), [mx, my, mz] = view.middle, size = BESIDE / view.zoom, gone = [], shades = Array.from({ length: 2 * SHADES + 1 }, () => []);
+    const [right, up] = view.axes(), [mx, my, mz] = view.middle, size = BESIDE / view.zoom, gone = [],
+      shades = Array.from({ length: 2 * SHADES + 1 }, () => []);
     for (let i = 0; i < r.line.length; i++) {
-      const x = r.x_mm[i] + r.dx[i] * size - mx, y = r.y_mm[i] + r.dy[i] * size - my, z = r.z_mm[i] + r.dz[i] * size - mz;
-      const spot = [view.cx + view.zoom * (x * right[0] + y * right[1]), view.cy - view.zoom * (x * up[0] + y * up[1] + z * up[2]), i];
+      const x = r.x_mm[i] + r.dx[i] * size - mx, y = r.y_mm[i] + r.dy[i] * size - my, z = r.z_mm[i] + r.dz[i] * size
+        - mz;
+      const spot = [view.cx + view.zoom * (x * right[0] + y * right[1]), view.cy - view.zoom * (x * up[0] + y * up[1]
+        + z * up[2]), i];
       const share = Math.max(-1, Math.min(1, (this.deviation[i] ?? 0) / this.scale));
       this.spots.push(spot);
       (r.aside[i] ? gone : shades[SHADES + Math.round(SHADES * share)]).push(spot);
     }
-    const paths = shades.map((spots, k) => ({ spots, percent: (k / SHADES - 1) * this.scale })).sort((a, b) => Math.abs(a.percent) - Math.abs(b.percent));
-    const trace = (g, spots, radius) => { g.beginPath(); for (const [x, y] of spots) { g.moveTo(x + radius, y); g.arc(x, y, radius, 0, 7); } };
+    const paths = shades.map((spots, k) => ({ spots, percent: (k / SHADES - 1) * this.scale }))
+      .sort((a, b) => Math.abs(a.percent) - Math.abs(b.percent));
+    const trace = (g, spots, radius) => { g.beginPath(); for (const [x, y] of spots) { g.moveTo(x + radius, y);
+      g.arc(x, y, radius, 0, 7); } };
     return { depth: 1e5, paint: (g) => {
-      for (const { spots, percent } of paths) { trace(g, spots, this.radius(false, percent)); g.fillStyle = errorColour(percent, this.scale); g.fill(); }
+      for (const { spots, percent } of paths) { trace(g, spots, this.radius(false, percent));
+        g.fillStyle = errorColour(percent, this.scale); g.fill(); }
       trace(g, gone, this.radius(true, 0)); g.strokeStyle = ink.muted; g.lineWidth = 1.4; g.stroke();
       const chosen = this.spots[this.selected];
-      if (chosen) ring(g, chosen[0], chosen[1], this.radius(r.aside[this.selected], this.deviation[this.selected] ?? 0) + 4, ink.ink, 2);
+      if (chosen) ring(g, chosen[0], chosen[1], this.radius(r.aside[this.selected], this.deviation[this.selected] ?? 0)
+        + 4, ink.ink, 2);
     } };
   }
   plan(view) {
@@ -194,11 +214,13 @@ class MachineScene {
     });
   }
   overlay(g, view) {
-    if (this.sample >= 0 && this.paths[0]) { const [x, y] = this.paths[0].at(this.sample); ring(g, x, y, 7, ink.panel, 4); ring(g, x, y, 7, ink.ink, 2); }
+    if (this.sample >= 0 && this.paths[0]) { const [x, y] = this.paths[0].at(this.sample);
+      ring(g, x, y, 7, ink.panel, 4); ring(g, x, y, 7, ink.ink, 2); }
   }
   nearest(x, y) {
     let best = 11 * 11, found = -1;
-    for (const [px, py, i] of this.spots ?? []) { const d = (px - x) ** 2 + (py - y) ** 2; if (d < best) { best = d; found = i; } }
+    for (const [px, py, i] of this.spots ?? []) { const d = (px - x) ** 2 + (py - y) ** 2; if (d < best) { best = d;
+      found = i; } }
     if (found < 0 && this.paths[0]) { const k = this.paths[0].nearest(x, y); if (k >= 0) found = k + PATH_FROM; }
     return found;
   }

@@ -1,6 +1,7 @@
 // The panels beside the machine. Each is a function of the state that gives elements; text is never taken for HTML.
 function h(tag, attributes = {}, ...children) {
-  const element = SVG.has(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag) : document.createElement(tag);
+  const element = SVG.has(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag)
+    : document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (value === null || value === undefined || value === false) continue;
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
@@ -13,29 +14,40 @@ function h(tag, attributes = {}, ...children) {
 const SVG = new Set(["svg", "path", "circle", "line", "text", "g", "polyline", "polygon", "title", "rect"]);
 const percent = (v, digits = 2) => (v === null || v === undefined ? "\u2013" : `${v.toFixed(digits)} %`);
 const chance = (p) => (p > 0.99 ? "> 99 %" : p < 0.01 ? "< 1 %" : `${Math.round(100 * p)} %`);
-const short = (v) => (typeof v !== "number" ? String(v) : Math.abs(v) >= 1e5 ? group(Number(v.toPrecision(4))) : String(Number(v.toPrecision(4))));
-const button = (label, run, attributes = {}) => h("button", { type: "button", class: "live", onclick: run, ...attributes }, label);
+const short = (v) => (typeof v !== "number" ? String(v) : Math.abs(v) >= 1e5 ? group(Number(v.toPrecision(4)))
+  : String(Number(v.toPrecision(4))));
+const button = (label, run, attributes = {}) => h("button", { type: "button", class: "live", onclick: run,
+  ...attributes }, label);
 const list = (items) => h("ul", {}, items.map((text) => h("li", {}, text)));
-const table = (head, rows) => h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "table" }, h("table", {}, h("thead", {}, h("tr", {}, head.map((t) => h("th", { scope: "col" }, t)))),
-  h("tbody", {}, rows.map((row) => h("tr", {}, row.map((cell) => h("td", typeof cell === "string" && cell.length > 24 ? { class: "long" } : {}, cell)))))));
-const figures = (pairs) => h("div", { class: "figures" }, pairs.map(([name, value, id]) => h("div", {}, h("b", id ? { id } : {}, value), h("span", {}, name))));
-
-// ---------------------------------------------------------------- the gauge
-const STAGES = [["as_given", "as the file stands"], ["refitted", "strut law refitted"], ["now", "effects on"], ["left_out", "at left-out points"]];
+const table = (head, rows) => h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "table" },
+  h("table", {}, h("thead", {}, h("tr", {}, head.map((t) => h("th", { scope: "col" }, t)))),
+  h("tbody", {}, rows.map((row) => h("tr", {}, row.map((cell) => h("td", typeof cell === "string" && cell.length > 24
+    ? { class: "long" } : {}, cell)))))));
+const figures = (pairs) => h("div", { class: "figures" }, pairs.map(([name, value, id]) => h("div", {},
+  h("b", id ? { id } : {}, value), h("span", {}, name))));
+// The gauge.
+const STAGES = [["as_given", "as the file stands"], ["refitted", "strut law refitted"], ["now", "effects on"],
+  ["left_out", "at left-out points"]];
 function gaugeOf(state) {
   const g = state.gauge;
-  if (!g) return h("p", { class: "muted" }, "Drop a measurement file on the page, or start a blind exercise: the error of the model stands here then.");
-  const most = Math.max(...STAGES.map(([key]) => g[key] ?? 0), g.floor ?? 0) * 1.04 || 1, width = (v) => `${100 * Math.min(1, v / most)}%`;
+  if (!g) return h("p", { class: "muted" },
+    "Drop a measurement file on the page, or start a blind exercise: the error of the model stands here then.");
+  const most = Math.max(...STAGES.map(([key]) => g[key] ?? 0), g.floor ?? 0) * 1.04 || 1, width = (v) =>
+    `${100 * Math.min(1, v / most)}%`;
   return h("dl", { class: "gauge", "aria-label": "Mean error of the model" }, STAGES.map(([key, label]) => {
     const note = key === "left_out" && g[key] === null ? "Fit tells" : percent(g[key]);
     const rises = key === "refitted" && percent(g.refitted) !== percent(g.as_given) && g.refitted > g.as_given;
-    return [h("dt", {}, label), h("dd", { class: "track", "aria-hidden": "true" }, h("span", { class: `fill ${key}`, style: `width:${width(g[key] ?? 0)}` }),
-      g.floor === null ? null : h("span", { class: "floor", style: `left:${width(g.floor)}` })), h("dd", { class: "number", id: `g-${key}` }, note),
-      rises ? h("dd", { class: "muted", id: "g-rises", style: "grid-column: 1 / -1" }, "likelier, not closer: it trusts those readings less that scatter more or lie far off; this mean counts all alike") : null];
-  }), h("dt", {}, "noise floor"), h("dd", { class: "muted" }, "dashed: no model can be better"), h("dd", { class: "number", id: "g-floor" }, percent(g.floor)));
+    return [h("dt", {}, label), h("dd", { class: "track", "aria-hidden": "true" },
+      h("span", { class: `fill ${key}`, style: `width:${width(g[key] ?? 0)}` }),
+      g.floor === null ? null : h("span", { class: "floor", style: `left:${width(g.floor)}` })),
+        h("dd", { class: "number", id: `g-${key}` }, note),
+      rises ? h("dd", { class: "muted", id: "g-rises", style: "grid-column: 1 / -1" },
+        "likelier, not closer: it trusts those readings less that scatter more or lie far off; "
+        + "this mean counts all alike") : null];
+  }), h("dt", {}, "noise floor"), h("dd", { class: "muted" }, "dashed: no model can be better"),
+    h("dd", { class: "number", id: "g-floor" }, percent(g.floor)));
 }
-
-// ---------------------------------------------------------------- effects
+// Effects.
 function effectsPanel(state, act) {
   if (!state.effects.length) return h("p", {}, "All effects of the catalogue are in the machine.");
   const sets = state.verdict?.confounding.sets ?? [], done = new Set(), rows = [];
@@ -45,18 +57,22 @@ function effectsPanel(state, act) {
     const members = state.effects.filter((one) => set.includes(one.name));
     members.forEach((one) => done.add(one.name));
     const drawn = members.map((one) => effectRow(one, act));
-    rows.push(members.length > 1 ? h("fieldset", { class: "together" }, h("legend", {}, "these data cannot tell these apart"), drawn) : drawn);
+    rows.push(members.length > 1 ? h("fieldset", { class: "together" },
+      h("legend", {}, "these data cannot tell these apart"), drawn) : drawn);
   }
   const on = state.effects.some((one) => one.on), fit = state.fit;
   return [
     h("h2", {}, "Which effect is missing?"),
-    h("div", { class: "actions" }, button("Fit", () => act({ do: "fit" }), { id: "fit", class: "main live", disabled: !on || !state.readings }),
+    h("div", { class: "actions" }, button("Fit", () => act({ do: "fit" }), { id: "fit", class: "main live",
+      disabled: !on || !state.readings }),
       button("Accept the fit", () => act({ do: "accept" }), { id: "accept", disabled: !(fit?.accepted && fit.holds) }),
-      state.machine.effects.length ? h("span", { class: "muted" }, `in the machine: ${state.machine.effects.join(", ")}`) : null),
+      state.machine.effects.length ? h("span", { class: "muted" },
+        `in the machine: ${state.machine.effects.join(", ")}`) : null),
     fit ? h("p", { id: "fit-text", class: fit.accepted ? "" : "warning" }, fit.text) : null,
     (fit?.support ?? []).flatMap((one) => one.reasons).map((reason) => h("p", { class: "muted" }, reason)),
     portrait(state.verdict?.portrait, act),
-    state.verdict ? null : h("p", { class: "muted" }, state.readings ? "The ranking comes with the diagnosis." : "Without readings nothing is ranked."),
+    state.verdict ? null : h("p", { class: "muted" }, state.readings ? "The ranking comes with the diagnosis."
+      : "Without readings nothing is ranked."),
     rows,
     ownEffects(state, act),
   ];
@@ -64,126 +80,194 @@ function effectsPanel(state, act) {
 // What no effect explains, as far as the readings describe it.
 function portrait(p, act) {
   if (!p) return null;
-  const bars = (rows, key) => h("ul", { class: "shares" }, rows.map((one) => h("li", {}, h("span", { class: "bars", "aria-hidden": "true" }, h("i", { style: `width:${100 * (one.probability ?? 0)}%` })), ` ${one[key]} ${chance(one.probability ?? 0)}`)));
-  return h("section", { class: "portrait", id: "portrait" }, h("h3", {}, "What the missing thing looks like"), h("p", {}, p.text),
-    h("div", { class: "two" }, h("div", {}, h("b", {}, "where"), bars(p.links, "link")), h("div", {}, h("b", {}, "varies with"), bars(p.variables, "variable"))),
-    figures([["rms at left-out points", percent(p.held_out_rms_percent)], ["noise there", percent(p.noise_floor_percent)], ["best that a smooth form could do", percent(p.smooth_rms_percent)], ["of the misfit explained", percent(p.explained_percent, 0)]]),
-    p.terms.length ? h("div", { class: "actions live" }, button("Draft it as an effect", () => act({ do: "draft" }), { id: "draft" }), h("span", { class: "muted" }, "a commented file that competes with the others; new readings must confirm it")) : null);
+  const bars = (rows, key) => h("ul", { class: "shares" },
+    rows.map((one) => h("li", {}, h("span", { class: "bars", "aria-hidden": "true" },
+    h("i", { style: `width:${100 * (one.probability ?? 0)}%` })), ` ${one[key]} ${chance(one.probability ?? 0)}`)));
+  return h("section", { class: "portrait", id: "portrait" }, h("h3", {}, "What the missing thing looks like"),
+    h("p", {}, p.text),
+    h("div", { class: "two" }, h("div", {}, h("b", {}, "where"), bars(p.links, "link")),
+      h("div", {}, h("b", {}, "varies with"), bars(p.variables, "variable"))),
+    figures([["rms at left-out points", percent(p.held_out_rms_percent)],
+      ["noise there", percent(p.noise_floor_percent)], ["best that a smooth form could do",
+      percent(p.smooth_rms_percent)], ["of the misfit explained", percent(p.explained_percent, 0)]]),
+    p.terms.length ? h("div", { class: "actions live" }, button("Draft it as an effect", () => act({ do: "draft" }),
+      { id: "draft" }), h("span", { class: "muted" },
+      "a commented file that competes with the others; new readings must confirm it")) : null);
 }
 // Effects of one's own: the working copy is edited here or in an editor; each save is loaded, a fault stands below.
 function ownEffects(state, act) {
-  if (!state.own_effects.length) return h("p", { class: "muted live" }, "Drop a Python file with an effect of your own on the page: it joins these.");
+  if (!state.own_effects.length) return h("p", { class: "muted live" },
+    "Drop a Python file with an effect of your own on the page: it joins these.");
   return [h("h3", {}, "Effects of your own"), state.own_effects.map((own, k) => {
-    const area = h("textarea", { id: `own-${k}`, rows: 16, spellcheck: "false", "aria-label": `Text of ${own.file}`, "aria-describedby": `own-fault-${k}` });
+    const area = h("textarea", { id: `own-${k}`, rows: 16, spellcheck: "false", "aria-label": `Text of ${own.file}`,
+      "aria-describedby": `own-fault-${k}` });
     area.value = drafts.get(own.file) ?? own.text;
     if (own.off) {
       Object.assign(area, { value: own.text, readOnly: true });
-      return h("div", { class: "own" }, h("p", { class: "warning", id: `own-off-${k}` }, h("code", {}, own.file), " is code that came with the case, and you have not agreed to run it: its effects are off."), area,
-        h("div", { class: "actions live" }, button("I have read it: run it", () => act({ do: "trust", file: own.file }), { id: `own-trust-${k}` })));
+      return h("div", { class: "own" }, h("p", { class: "warning", id: `own-off-${k}` }, h("code", {}, own.file),
+        " is code that came with the case, and you have not agreed to run it: its effects are off."), area,
+        h("div", { class: "actions live" }, button("I have read it: run it", () => act({ do: "trust", file: own.file }),
+          { id: `own-trust-${k}` })));
     }
     area.addEventListener("input", () => drafts.set(own.file, area.value));
     const save = () => { drafts.delete(own.file); act({ do: "save_effect", file: own.file, text: area.value }); };
     return h("div", { class: "own" }, h("code", {}, own.file), own.copy
-      ? [h("p", { class: "muted" }, "Edit it here, or in an editor: ", h("code", {}, own.copy), ". Its code is run each time it is saved."), area,
+      ? [h("p", { class: "muted" }, "Edit it here, or in an editor: ", h("code", {}, own.copy),
+        ". Its code is run each time it is saved."), area,
         h("div", { class: "actions" }, button("Save and load", save, { id: `own-save-${k}`, class: "main live" }))]
-      : h("div", { class: "actions" }, button("Edit", () => act({ do: "edit", file: own.file }), { id: `own-edit-${k}` })),
+      : h("div", { class: "actions" }, button("Edit", () => act({ do: "edit", file: own.file }),
+        { id: `own-edit-${k}` })),
       own.fault ? h("p", { class: "warning", id: `own-fault-${k}`, role: "alert" }, own.fault) : null);
   })];
 }
 const drafts = new Map(); // what was typed and not saved yet
 function effectRow(effect, act) {
   const id = `sw-${effect.name}`, on = effect.on !== null;
-  const toggle = (e) => act({ do: "switch", effect: effect.name, values: e.target.checked ? Object.fromEntries(effect.sliders.map((s) => [s.key, s.start])) : null });
+  const toggle = (e) => act({ do: "switch", effect: effect.name, values: e.target.checked
+    ? Object.fromEntries(effect.sliders.map((s) => [s.key, s.start])) : null });
   return h("div", { class: effect.probability === null ? "effect off-table" : "effect" }, h("div", { class: "row" },
-    h("input", { type: "checkbox", role: "switch", class: "switch", id, checked: on, onchange: toggle, "aria-checked": String(on), disabled: act.readonly }),
+    h("input", { type: "checkbox", role: "switch", class: "switch", id, checked: on, onchange: toggle,
+      "aria-checked": String(on), disabled: act.readonly }),
     h("label", { class: "name", for: id }, effect.title, h("code", {}, effect.name)),
-    effect.probability === null ? null : h("span", { class: "chance" }, h("span", { class: "bars", "aria-hidden": "true" }, h("i", { style: `width:${100 * effect.probability}%` })), chance(effect.probability))),
-    effect.finding ? h("div", { class: "note" }, `${effect.finding}: mean error ${percent(effect.mean_abs_error_percent)}, ${percent(effect.held_out_error_percent)} at left-out points; ${effect.words}`)
+    effect.probability === null ? null : h("span", { class: "chance" },
+      h("span", { class: "bars", "aria-hidden": "true" }, h("i", { style: `width:${100 * effect.probability}%` })),
+      chance(effect.probability))),
+    effect.finding ? h("div", { class: "note" },
+      `${effect.finding}: mean error ${percent(effect.mean_abs_error_percent)}, `
+        + `${percent(effect.held_out_error_percent)} at left-out points; ${effect.words}`)
       : effect.words ? h("div", { class: "note" }, [effect.words, effect.remark].filter(Boolean).join("; ")) : null,
     on ? h("div", { class: "sizes" }, effect.sliders.map((s) => slider(effect, s, act))) : null);
 }
 function slider(effect, s, act) {
   const id = `${effect.name}-${s.key}`, value = effect.on[s.key], set = (v) => ({ ...effect.on, [s.key]: v });
   if (s.choices) {
-    const change = (e) => act({ do: "switch", effect: effect.name, values: set(s.kind === "integer" ? Number(e.target.value) : e.target.value) });
-    return [h("label", { for: id }, s.name), h("select", { id, class: "wide", onchange: change, disabled: act.readonly }, s.choices.map((c) => h("option", { value: String(c), selected: c === value }, String(c) || "(none)")))];
+    const change = (e) => act({ do: "switch", effect: effect.name, values: set(s.kind === "integer"
+      ? Number(e.target.value) : e.target.value) });
+    return [h("label", { for: id }, s.name), h("select", { id, class: "wide", onchange: change, disabled: act.readonly
+      }, s.choices.map((c) => h("option", { value: String(c), selected: c === value }, String(c) || "(none)")))];
   }
-  const text = (v) => `${short(v)} ${s.unit}${s.interval ? `  (${short(s.interval[0])} to ${short(s.interval[1])})` : ""}`;
+  const text = (v) =>
+    `${short(v)} ${s.unit}${s.interval ? `  (${short(s.interval[0])} to ${short(s.interval[1])})` : ""}`;
   const out = h("output", { for: id, title: s.interval ? "95 % interval of the diagnosis" : "" }, text(value));
-  return [h("label", { for: id, title: s.meaning }, s.name), h("input", { type: "range", id, min: s.low, max: s.high, step: (s.high - s.low) / 400, value, disabled: act.readonly,
-    oninput: (e) => { out.textContent = text(Number(e.target.value)); act.hand(effect.name, set(Number(e.target.value))); },
+  return [h("label", { for: id, title: s.meaning }, s.name), h("input", { type: "range", id, min: s.low, max: s.high,
+    step: (s.high - s.low) / 400, value, disabled: act.readonly,
+    oninput: (e) => { out.textContent = text(Number(e.target.value));
+      act.hand(effect.name, set(Number(e.target.value))); },
     onchange: (e) => act({ do: "switch", effect: effect.name, values: set(Number(e.target.value)) }) }), out];
 }
-
-// ---------------------------------------------------------------- why believe it
-const AGAINST = [["line", "line of the file"], ["x_mm", "X, mm"], ["y_mm", "Y, mm"], ["z_mm", "Z, mm"], ["a_deg", "A, deg"], ["b_deg", "B, deg"], ["c_deg", "C, deg"], ["force_N", "force, N"], ["stiffness_N_per_mm", "measured, N/mm"]];
+// Why believe it.
+const AGAINST = [["line", "line of the file"], ["x_mm", "X, mm"], ["y_mm", "Y, mm"], ["z_mm", "Z, mm"],
+  ["a_deg", "A, deg"], ["b_deg", "B, deg"], ["c_deg", "C, deg"], ["force_N", "force, N"], ["stiffness_N_per_mm",
+  "measured, N/mm"]];
 let against = "z_mm";
 function whyPanel(state, act) {
   const v = state.verdict;
   if (!v) return h("p", {}, state.readings ? "The diagnosis is under way." : "There are no readings yet.");
-  const gates = [["a model without a further effect", v.gates.baseline_probability], ["sum of squares", v.gates.squares_probability], ["structure", v.gates.structure_probability], ["gain of the best effect", v.gates.gain_probability]];
+  const gates = [["a model without a further effect", v.gates.baseline_probability],
+    ["sum of squares", v.gates.squares_probability], ["structure", v.gates.structure_probability],
+    ["gain of the best effect", v.gates.gain_probability]];
   const c = state.compare;
   return [
     h("h2", {}, "Why believe it?"), h("p", {}, v.text), list([...v.why, ...v.warnings]),
     h("h3", {}, "Residuals"), residuals(state, act),
-    h("h3", {}, "Gates: how often scatter alone would look so"), table(["test", "probability"], gates.map(([name, p]) => [name, p === null ? "\u2013" : short(p)])),
+    h("h3", {}, "Gates: how often scatter alone would look so"), table(["test", "probability"],
+      gates.map(([name, p]) => [name, p === null ? "\u2013" : short(p)])),
     h("h3", {}, "Plane by direction"),
-    c ? [table(["readings", "number", "mean error", "bias", "rms"], Object.entries(c.by_plane_and_direction).map(([name, one]) => [name, one.readings, percent(one.mean_abs_error_percent), percent(one.bias_percent), percent(one.rms_percent)])),
-      h("p", {}, c.text), list(c.findings.map((one) => one.text)), h("a", { class: "live", href: `/case/${c.result}/report.html`, target: "_blank", rel: "noreferrer" }, "the whole comparison, with residuals against every variable")]
+    c ? [table(["readings", "number", "mean error", "bias", "rms"], Object.entries(c.by_plane_and_direction)
+      .map(([name, one]) => [name, one.readings, percent(one.mean_abs_error_percent), percent(one.bias_percent),
+      percent(one.rms_percent)])),
+      h("p", {}, c.text), list(c.findings.map((one) => one.text)),
+        h("a", { class: "live", href: `/case/${c.result}/report.html`, target: "_blank", rel: "noreferrer" },
+        "the whole comparison, with residuals against every variable")]
       : button("Where the model fails", () => act({ do: "compare" }), { id: "compare" }),
     h("h3", {}, "What these data could show"),
-    table(["effect", "parameter", "smallest size shown", "change of readings (rms)"], v.detectable.map((d) => [d.effect, d.parameter, d.detectable ? `${short(d.size)} ${d.unit}` : "none", percent(d.rms_percent, 1)])),
-    v.confounding.sets.length ? [h("h3", {}, "Cannot be told apart"), list(v.confounding.sets.map((names) => names.join(", ")))] : null,
+    table(["effect", "parameter", "smallest size shown", "change of readings (rms)"], v.detectable
+      .map((d) => [d.effect, d.parameter, d.detectable ? `${short(d.size)} ${d.unit}` : "none", percent(d.rms_percent,
+      1)])),
+    v.confounding.sets.length ? [h("h3", {}, "Cannot be told apart"),
+      list(v.confounding.sets.map((names) => names.join(", ")))] : null,
     h("h3", {}, "Assumed"), list(v.assumptions), v.notes.length ? [h("h3", {}, "Notes"), list(v.notes)] : null,
   ];
 }
 function residuals(state, act) {
   const r = state.readings, values = r[against], W = 520, H = 210, pad = 42, end = 24, dev = act.scene.deviation;
-  const used = values.map((_, i) => i).filter((i) => !r.aside[i]), low = Math.min(...used.map((i) => values[i])), high = Math.max(...used.map((i) => values[i]));
-  const most = Math.max(1, ...used.map((i) => Math.abs(dev[i] ?? 0))) * 1.08, x = (v) => pad + (v - low) / (high - low || 1) * (W - pad - end), y = (v) => H / 2 - 8 - v / most * (H / 2 - 26);
-  const pick = h("select", { id: "against", "aria-label": "Variable", onchange: (e) => { against = e.target.value; act.redraw(); } }, AGAINST.map(([key, label]) => h("option", { value: key, selected: key === against }, label)));
-  const marks = ticks(-most, most, 4).values.map((v) => [h("line", { x1: pad, x2: W - end, y1: y(v), y2: y(v), stroke: "var(--line)" }), h("text", { x: pad - 6, y: y(v) + 4, "text-anchor": "end" }, String(Number(v.toPrecision(3))))]);
-  const across = ticks(low, high > low ? high : low + 1, 6), feet = across.values.map((v) => h("text", { x: x(v), y: H - 16, "text-anchor": "middle" }, v.toFixed(across.digits)));
-  return [h("div", { class: "bar" }, h("label", { for: "against" }, "against "), pick), h("svg", { viewBox: `0 0 ${W} ${H}`, class: "drag", style: "cursor:default", role: "img", "aria-label": `Errors of ${used.length} readings against ${against}` },
-    marks, feet, h("line", { x1: pad, x2: W - end, y1: y(0), y2: y(0), stroke: "var(--muted)" }), h("text", { x: 4, y: 12 }, "error %"),
-    used.map((i) => h("circle", { cx: x(values[i]).toFixed(1), cy: y(dev[i] ?? 0).toFixed(1), r: 3, fill: errorColour(dev[i] ?? 0, act.scene.scale), "fill-opacity": 0.8 })))];
+  const used = values.map((_, i) => i).filter((i) => !r.aside[i]), low = Math.min(...used.map((i) => values[i])),
+    high = Math.max(...used.map((i) => values[i]));
+  const most = Math.max(1, ...used.map((i) => Math.abs(dev[i] ?? 0))) * 1.08, x = (v) => pad + (v - low) / (high - low
+    || 1) * (W - pad - end), y = (v) => H / 2 - 8 - v / most * (H / 2 - 26);
+  const pick = h("select", { id: "against", "aria-label": "Variable", onchange: (e) => { against = e.target.value;
+    act.redraw(); } }, AGAINST.map(([key, label]) => h("option", { value: key, selected: key === against }, label)));
+  const marks = ticks(-most, most, 4).values
+    .map((v) => [h("line", { x1: pad, x2: W - end, y1: y(v), y2: y(v), stroke: "var(--line)" }),
+    h("text", { x: pad - 6, y: y(v) + 4, "text-anchor": "end" }, String(Number(v.toPrecision(3))))]);
+  const across = ticks(low, high > low ? high : low + 1, 6), feet = across.values
+    .map((v) => h("text", { x: x(v), y: H - 16, "text-anchor": "middle" }, v.toFixed(across.digits)));
+  return [h("div", { class: "bar" }, h("label", { for: "against" }, "against "), pick),
+    h("svg", { viewBox: `0 0 ${W} ${H}`, class: "drag", style: "cursor:default", role: "img",
+    "aria-label": `Errors of ${used.length} readings against ${against}` },
+    marks, feet, h("line", { x1: pad, x2: W - end, y1: y(0), y2: y(0), stroke: "var(--muted)" }),
+      h("text", { x: 4, y: 12 }, "error %"),
+    used.map((i) => h("circle", { cx: x(values[i]).toFixed(1), cy: y(dev[i] ?? 0).toFixed(1), r: 3,
+      fill: errorColour(dev[i] ?? 0, act.scene.scale), "fill-opacity": 0.8 })))];
 }
-
-// ---------------------------------------------------------------- what to measure next
+// What to measure next.
 function nextPanel(state, act) {
   const p = state.plan, count = h("input", { type: "number", id: "poses", min: 1, max: 60, value: p?.poses ?? 6 });
   return [
     h("h2", {}, "What to measure next"),
-    h("p", { class: "muted" }, state.readings ? "Poses at which the explanations that are left differ most." : "A first campaign: poses that show most effects."),
-    h("div", { class: "actions live" }, h("label", { for: "poses" }, "poses "), count, button("Make a plan", () => act({ do: "plan", n: Number(count.value) }), { id: "make-plan", class: "main live" })),
-    p ? [list(p.text), h("p", {}, `${p.poses} poses, ${p.readings} readings, about ${Math.round(p.minutes)} minutes. Diamonds in the machine.`),
-      h("div", { class: "actions live" }, h("a", { class: "button", id: "plan-file", href: `/case/${p.file}` }, "Download plan.csv"), button("Print", () => print()),
-        state.exercise.folder ? button("Measure on the exercise's machine", () => act({ do: "measure" }), { id: "measure", class: "main live" }) : h("span", { class: "muted" }, "fill in the stiffness and drop the file on the page")),
-      table(["clamping", "X mm", "Y mm", "Z mm", "A deg", "B deg", "C deg", "forces N", "why"], p.visits.map((v) => [v.clamp, v.x_mm, v.y_mm, v.z_mm, v.a_deg, v.b_deg, v.c_deg, v.forces_N.join(", "), v.why].map(String)))] : null,
-    (state.readings?.aside ?? []).some(Boolean) ? [h("h3", {}, "Set aside"), state.readings.aside.map((gone, i) => (gone ? h("div", { class: "actions" }, `${state.readings.file[i]} line ${state.readings.line[i]}`, button("Use again", () => act({ do: "aside", file: state.readings.file[i], line: state.readings.line[i] }), { id: `again-${i}` })) : null))] : null,
+    h("p", { class: "muted" }, state.readings ? "Poses at which the explanations that are left differ most."
+      : "A first campaign: poses that show most effects."),
+    h("div", { class: "actions live" }, h("label", { for: "poses" }, "poses "), count, button("Make a plan",
+      () => act({ do: "plan", n: Number(count.value) }), { id: "make-plan", class: "main live" })),
+    p ? [list(p.text),
+      h("p", {}, `${p.poses} poses, ${p.readings} readings, about ${Math.round(p.minutes)} minutes. `
+        + `Diamonds in the machine.`),
+      h("div", { class: "actions live" }, h("a", { class: "button", id: "plan-file", href: `/case/${p.file}` },
+        "Download plan.csv"), button("Print", () => print()),
+        state.exercise.folder ? button("Measure on the exercise's machine", () => act({ do: "measure" }),
+          { id: "measure", class: "main live" }) : h("span", { class: "muted" },
+          "fill in the stiffness and drop the file on the page")),
+      table(["clamping", "X mm", "Y mm", "Z mm", "A deg", "B deg", "C deg", "forces N", "why"], p.visits
+        .map((v) => [v.clamp, v.x_mm, v.y_mm, v.z_mm, v.a_deg, v.b_deg, v.c_deg, v.forces_N.join(", "), v.why]
+        .map(String)))] : null,
+    (state.readings?.aside ?? []).some(Boolean) ? [h("h3", {}, "Set aside"), state.readings.aside
+      .map((gone, i) => (gone ? h("div", { class: "actions" },
+      `${state.readings.file[i]} line ${state.readings.line[i]}`, button("Use again",
+      () => act({ do: "aside", file: state.readings.file[i], line: state.readings.line[i] }), { id: `again-${i}` }))
+      : null))] : null,
   ];
 }
-
-// ---------------------------------------------------------------- the program
+// The program.
 function programPanel(state, act) {
   const p = state.program;
-  if (!p) return [h("h2", {}, "The program"), h("p", {}, "Drop an NC program on the page, or open one: its path is coloured by stiffness, and profile and text are linked.")];
+  if (!p) return [h("h2", {}, "The program"),
+    h("p", {}, "Drop an NC program on the page, or open one: its path is coloured by stiffness, "
+      + "and profile and text are linked.")];
   const s = p.summary, n = (v) => group(v);
-  const need = h("input", { type: "number", id: "require", min: 0, step: 1000, value: p.require || "", placeholder: "none", onchange: (e) => act({ do: "require", value: Number(e.target.value || 0) }), disabled: act.readonly });
+  const need = h("input", { type: "number", id: "require", min: 0, step: 1000, value: p.require || "",
+    placeholder: "none", onchange: (e) => act({ do: "require", value: Number(e.target.value || 0) }),
+    disabled: act.readonly });
   return [
     h("h2", {}, p.name),
     p.error ? h("p", { class: "warning", id: "program-error" }, p.error) : null,
-    s ? [figures([["mean N/mm", n(s.mean_N_per_mm), "p-mean"], ["weakest N/mm", n(s.min_N_per_mm), "p-min"], ["range N/mm", n(s.range_N_per_mm), "p-range"], ["weakest in line", String(s.weakest?.line ?? "\u2013")],
+    s ? [figures([["mean N/mm", n(s.mean_N_per_mm), "p-mean"], ["weakest N/mm", n(s.min_N_per_mm), "p-min"],
+      ["range N/mm", n(s.range_N_per_mm), "p-range"], ["weakest in line", String(s.weakest?.line ?? "\u2013")],
       ...(s.plunges ? [["plunges, mean N/mm", n(s.plunges.mean_N_per_mm)]] : [])]),
-      s.out_of_reach_samples ? h("p", { class: "warning", id: "out-of-reach" }, `${s.out_of_reach_samples} samples of cuts are out of reach: red in the path`) : null,
-      s.warnings.map((text) => h("p", { class: "warning" }, text))] : h("p", { class: "muted" }, p.error ? "" : "It is being analyzed."),
-    h("div", { class: "actions" }, h("label", { for: "require" }, "required N/mm "), need, s?.required ? h("span", { id: "below", class: s.required.lines?.length ? "bad" : "good" }, s.required.lines?.length ? `${s.required.lines.length} lines are below` : "every cut has it") : null),
+      s.out_of_reach_samples ? h("p", { class: "warning", id: "out-of-reach" },
+        `${s.out_of_reach_samples} samples of cuts are out of reach: red in the path`) : null,
+      s.warnings.map((text) => h("p", { class: "warning" }, text))] : h("p", { class: "muted" }, p.error ? ""
+        : "It is being analyzed."),
+    h("div", { class: "actions" }, h("label", { for: "require" }, "required N/mm "), need, s?.required
+      ? h("span", { id: "below", class: s.required.lines?.length ? "bad" : "good" }, s.required.lines?.length
+      ? `${s.required.lines.length} lines are below` : "every cut has it") : null),
     h("div", { class: "text", id: "text", role: "group", "aria-label": "Program text" }),
-    p.path && s.per_operation?.length > 1 ? [h("h3", {}, "Operations"), table(["", "mean N/mm", "min N/mm", ""], s.per_operation.map((o, k) => [o.name ?? o.title ?? `operation ${k + 1}`, n(o.mean_N_per_mm), n(o.min_N_per_mm), button(act.operation === k + 1 ? "all" : "only this", () => act.only(k + 1), { id: `only-${k + 1}`, class: "" })]))] : null,
+    p.path && s.per_operation?.length > 1 ? [h("h3", {}, "Operations"), table(["", "mean N/mm", "min N/mm", ""],
+      s.per_operation.map((o, k) => [o.name ?? o.title ?? `operation ${k + 1}`, n(o.mean_N_per_mm), n(o.min_N_per_mm),
+      button(act.operation === k + 1 ? "all" : "only this", () => act.only(k + 1), { id: `only-${k + 1}`,
+      class: "" })]))] : null,
   ];
 }
-
-// ---------------------------------------------------------------- the placement
+// The placement.
 function placementPanel(state, act) {
   const p = state.placement;
   if (!p) return [h("h2", {}, "Placement"), h("p", {}, "Open a program first.")];
@@ -191,35 +275,59 @@ function placementPanel(state, act) {
   return [
     h("h2", {}, "Where the work sits"),
     placementFigures(p.now, state, "pl"),
-    state.effects.some((one) => one.on) ? h("p", { class: "muted", id: "pl-without" }, "These figures are of the machine file, without the effects that are switched on: accept the fit to place the work on the machine that carries them.") : null,
+    state.effects.some((one) => one.on) ? h("p", { class: "muted", id: "pl-without" },
+      "These figures are of the machine file, without the effects that are switched on: "
+        + "accept the fit to place the work on the machine that carries them.") : null,
     dragMap(state, act),
     h("div", { class: "place live" }, rows.map(([name, axis, low, high]) => {
-      const number = h("input", { type: "number", id: `o-${name}n`, "aria-label": `${name} of program zero`, step: axis === 5 ? 1 : 5, value: Number(at[axis].toFixed(3)), onchange: (e) => act.move(axis, Number(e.target.value), true) });
-      return [h("label", { for: `o-${name}` }, name), h("input", { type: "range", id: `o-${name}`, min: low, max: high, step: 1, value: at[axis], oninput: (e) => { number.value = e.target.value; act.move(axis, Number(e.target.value), false); }, onchange: (e) => act.move(axis, Number(e.target.value), true) }), number];
+      const number = h("input", { type: "number", id: `o-${name}n`, "aria-label": `${name} of program zero`,
+        step: axis === 5 ? 1 : 5, value: Number(at[axis].toFixed(3)), onchange: (e) => act.move(axis,
+        Number(e.target.value), true) });
+      return [h("label", { for: `o-${name}` }, name), h("input", { type: "range", id: `o-${name}`, min: low, max: high,
+        step: 1, value: at[axis], oninput: (e) => { number.value = e.target.value;
+        act.move(axis, Number(e.target.value), false); }, onchange: (e) => act.move(axis, Number(e.target.value), true)
+        }), number];
     })),
-    h("div", { class: "actions live" }, button("Best", () => act({ do: "place" }), { id: "best", class: "main live" }), h("span", { class: "muted" }, "searches the whole workspace; none of mean, range and weakest gets worse where that can be avoided")),
+    h("div", { class: "actions live" }, button("Best", () => act({ do: "place" }), { id: "best", class: "main live" }),
+      h("span", { class: "muted" },
+      "searches the whole workspace; none of mean, range and weakest gets worse where that can be avoided")),
     setUp(p, state, act),
     p.front ? [(p.warnings ?? []).map((text) => h("p", { class: "warning" }, text)), h("h3", {}, "Front"),
-      Object.entries(p.offset_blocks ?? {}).filter(([name]) => !name.endsWith("_reason")).map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" }, p.offset_blocks[`${name}_reason`] ?? "no block can say it"))),
-      table(["", "mean", "range", "weakest N/mm", "X", "Y", "Z mm", "C deg", ""], p.front.map((row) => [`${row.number}${row.number === p.chosen?.number ? " recommended" : ""}`, group(row.mean_N_per_mm), group(row.range_N_per_mm), group(row.min_N_per_mm), ...["x_mm", "y_mm", "z_mm", "rotation_deg"].map((k) => row[k].toFixed(1)),
-        button("use", () => act({ do: "place_at", origin: [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg] }), { id: `use-${row.number}`, "aria-label": `use point ${row.number}` })]))] : null,
+      Object.entries(p.offset_blocks ?? {}).filter(([name]) => !name.endsWith("_reason"))
+        .map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" },
+        p.offset_blocks[`${name}_reason`] ?? "no block can say it"))),
+      table(["", "mean", "range", "weakest N/mm", "X", "Y", "Z mm", "C deg", ""], p.front
+        .map((row) => [`${row.number}${row.number === p.chosen?.number ? " recommended" : ""}`,
+        group(row.mean_N_per_mm), group(row.range_N_per_mm), group(row.min_N_per_mm), ...["x_mm", "y_mm", "z_mm",
+        "rotation_deg"].map((k) => row[k].toFixed(1)),
+        button("use", () => act({ do: "place_at", origin: [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg,
+          row.rotation_deg] }), { id: `use-${row.number}`, "aria-label": `use point ${row.number}` })]))] : null,
   ];
 }
 // For the shop floor, of the placement as it stands: offsets, set-up sheet, the program written for it, every warning.
 function setUp(p, state, act) {
   const made = p.set_up, moved = state.program.placed;
-  const offsets = (blocks) => Object.entries(blocks ?? {}).filter(([name]) => !name.endsWith("_reason")).map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" }, blocks[`${name}_reason`] ?? "no block can say it")));
+  const offsets = (blocks) => Object.entries(blocks ?? {}).filter(([name]) => !name.endsWith("_reason"))
+    .map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" },
+    blocks[`${name}_reason`] ?? "no block can say it")));
   return [
-    h("div", { class: "actions live" }, button("Offsets, set-up sheet, program", () => act({ do: "set_up" }), { id: "set-up", disabled: !moved }), h("span", { class: "muted" }, moved ? "for this placement, as files" : "move the work first")),
-    made ? h("div", { id: "set-up-files" }, made.warnings.map((text) => h("p", { class: "warning" }, text)), offsets(made.offset_blocks),
-      h("p", { class: "actions live" }, [["sheet", "Set-up sheet"], ["written", made.written.endsWith("not_written.txt") ? "Why the program was not written" : "Program for this placement"], ["page", "Report"]]
-        .map(([key, label]) => h("a", { class: "button", id: `set-up-${key}`, href: `/case/${made[key]}`, target: key === "page" ? "_blank" : null, rel: "noreferrer" }, label)))) : null,
+    h("div", { class: "actions live" }, button("Offsets, set-up sheet, program", () => act({ do: "set_up" }),
+      { id: "set-up", disabled: !moved }), h("span", { class: "muted" }, moved ? "for this placement, as files"
+      : "move the work first")),
+    made ? h("div", { id: "set-up-files" }, made.warnings.map((text) => h("p", { class: "warning" }, text)),
+      offsets(made.offset_blocks),
+      h("p", { class: "actions live" }, [["sheet", "Set-up sheet"], ["written", made.written.endsWith("not_written.txt")
+        ? "Why the program was not written" : "Program for this placement"], ["page", "Report"]]
+        .map(([key, label]) => h("a", { class: "button", id: `set-up-${key}`, href: `/case/${made[key]}`,
+          target: key === "page" ? "_blank" : null, rel: "noreferrer" }, label)))) : null,
   ];
 }
 function placementFigures(now, state, id) {
   const v = (value, digits = 0) => (value === null || value === undefined ? "\u2013" : group(value, digits));
-  return h("div", { id }, figures([["mean N/mm", v(now?.mean_N_per_mm), "pl-mean"], ["range N/mm", v(now?.range_N_per_mm), "pl-range"], ["weakest N/mm", v(now?.min_N_per_mm), "pl-min"],
-    ["margin of cuts, %", now ? v(100 * now.margin, 1) : "\u2013", "pl-margin"], ["margin of rapids, %", now ? v(100 * now.rapid_margin, 1) : "\u2013"]]),
+  return h("div", { id }, figures([["mean N/mm", v(now?.mean_N_per_mm), "pl-mean"],
+    ["range N/mm", v(now?.range_N_per_mm), "pl-range"], ["weakest N/mm", v(now?.min_N_per_mm), "pl-min"],
+    ["margin of cuts, %", now ? v(100 * now.margin, 1) : "\u2013", "pl-margin"], ["margin of rapids, %", now
+      ? v(100 * now.rapid_margin, 1) : "\u2013"]]),
     now && now.mean_N_per_mm === null ? h("p", { class: "warning" }, "A cut is out of reach here.") : null);
 }
 // The boundary of the reach at the height of program zero, from above: the farthest crossing of each meridian.
@@ -243,21 +351,32 @@ function dragMap(state, act) {
   if (path) {
     const from = state.program.origin, c = Math.cos(-from[5] * Math.PI / 180), s = Math.sin(-from[5] * Math.PI / 180);
     const step = Math.max(1, Math.floor(path.x_mm.length / 900));
-    for (let i = 0; i < path.x_mm.length; i += step) if (path.cut[i]) { const [x, y] = [path.x_mm[i] - from[0], path.y_mm[i] - from[1]]; points.push([c * x - s * y, s * x + c * y]); }
+    for (let i = 0; i < path.x_mm.length; i += step) if (path.cut[i]) { const [x, y] = [path.x_mm[i] - from[0],
+      path.y_mm[i] - from[1]]; points.push([c * x - s * y, s * x + c * y]); }
   }
-  const work = h("g", {}, h("polyline", { points: points.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" "), fill: "none", stroke: "var(--blue)", "stroke-width": 5 }), h("circle", { r: 12, fill: "var(--pink)" }), h("line", { x1: 0, y1: 0, x2: 90, y2: 0, stroke: "var(--pink)", "stroke-width": 5 }));
-  const put = () => work.setAttribute("transform", `translate(${act.origin[0]} ${act.origin[1]}) rotate(${act.origin[5]})`);
+  const work = h("g", {}, h("polyline", { points: points.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" "),
+    fill: "none", stroke: "var(--blue)", "stroke-width": 5 }), h("circle", { r: 12, fill: "var(--pink)" }),
+    h("line", { x1: 0, y1: 0, x2: 90, y2: 0, stroke: "var(--pink)", "stroke-width": 5 }));
+  const put = () => work.setAttribute("transform",
+    `translate(${act.origin[0]} ${act.origin[1]}) rotate(${act.origin[5]})`);
   put();
   act.put = put;
-  const svg = h("svg", { viewBox: `${-size} ${-size * 0.94} ${2 * size} ${1.88 * size}`, class: "drag live", id: "drag", role: "application", tabindex: "0", "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn." },
-    h("g", { transform: "scale(1 -1)" }, h("polygon", { points: reach.map((p) => p.map((v) => v.toFixed(0)).join(",")).join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": 4 }), h("line", { x1: -60, x2: 60, y1: 0, y2: 0, stroke: "var(--muted)", "stroke-width": 3 }), h("line", { y1: -60, y2: 60, x1: 0, x2: 0, stroke: "var(--muted)", "stroke-width": 3 }), work));
-  const where = (e) => { const m = svg.getScreenCTM().inverse(), p = new DOMPoint(e.clientX, e.clientY).matrixTransform(m); return [p.x, -p.y]; };
+  const svg = h("svg", { viewBox: `${-size} ${-size * 0.94} ${2 * size} ${1.88 * size}`, class: "drag live", id: "drag",
+    role: "application", tabindex: "0",
+    "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn." },
+    h("g", { transform: "scale(1 -1)" }, h("polygon", { points: reach.map((p) => p.map((v) => v.toFixed(0)).join(","))
+      .join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": 4 }),
+      h("line", { x1: -60, x2: 60, y1: 0, y2: 0, stroke: "var(--muted)", "stroke-width": 3 }),
+      h("line", { y1: -60, y2: 60, x1: 0, x2: 0, stroke: "var(--muted)", "stroke-width": 3 }), work));
+  const where = (e) => { const m = svg.getScreenCTM().inverse(), p = new DOMPoint(e.clientX, e.clientY).matrixTransform(
+    m); return [p.x, -p.y]; };
   let last = null;
   svg.addEventListener("pointerdown", (e) => { svg.setPointerCapture(e.pointerId); last = where(e); });
   svg.addEventListener("pointermove", (e) => {
     if (!last) return;
     const now = where(e);
-    if (e.shiftKey) act.shift(5, (now[0] - last[0]) / 4); else { act.shift(0, now[0] - last[0]); act.shift(1, now[1] - last[1]); }
+    if (e.shiftKey) act.shift(5, (now[0] - last[0]) / 4); else { act.shift(0, now[0] - last[0]);
+      act.shift(1, now[1] - last[1]); }
     last = now;
   });
   svg.addEventListener("pointerup", () => { if (last) act.drop(); last = null; });
@@ -270,25 +389,45 @@ function dragMap(state, act) {
   });
   return svg;
 }
-
-// ---------------------------------------------------------------- the exercise, the history
+// The exercise, the history.
 function exercisePanel(state, act) {
   const seed = h("input", { type: "number", id: "seed", min: 0, value: 7 }), r = state.exercise.reveal;
-  const layout = h("select", { id: "layout", "aria-label": "Campaign" }, h("option", { value: "tilted" }, "24 tilted poses, 288 readings"), h("option", { value: "paper" }, "14 points along X, Y, Z, 42 readings"));
-  const claim = h("select", { id: "claim" }, ["none", "outside", ...state.effects.map((one) => one.name), ...state.machine.effects].map((name) => h("option", { value: name, selected: name === state.verdict?.best }, name)));
+  const layout = h("select", { id: "layout", "aria-label": "Campaign" }, h("option", { value: "tilted" },
+    "24 tilted poses, 288 readings"), h("option", { value: "paper" }, "14 points along X, Y, Z, 42 readings"));
+  const claim = h("select", { id: "claim" }, ["none", "outside", ...state.effects.map((one) => one.name),
+    ...state.machine.effects].map((name) => h("option", { value: name, selected: name === state.verdict?.best },
+    name)));
   return [
-    h("h2", {}, "Blind exercise"), h("p", { class: "muted" }, "A simulated machine hides something. It shares no stiffness code with the model. Find out what, say it, then open the seal."),
-    h("div", { class: "actions live" }, h("label", { for: "seed" }, "seed "), seed, layout, button("Start an exercise", () => act({ do: "exercise", seed: Number(seed.value), layout: layout.value }), { id: "start-exercise", class: state.exercise.folder ? "live" : "main live" })),
-    state.exercise.folder ? [h("div", { class: "actions live" }, h("label", { for: "claim" }, "what is hidden? "), claim, button("Reveal", () => act({ do: "claim", effects: claim.value }), { id: "reveal", class: "main live" }))] : null,
-    r ? [h("p", { id: "revealed", class: r.verdict === "wrong" ? "bad" : "good" }, `claim ${r.claim.join(", ")}: ${r.verdict}`),
-      r.effects.length ? list(r.effects.map((e) => `hidden: ${e.effect} (${Object.entries(e.parameters).map(([k, v]) => `${k} ${short(v)}`).join(", ")}); changes the readings by ${percent(100 * e.size, 1)} (rms)`)) : h("p", {}, "nothing was hidden")] : null,
+    h("h2", {}, "Blind exercise"), h("p", { class: "muted" },
+      "A simulated machine hides something. It shares no stiffness code with the model. "
+        + "Find out what, say it, then open the seal."),
+    h("div", { class: "actions live" }, h("label", { for: "seed" }, "seed "), seed, layout, button("Start an exercise",
+      () => act({ do: "exercise", seed: Number(seed.value), layout: layout.value }), { id: "start-exercise",
+      class: state.exercise.folder ? "live" : "main live" })),
+    state.exercise.folder ? [h("div", { class: "actions live" }, h("label", { for: "claim" }, "what is hidden? "),
+      claim, button("Reveal", () => act({ do: "claim", effects: claim.value }), { id: "reveal", class: "main live" }))]
+      : null,
+    r ? [h("p", { id: "revealed", class: r.verdict === "wrong" ? "bad" : "good" },
+      `claim ${r.claim.join(", ")}: ${r.verdict}`),
+      r.effects.length
+        ? list(r.effects
+        .map((e) => `hidden: ${e.effect} `
+          + `(${Object.entries(e.parameters).map(([k, v]) => `${k} ${short(v)}`).join(", ")}); `
+          + `changes the readings by ${percent(100 * e.size, 1)} (rms)`)) : h("p", {}, "nothing was hidden")] : null,
   ];
 }
 function historyPanel(state, act) {
-  const copy = (text) => button("copy", (e) => { navigator.clipboard?.writeText(text); e.target.textContent = "copied"; }, { "aria-label": `copy ${text.slice(0, 40)}` });
-  const words = (text) => text.split(" ").flatMap((word, k) => [k ? " " : "", h("span", {}, word)]);  // broken between words alone
+  const copy = (text) => button("copy", (e) => { navigator.clipboard?.writeText(text); e.target.textContent = "copied";
+    }, { "aria-label": `copy ${text.slice(0, 40)}` });
+  // broken between words alone
+  const words = (text) => text.split(" ").flatMap((word, k) => [k ? " " : "", h("span", {}, word)]);
   const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, words(text)), copy(text)) : null);
-  const step = (one, undone) => h("div", { class: undone ? "step undone" : "step" }, h("b", {}, one.text), undone ? " (undone)" : null, line(one.command), line(one.python));
-  return [h("h2", {}, "What was done"), h("p", { class: "muted" }, "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."), [...state.history].reverse().map((one) => step(one, false)), state.undone.map((one) => step(one, true))];
+  const step = (one, undone) => h("div", { class: undone ? "step undone" : "step" }, h("b", {}, one.text), undone
+    ? " (undone)" : null, line(one.command), line(one.python));
+  return [h("h2", {}, "What was done"), h("p", { class: "muted" },
+    "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."), [...state.history].reverse()
+    .map((one) => step(one, false)), state.undone.map((one) => step(one, true))];
 }
-const PANELS = [["effects", "Effects", effectsPanel], ["why", "Why believe it?", whyPanel], ["next", "Next", nextPanel], ["program", "Program", programPanel], ["placement", "Placement", placementPanel], ["exercise", "Exercise", exercisePanel], ["history", "History", historyPanel]];
+const PANELS = [["effects", "Effects", effectsPanel], ["why", "Why believe it?", whyPanel], ["next", "Next", nextPanel],
+  ["program", "Program", programPanel], ["placement", "Placement", placementPanel], ["exercise", "Exercise",
+  exercisePanel], ["history", "History", historyPanel]];

@@ -1,13 +1,15 @@
 // The page: it asks for the state, draws it, posts what is to be done, and hears of every change.
 const $ = (id) => document.getElementById(id);
 const scene = new MachineScene();
-let state = JSON.parse($("state").textContent), panel = "effects", here = -1, which = "now", operation = 0, playing = 0, version = -1;
+let state = JSON.parse($("state").textContent), panel = "effects", here = -1, which = "now", operation = 0, playing = 0,
+  version = -1;
 const readonly = state !== null;
 document.body.classList.toggle("readonly", readonly);
 if (readonly) for (const id of ["tools", "drop"]) $(id).remove();
 
 async function post(path, body) {
-  const answer = await fetch(path, { method: "POST", body, headers: typeof body === "string" ? { "Content-Type": "application/json" } : {} });
+  const answer = await fetch(path, { method: "POST", body, headers: typeof body === "string"
+    ? { "Content-Type": "application/json" } : {} });
   const found = await answer.json();
   if (found.error) throw new Error(found.error);
   return found;
@@ -39,7 +41,8 @@ function latest(ask, show) {
     next = asked;
     if (busy || readonly) return;
     busy = true;
-    while (next) { const now = next; next = null; try { show(await ask(...now), ...now); } catch (error) { tell(error.message); } }
+    while (next) { const now = next; next = null; try { show(await ask(...now), ...now); } catch (error) {
+      tell(error.message); } }
     busy = false;
   };
 }
@@ -57,36 +60,43 @@ const placed = latest((origin) => post("/do", JSON.stringify({ do: "at", origin 
 });
 Object.assign(act, {
   scene, readonly, operation, origin: [0, 0, 0, 0, 0, 0], redraw: () => drawPanel(), put: () => {},
-  hand: (name, values) => hand({ ...Object.fromEntries(state.effects.filter((one) => one.on).map((one) => [one.name, one.on])), [name]: values }),
-  only: (number) => { operation = act.operation = act.operation === number ? 0 : number; classify(); view.redraw(); drawPanel(); },
+  hand: (name, values) => hand({ ...Object.fromEntries(state.effects.filter((one) => one.on)
+    .map((one) => [one.name, one.on])), [name]: values }),
+  only: (number) => { operation = act.operation = act.operation === number ? 0 : number; classify(); view.redraw();
+    drawPanel(); },
   shift: (axis, by) => act.move(axis, act.origin[axis] + by, false),
   move: (axis, value, done) => {
     if (!Number.isFinite(value)) return;
     act.origin[axis] = axis === 5 ? ((value % 360) + 360) % 360 : value;
     act.put();
-    for (const name of ["X", "Y", "Z", "C"]) { const k = { X: 0, Y: 1, Z: 2, C: 5 }[name]; for (const id of [`o-${name}`, `o-${name}n`]) if ($(id) && document.activeElement !== $(id)) $(id).value = Number(act.origin[k].toFixed(1)); }
+    for (const name of ["X", "Y", "Z", "C"]) { const k = { X: 0, Y: 1, Z: 2, C: 5 }[name];
+      for (const id of [`o-${name}`, `o-${name}n`]) if ($(id) && document.activeElement !== $(id)) $(id).value =
+      Number(act.origin[k].toFixed(1)); }
     placed([...act.origin]);
     if (done) act.drop();
   },
   drop: () => act({ do: "place_at", origin: act.origin.map((v) => Number(v.toFixed(3))) }),
 });
-
-// ---------------------------------------------------------------- the machine, the profile
+// The machine, the profile.
 const view = new Viewer($("scene"), scene, { point, pick, step: (by) => stepReading(by) });
 let profile = null;
 function describe(i) {
   const r = state.readings, d = scene.deviation[i], turned = [r.a_deg[i], r.b_deg[i], r.c_deg[i]];
   const along = ["dx", "dy", "dz"].map((k) => r[k][i]), axis = along.findIndex((v) => Math.abs(v) > 0.999);
   return [`${r.file[i]} line ${r.line[i]}${r.aside[i] ? ", set aside" : ""}`,
-    `X${r.x_mm[i]} Y${r.y_mm[i]} Z${r.z_mm[i]} mm${turned.some(Boolean) ? `, A${turned[0]} B${turned[1]} C${turned[2]} deg` : ""}`,
+    `X${r.x_mm[i]} Y${r.y_mm[i]} Z${r.z_mm[i]} mm`
+      + `${turned.some(Boolean) ? `, A${turned[0]} B${turned[1]} C${turned[2]} deg` : ""}`,
     `along ${axis < 0 ? along.map((v) => v.toFixed(2)).join(", ") : "XYZ"[axis]}, ${group(r.force_N[i])} N`,
-    r.aside[i] ? `measured ${group(r.stiffness_N_per_mm[i])} N/mm` : `measured ${group(r.stiffness_N_per_mm[i])}, modelled ${group(r.stiffness_N_per_mm[i] / (1 + d / 100))} N/mm: ${d > 0 ? "+" : ""}${d.toFixed(1)} %`];
+    r.aside[i] ? `measured ${group(r.stiffness_N_per_mm[i])} N/mm`
+      : `measured ${group(r.stiffness_N_per_mm[i])}, modelled `
+        + `${group(r.stiffness_N_per_mm[i] / (1 + d / 100))} N/mm: ${d > 0 ? "+" : ""}${d.toFixed(1)} %`];
 }
 function select(i) {
   scene.selected = i;
   const r = state.readings;
   scene.pose = [r.x_mm[i], r.y_mm[i], r.z_mm[i], r.a_deg[i], r.b_deg[i], r.c_deg[i]];
-  $("status").textContent = `${describe(i).join(" \u00b7 ")} \u00b7 ${readonly ? "" : "click or Enter sets it aside or uses it again"}`;
+  $("status").textContent =
+    `${describe(i).join(" \u00b7 ")} \u00b7 ${readonly ? "" : "click or Enter sets it aside or uses it again"}`;
   view.redraw();
 }
 function point(i) {
@@ -105,7 +115,8 @@ function stepReading(by) {
   const n = state.readings?.line.length;
   if (n) select((scene.selected + by + n) % n);
 }
-$("scene").querySelector(".overlay").addEventListener("keydown", (e) => { if (e.key === "Enter" && scene.selected >= 0) { e.preventDefault(); aside(scene.selected); } });
+$("scene").querySelector(".overlay").addEventListener("keydown",
+  (e) => { if (e.key === "Enter" && scene.selected >= 0) { e.preventDefault(); aside(scene.selected); } });
 
 function classify() {
   const path = state.program?.path;
@@ -120,13 +131,15 @@ function classify() {
     if (operation && path.operation[i] !== operation) return -1;
     if (!path.cut[i]) return count;
     if (shown[i] === null) return count + 2;
-    return path.plunge[i] ? count + 1 : Math.max(0, Math.min(count - 1, Math.floor((shown[i] - low) / (high - low || 1) * count)));
+    return path.plunge[i] ? count + 1
+      : Math.max(0, Math.min(count - 1, Math.floor((shown[i] - low) / (high - low || 1) * count)));
   }, count + 3);
   scene.paths = [lines];
 }
 function curve() {
   const path = state.program.path;
-  if (which === "difference" && path.given) return path.now.map((v, i) => (v === null || path.given[i] === null ? null : v - path.given[i]));
+  if (which === "difference" && path.given) return path.now.map((v, i) => (v === null || path.given[i] === null ? null
+    : v - path.given[i]));
   return which === "given" && path.given ? path.given : path.now;
 }
 const numbers = (values, keep) => Float32Array.from(values, (v, i) => (v === null || !keep(i) ? NaN : v));
@@ -138,26 +151,36 @@ function drawProfile() {
   const s = Float32Array.from(path.s_mm), cut = (i) => path.cut[i] && !path.plunge[i], shown = numbers(curve(), cut);
   const curves = () => {
     const found = [];
-    if (which === "now" && path.sd) for (const sign of [-1.96, 1.96]) found.push({ s, k: numbers(path.now.map((v, i) => (v === null ? null : v + sign * path.sd[i])), cut), colour: ink.rapid });
-    if (which === "now" && path.given && path.given.some((v, i) => v !== path.now[i])) found.push({ s, k: numbers(path.given, cut), colour: ink.second });
+    if (which === "now" && path.sd) for (const sign of [-1.96, 1.96]) found.push(
+      { s, k: numbers(path.now.map((v, i) => (v === null ? null : v + sign * path.sd[i])), cut), colour: ink.rapid });
+    if (which === "now" && path.given && path.given.some((v, i) => v !== path.now[i])) found.push(
+      { s, k: numbers(path.given, cut), colour: ink.second });
     return [...found, { s, k: shown, colour: ink.curve }];
   };
   const model = {
     s, value: (i) => shown[i], curves, ends: () => scene.ends, here: () => here,
     beside: () => null,
-    levels: () => (state.program?.require && which !== "difference" ? [{ value: state.program.require, colour: ink.bad, dash: [6, 4], held: true }] : []),
+    levels: () => (state.program?.require && which !== "difference" ? [{ value: state.program.require, colour: ink.bad,
+      dash: [6, 4], held: true }] : []),
   };
   if (profile) { profile.model = model; profile.all(); profile.redraw(); }
   else {
-    profile = new Profile($("profile"), model, { point: goTo, step: (by) => goTo(Math.max(0, Math.min(s.length - 1, here + by))) });
-    profile.drawOverlay = function () { const g = this.clear(this.overlay); if (here >= 0 && here < this.model.s.length) { ring(g, ...this.at(here), 5, ink.panel, 4); ring(g, ...this.at(here), 5, ink.ink, 2); } };
+    profile = new Profile($("profile"), model,
+      { point: goTo, step: (by) => goTo(Math.max(0, Math.min(s.length - 1, here + by))) });
+    profile.drawOverlay = function () { const g = this.clear(this.overlay);
+      if (here >= 0 && here < this.model.s.length) { ring(g, ...this.at(here), 5, ink.panel, 4);
+      ring(g, ...this.at(here), 5, ink.ink, 2); } };
   }
   $("scrub").max = path.s_mm.length - 1;
   const focus = document.activeElement?.id;
-  $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : [])].map((name) => h("button", { type: "button", id: `which-${name}`, "aria-pressed": String(which === name), onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw(); } }, name)));
+  $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : [])]
+    .map((name) => h("button", { type: "button", id: `which-${name}`, "aria-pressed": String(which === name),
+    onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw(); } }, name)));
   refocus(focus, "");
   const other = which === "now" && path.given?.some((v, i) => v !== path.now[i]);
-  $("curves").textContent = [other ? "orange: as given" : "", which === "now" && path.sd ? "grey: 95 % band of what was fitted" : "", state.program.require ? "dashed: required" : ""].filter(Boolean).join(", ");
+  $("curves").textContent = [other ? "orange: as given" : "", which === "now" && path.sd
+    ? "grey: 95 % band of what was fitted" : "", state.program.require ? "dashed: required" : ""].filter(Boolean)
+    .join(", ");
 }
 function goTo(i) {
   const path = state.program?.path;
@@ -166,7 +189,12 @@ function goTo(i) {
   scene.pose = ["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"].map((k) => path[k][here]);
   $("scrub").value = here;
   const k = path.now[here];
-  $("status").textContent = `line ${path.line[here]} \u00b7 ${k === null ? "out of reach" : `${group(k)} N/mm`}${path.sd?.[here] ? ` \u00b1 ${group(1.96 * path.sd[here])} (95 %)` : ""}${path.given?.[here] ? `, as given ${group(path.given[here])}` : ""} \u00b7 X${path.x_mm[here].toFixed(1)} Y${path.y_mm[here].toFixed(1)} Z${path.z_mm[here].toFixed(1)} mm \u00b7 margin ${path.margin[here]?.toFixed(3) ?? "\u2013"}`;
+  $("status").textContent =
+    `line ${path.line[here]} \u00b7 ${k === null ? "out of reach" : `${group(k)} N/mm`}`
+      + `${path.sd?.[here] ? ` \u00b1 ${group(1.96 * path.sd[here])} (95 %)` : ""}`
+      + `${path.given?.[here] ? `, as given ${group(path.given[here])}` : ""} \u00b7 X${path.x_mm[here].toFixed(1)} `
+      + `Y${path.y_mm[here].toFixed(1)} Z${path.z_mm[here].toFixed(1)} mm `
+      + `\u00b7 margin ${path.margin[here]?.toFixed(3) ?? "\u2013"}`;
   view.redraw();
   profile?.drawOverlay();
   drawText(path.line[here]);
@@ -177,13 +205,18 @@ function drawText(line) {
   if (!box || !p) return;
   if (lowest.of !== p.path) {
     Object.assign(lowest, { of: p.path, lines: new Map() });
-    p.path?.line.forEach((n, i) => { if (p.path.cut[i] && p.path.now[i] !== null) lowest.lines.set(n, Math.min(lowest.lines.get(n) ?? Infinity, p.path.now[i])); });
+    p.path?.line.forEach((n, i) => { if (p.path.cut[i] && p.path.now[i] !== null) lowest.lines.set(n,
+      Math.min(lowest.lines.get(n) ?? Infinity, p.path.now[i])); });
   }
-  const from = Math.max(1, Math.min(line - 8, p.lines.length - 16)), colours = theme.dark ? COLOURS.dark : COLOURS.light, [low, high] = scene.ends ?? [0, 1];
+  const from = Math.max(1, Math.min(line - 8, p.lines.length - 16)), colours = theme.dark ? COLOURS.dark
+    : COLOURS.light, [low, high] = scene.ends ?? [0, 1];
   const focus = document.activeElement?.id;
   box.replaceChildren(...p.lines.slice(from - 1, from + 16).map((text, k) => {
-    const n = from + k, v = lowest.lines.get(n), c = v === undefined ? "transparent" : colours[Math.max(0, Math.min(colours.length - 1, Math.floor((v - low) / (high - low || 1) * colours.length)))];
-    return h("button", { type: "button", id: `line-${n}`, class: n === line ? "here" : "", title: v === undefined ? "" : `${group(v)} N/mm`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i); else drawText(n); } }, h("i", { style: `background:${c}` }), h("span", {}, String(n)), h("span", {}, text));
+    const n = from + k, v = lowest.lines.get(n), c = v === undefined ? "transparent"
+      : colours[Math.max(0, Math.min(colours.length - 1, Math.floor((v - low) / (high - low || 1) * colours.length)))];
+    return h("button", { type: "button", id: `line-${n}`, class: n === line ? "here" : "", title: v === undefined ? ""
+      : `${group(v)} N/mm`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i);
+      else drawText(n); } }, h("i", { style: `background:${c}` }), h("span", {}, String(n)), h("span", {}, text));
   }));
   refocus(focus, "");
 }
@@ -193,19 +226,27 @@ function play() {
   goTo((here + Math.max(1, Math.round(path.s_mm.length / 900))) % path.s_mm.length);
   playing = requestAnimationFrame(play);
 }
-
-// ---------------------------------------------------------------- drawing the state
+// Drawing the state.
 function drawLegend() {
   const parts = [];
-  if (state.readings) parts.push(h("div", { title: "Larger dots: larger errors. Rings: set aside." }, `softer -${scene.scale} %`, h("span", { class: "ramp", style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }), `+${scene.scale} % stiffer than modelled`));
-  if (state.program?.path) parts.push(h("div", {}, `path ${group(scene.ends[0])}`, h("span", { class: "ramp", style: `background:${ramp(theme.dark ? COLOURS.dark : COLOURS.light)}` }), `${group(scene.ends[1])} N/mm`));
+  if (state.readings) parts.push(h("div", { title: "Larger dots: larger errors. Rings: set aside." },
+    `softer -${scene.scale} %`,
+    h("span", { class: "ramp",
+    style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }),
+    `+${scene.scale} % stiffer than modelled`));
+  if (state.program?.path) parts.push(h("div", {}, `path ${group(scene.ends[0])}`,
+    h("span", { class: "ramp", style: `background:${ramp(theme.dark ? COLOURS.dark : COLOURS.light)}` }),
+    `${group(scene.ends[1])} N/mm`));
   $("legend").replaceChildren(...parts);
 }
 function drawPanel() {
   const typed = document.activeElement, focus = typed?.id, [, , make] = PANELS.find(([name]) => name === panel);
-  $("tabs").replaceChildren(...PANELS.map(([name, label]) => h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-selected": String(name === panel), "aria-controls": "panel", tabindex: name === panel ? "0" : "-1", onclick: () => open(name) }, label)));
+  $("tabs").replaceChildren(...PANELS.map(([name, label]) => h("button", { type: "button", role: "tab",
+    id: `tab-${name}`, "aria-selected": String(name === panel), "aria-controls": "panel", tabindex: name === panel ? "0"
+    : "-1", onclick: () => open(name) }, label)));
   $("panel").setAttribute("aria-labelledby", `tab-${panel}`);
-  const within = $("panel").contains(typed), caret = typed?.tagName === "TEXTAREA" ? [typed.selectionStart, typed.selectionEnd, typed.scrollTop] : null;
+  const within = $("panel").contains(typed), caret = typed?.tagName === "TEXTAREA" ? [typed.selectionStart,
+    typed.selectionEnd, typed.scrollTop] : null;
   $("panel").replaceChildren(...[make(state, act)].flat(9).filter(Boolean));
   if (panel === "program") drawText(state.program?.path?.line[Math.max(0, here)] ?? 1);
   refocus(focus, within ? "panel" : "");
@@ -231,13 +272,16 @@ function draw() {
   const r = state.readings, v = state.verdict;
   scene.deviation = r?.deviation ?? [];
   const sizes = scene.deviation.filter((d) => d !== null).map(Math.abs).sort((a, b) => a - b);
-  if (!scene.scaled && sizes.length) { scene.scale = Math.max(5, 5 * Math.ceil(sizes[Math.floor(0.95 * sizes.length)] / 5)); scene.scaled = true; }
+  if (!scene.scaled && sizes.length) { scene.scale = Math.max(5,
+    5 * Math.ceil(sizes[Math.floor(0.95 * sizes.length)] / 5)); scene.scaled = true; }
   scene.lit = state.effects.filter((one) => one.on).map((one) => ({ link: one.link, number: one.on.strut }));
   if (scene.selected >= (r?.line.length ?? 0)) scene.selected = -1;
   if (scene.selected < 0 && here < 0) scene.pose = [...state.machine.origin];
   if (!pending) act.origin = [...(state.program?.origin ?? state.machine.origin)];
   $("title").textContent = state.case;
-  $("machine-name").textContent = `${state.machine.title}${r ? `, ${r.line.length - r.aside.filter(Boolean).length} readings` : ""}${state.program ? `, ${state.program.name}` : ""}`;
+  $("machine-name").textContent =
+    `${state.machine.title}${r ? `, ${r.line.length - r.aside.filter(Boolean).length} readings` : ""}`
+      + `${state.program ? `, ${state.program.name}` : ""}`;
   document.title = `${state.case}: toolpath_stiff studio`;
   const waiting = r && !v ? "Judging the readings" : r ? "" : "What does the machine do, and does the model say so?";
   $("sentence").classList.toggle("waiting", Boolean(waiting));
@@ -245,8 +289,10 @@ function draw() {
   $("gauge").replaceChildren(gaugeOf(state));
   const off = state.own_effects.filter((one) => one.off).map((one) => one.file);
   $("off").hidden = !off.length;
-  $("off").textContent = `Off, as it is code that you have not agreed to run: ${off.join(", ")}. It stands under Effects.`;
-  for (const [id, many] of [["undo", state.history.length > 1], ["redo", state.undone.length]]) if ($(id)) $(id).disabled = !many;
+  $("off").textContent =
+    `Off, as it is code that you have not agreed to run: ${off.join(", ")}. It stands under Effects.`;
+  for (const [id, many] of [["undo", state.history.length > 1], ["redo", state.undone.length]]) if ($(id)) $(
+    id).disabled = !many;
   scene.paths = [];
   if (state.program?.path && here >= state.program.path.s_mm.length) here = scene.sample = -1;
   classify();
@@ -258,7 +304,8 @@ function draw() {
 function drawJob(job) {
   if (readonly) return;
   $("job").classList.toggle("busy", Boolean(job));
-  $("job").textContent = job ? `${job.text || job.kind}${job.total ? `, ${Math.round(100 * job.done / job.total)} %` : ""}` : "";
+  $("job").textContent = job
+    ? `${job.text || job.kind}${job.total ? `, ${Math.round(100 * job.done / job.total)} %` : ""}` : "";
   $("cancel").hidden = !job;
 }
 let asking = null;
@@ -276,12 +323,13 @@ async function refresh() {
   })();
   await asking;
 }
-
-// ---------------------------------------------------------------- controls
-for (const one of document.querySelectorAll("[data-view]")) one.addEventListener("click", () => view.turnTo(one.dataset.view));
+// Controls.
+for (const one of document.querySelectorAll("[data-view]")) one.addEventListener("click",
+  () => view.turnTo(one.dataset.view));
 for (const one of document.querySelectorAll("[data-focus]")) one.addEventListener("click", () => {
   scene.focus = one.dataset.focus;
-  for (const other of document.querySelectorAll("[data-focus]")) other.setAttribute("aria-pressed", String(other === one));
+  for (const other of document.querySelectorAll("[data-focus]")) other.setAttribute("aria-pressed",
+    String(other === one));
   view.turnTo("fit");
 });
 $("show-reach").addEventListener("change", (e) => { scene.showReach = e.target.checked; view.redraw(); });
@@ -296,7 +344,8 @@ $("play").addEventListener("click", () => {
 watchTheme(() => { if (state) { drawLegend(); view.redraw(); profile?.redraw(); } });
 
 // What a program is read with comes before the program.
-const ordered = (files) => [...files].sort((a, b) => /\.(tbl|var|toml|csv)$/i.test(b.name) - /\.(tbl|var|toml|csv)$/i.test(a.name));
+const ordered = (files) => [...files].sort((a, b) => /\.(tbl|var|toml|csv)$/i.test(b.name)
+  - /\.(tbl|var|toml|csv)$/i.test(a.name));
 async function take(file, run = false) {
   try {
     const found = await post(`/file?name=${encodeURIComponent(file.name)}${run ? "&run=yes" : ""}`, file);
@@ -317,10 +366,12 @@ if (readonly) draw();
 else {
   for (const name of ["undo", "redo", "cancel"]) $(name).addEventListener("click", () => act({ do: name }));
   $("open").addEventListener("click", () => $("file").click());
-  $("file").addEventListener("change", async (e) => { for (const file of ordered(e.target.files)) await take(file); e.target.value = ""; });
+  $("file").addEventListener("change", async (e) => { for (const file of ordered(e.target.files)) await take(file);
+    e.target.value = ""; });
   addEventListener("dragover", (e) => { e.preventDefault(); $("drop").hidden = false; });
   addEventListener("dragleave", (e) => { if (!e.relatedTarget) $("drop").hidden = true; });
-  addEventListener("drop", async (e) => { e.preventDefault(); $("drop").hidden = true; for (const file of ordered(e.dataTransfer.files)) await take(file); });
+  addEventListener("drop", async (e) => { e.preventDefault(); $("drop").hidden = true;
+    for (const file of ordered(e.dataTransfer.files)) await take(file); });
   addEventListener("keydown", (e) => {
     if (!(e.ctrlKey || e.metaKey) || e.target.matches("textarea, input[type=number], input[type=text]")) return;
     const name = { z: "undo", y: "redo" }[e.key.toLowerCase()];

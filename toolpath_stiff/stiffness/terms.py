@@ -1,6 +1,6 @@
-"""Terms of a portrait: one link of the load path that gives way, along some directions, as one variable says.
+"""Terms: one link of the load path that gives way, along some directions, as one variable says.
 
-A term is an ordinary effect with one size and constants that are read off the readings. Its compliance is
+A term has a size and constants that are read off readings; `term_effect` makes effects of terms. Its compliance is
 
     c(v) = size * s(v),        s >= 0,
 
@@ -11,18 +11,16 @@ where the link can only give; a strut's stiffness may change to both sides, with
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import joint_angles
-from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
-from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
-from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
+from toolpath_stiff.stiffness.contract import LoadPath
 
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
 
@@ -77,7 +75,61 @@ UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = 
 }
 
 
-ASSUMED = "described from readings; usual sizes are engineering experience, no source"
+# (action, link) -> directions along which it may act there.
+HEAD, BASE, STRUTS = ("tool", "platform"), ("frame", "table"), ("along the struts",)
+ALONG: dict[tuple[str, str], tuple[str, ...]] = {
+    **{("give", link): ("X", "Y", "Z", "radial", "axial", "all") for link in HEAD},
+    **{("give", link): ("X", "Y", "Z", "horizontal", "radial", "tangential", "all") for link in BASE},
+    **{("rocking", link): ("X", "Y", "tangential", "all") for link in BASE},
+    **{("tilting", link): ("X", "Y", "radial") for link in HEAD},
+    **{("vertex", link): ("radial", "tangential", "Z", "axial", *STRUTS) for link in ("frame", "platform")},
+    **{("strut", link): STRUTS for link in ("joints", "struts", "one strut")},
+    **{("strut factor", link): STRUTS for link in ("struts", "one strut")},
+    **{("coupling", link): STRUTS for link in ("struts", "frame")},
+    **{(pin, "joints"): ("radial", "tangential") for pin in ("frame pin", "platform pin")},
+    ("turning", "joints"): ("all",),
+    ("joint offset", "joints"): ("X", "Y", "Z"),
+    ("reading factor", "instrument"): ("reading", "X", "Y", "Z", "all"),
+    ("reading shift", "instrument"): ("reading", "X", "Y", "Z", "all"),
+}
+
+
+# Action -> what it adds of a size, its share s of it, and h, the load of the link.
+EQUATIONS = {
+    "give": "c += {} s h^2, h = tip force",
+    "rocking": "c += {} s h^2, h = moment of the tip force about the origin",
+    "tilting": "c += {} s h^2, h = moment of the tip force about the platform's middle",
+    "vertex": "c += {} s h^2, h = force in the vertex",
+    "strut": "c_i += {} s",
+    "frame pin": "c_i += {} s (u_i . pin)^2",
+    "platform pin": "c_i += {} s (u_i . pin)^2",
+    "turning": "K += sum over i of {} s B_i^T B_i",
+    "strut factor": "c_i += {} s / k_i",
+    "coupling": "c_ij += {} s / sqrt(k_i k_j)",
+    "joint offset": "joint += {}",
+    "reading factor": "k_read = k / (1 + {} s)",
+    "reading shift": "F / k_read = F / k + {} s",
+}
+
+
+# Shape -> names of its constants -> s of the variable v.
+FORMULAS: dict[str, dict[tuple[str, ...], str]] = {
+    "offset": {(): "v"},
+    "slope": {
+        ("start", "end"): "(v - start) / (end - start)",
+        ("power", "reference"): "(v / reference)^power",
+    },
+    "square": {("centre", "reach"): "((v - centre) / reach)^2"},
+    "bump": {("centre", "width"): "exp(-((v - centre) / width)^2 / 2)"},
+    "threshold": {
+        ("edge", "side"): "(1 where side (v - edge) > 0, else 0)",
+        ("from", "end"): "max(0, (v - from) / (end - from))",
+        ("beyond",): "max(0, 1 - beyond / v)",
+        ("within",): "min(1, within / v)",
+    },
+    "periodic": {("period", "crest"): "(1 + cos(2 pi (v - crest) / period)) / 2"},
+    "sign": {("side",): "(1 where side v > 0, else 0)"},
+}
 
 
 PLACE = ("x", "y", "z", "radius")
@@ -88,6 +140,9 @@ IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the complian
 
 
 SWINGS = ("frame joint", "platform joint")
+
+
+PAIR = ("first", "second")  # constants of a coupling
 
 
 AXES = {"X": 0, "Y": 1, "Z": 2}
@@ -299,235 +354,23 @@ def multiplied(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.asarray(wide * narrow[:, None])
 
 
-def carriers(link: str, action: str, direction: str, where: int | None, path: LoadPath) -> FloatArray:
-    """(n, k, 12) h of the link's generalised forces h . [f; w] under strut forces f and the tip's wrench w.
-
-    The compliance along a load is the sum of their squares times that of the link.
-    """
-    if action == "vertex":
-        return _vertex_carriers(link, direction, where, path)
-    axes = _axes(link, action, direction, path)
-    found = np.zeros((len(path), axes.shape[1], 12))
-    found[:, :, 6:9] = axes
-    return found
-
-
-def _axes(link: str, action: str, direction: str, path: LoadPath) -> FloatArray:
-    """(n, k, 3) a: the link's generalised forces are a . F of the tip's force F."""
-    n = len(path)
-    if link in ("tool", "platform"):
-        own = {"X": [0], "Y": [1], "Z": [2], "axial": [2], "radial": [0, 1], "all": [0, 1, 2]}[direction]
-        axes = np.swapaxes(path.rotation, 1, 2)[:, own]  # rows R e
-        if action == "tilting":  # (lever x F) . (R e_z x R e) = F . ((R e_z x R e) x lever)
-            lever = -path.struts.arms.mean(axis=1)
-            about = np.cross(path.rotation[:, None, :, 2], axes)
-            return np.cross(about, lever[:, None])
-        return axes
-    x, y, z = path.position.T
-    none = np.zeros(n)
-    if action == "rocking":  # moments of F at p about Y, X and Z
-        of = {"X": (z, none, -x), "Y": (none, z, -y), "tangential": (-y, x, none)}
-        chosen = ("X", "Y") if direction == "all" else (direction,)
-        return np.stack([np.stack(of[one], axis=1) for one in chosen], axis=1)
-    if direction in ("radial", "tangential"):
-        reach = np.maximum(np.hypot(x, y), 1e-9)
-        ends = (x, y, none) if direction == "radial" else (-y, x, none)
-        return np.asarray((np.stack(ends, axis=1) / reach[:, None])[:, None])
-    own = {"all": [0, 1, 2], "horizontal": [0, 1]}.get(direction) or [AXES[direction]]
-    return np.broadcast_to(np.eye(3)[own], (n, len(own), 3))
-
-
-def _vertex_carriers(link: str, direction: str, where: int | None, path: LoadPath) -> FloatArray:
-    """(n, k, 12) of the vertices of frame or platform: the force of two struts along the vertex's own axes."""
-    joints = path.machine.frame_joints if link == "frame" else path.machine.platform_joints
-    found = []
-    for number, (pair, outward) in enumerate(frame_vertices(joints), start=1):
-        if where not in (None, number):
-            continue
-        one = np.zeros((len(path), 12))
-        if direction == "along the struts":  # what both carry together
-            one[:, pair] = 1.0
-        else:
-            across = np.array([-outward[1], outward[0], 0.0])
-            upright = np.array([0.0, 0.0, 1.0])
-            own = {"radial": outward, "tangential": across, "Z": upright, "axial": upright}[direction]
-            axis = np.broadcast_to(own, (len(path), 3)) if link == "frame" else path.rotation @ own
-            one[:, pair] = np.einsum("nij,nj->ni", path.struts.directions[:, pair], axis)
-        found.append(one)
-    return np.stack(found, axis=1)
-
-
-def along_pins(action: str, direction: str, path: LoadPath) -> FloatArray:
-    """(n, 6) share of each strut's force that is along the pin of its joint."""
-    joints = path.machine.frame_joints if action == "frame pin" else path.machine.platform_joints
-    x, y = joints[:, :2].T / np.linalg.norm(joints[:, :2], axis=1)
-    pins = np.stack([x, y, 0.0 * x] if direction == "radial" else [-y, x, 0.0 * x], axis=1)
-    turned = pins if action == "frame pin" else pins @ np.swapaxes(path.rotation, 1, 2)
-    return np.asarray((path.struts.directions * turned).sum(axis=-1))
-
-
-def strut_share(term: Term, path: LoadPath) -> FloatArray:
-    """(n, 6) of each strut per unit of a size: compliance of what is in series with it, stiffness of `turning`."""
-    shape = shaped(term, path)
-    each = np.array(np.broadcast_to(shape[:, None] if shape.ndim == 1 else shape, (len(path), 6)), dtype=float)
-    if term.where is not None:
-        each[:, np.arange(6) != term.where - 1] = 0.0
-    if term.action == "strut factor":
-        each = np.asarray(each / path.machine.strut_law.stiffness(path.struts.lengths))
-    if term.action in PINS:
-        each = np.asarray(each * along_pins(term.action, term.direction, path) ** 2)
-    return each
-
-
-def coupled(term: Term) -> tuple[int, int]:
-    """Indices from 0 of the struts of a `coupling`."""
-    return int(term.constants["first"]) - 1, int(term.constants["second"]) - 1
-
-
-def coupling_share(term: Term, path: LoadPath) -> FloatArray:
-    """(n,) m/N that a `coupling` puts between its struts per unit of its size."""
-    stiffness = path.machine.strut_law.stiffness(path.struts.lengths[:, coupled(term)])
-    return np.asarray(shaped(term, path) / np.sqrt(stiffness.prod(axis=1)))
-
-
-def reading_share(term: Term, path: LoadPath) -> FloatArray:
-    """(n,) by how much a `reading` is off per unit of the term's size: a share, or a displacement in m."""
-    shape = shaped(term, path)
-    if term.direction in AXES:
-        assert path.direction is not None
-        shape = shape * path.direction[:, AXES[term.direction]] ** 2
-    return np.asarray(shape)
-
-
-class TermEffect(Effect):
-    """A term as an effect; `effect_of` makes one."""
-
-    term: ClassVar[Term]
-
-
-class _Form(TermEffect):
-    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """Quadratic form of strut forces and tip wrench."""
-        term = self.term
-        if not _seen(term, path):
-            return None
-        rows = carriers(term.link, term.action, term.direction, term.where, path)
-        weight = p["size"] * shaped(term, path)
-        return np.asarray(weight[:, None, None] * np.einsum("nki,nkj->nij", rows, rows))
-
-
-class _Coupling(TermEffect):
-    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """What couples two struts."""
-        term = self.term
-        if not _seen(term, path):
-            return None
-        first, second = coupled(term)
-        own = p["size"] * coupling_share(term, path)
-        form = np.zeros((len(path), 12, 12))
-        form[:, first, second] = form[:, second, first] = own
-        return form
-
-
-class _Strut(TermEffect):
-    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """In series with each strut."""
-        if not _seen(self.term, path):
-            return None
-        return np.asarray(p["size"] * strut_share(self.term, path))
-
-
-class _Turning(TermEffect):
-    def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """Rotational springs at both ends of each strut."""
-        if p["size"] == 0.0 or not _seen(self.term, path):
-            return None
-        rotations = end_rotations(path)
-        weighted = (p["size"] * strut_share(self.term, path))[:, :, None, None] * rotations
-        flat = (len(path), 36, 6)
-        return np.asarray(np.swapaxes(rotations.reshape(flat), 1, 2) @ weighted.reshape(flat))
-
-
-class _Offset(TermEffect):
-    unknown_to_control = True
-
-    def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
-        """With one joint off its place."""
-        name = f"{self.term.column}_joints"
-        joints = np.array(getattr(machine, name))
-        assert self.term.where is not None
-        joints[self.term.where - 1, AXES[self.term.direction]] += p["size"]
-        return machine.with_changes(**{name: joints})
-
-
-class _Reading(TermEffect):
-    def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
-        """Force over the deflection as read; nan where nothing of the deflection is left."""
-        off = p["size"] * reading_share(self.term, path)
-        factor = 1.0 + (off if self.term.action == "reading factor" else off * stiffness / path.force)
-        return np.where(factor > 0.0, stiffness / np.where(factor > 0.0, factor, 1.0), np.nan)
-
-
-def _seen(term: Term, path: LoadPath) -> bool:
-    """Whether these poses say what the term varies with."""
-    needed = {"time": path.time, "temperature": path.temperature, "setup": path.setup}
-    needed |= dict.fromkeys(OF_FORCES, path.strut_forces)
-    return all(one not in needed or needed[one] is not None for one in term.variables)
-
-
-NEEDS = {
-    "load": "force_N",
-    "strut force": "force_N",
-    "time": "time_min",
-    "temperature": "temperature_C",
-    "setup": "setup",
-}
-
-
 OF_FORCES = ("strut force", "force sign")
 
 
-CATALOGUE_LINKS = {"one strut": "struts"}
+def formula(term: Term, size: str) -> str:
+    """What a term adds, its size and its constants by name."""
+    along = f" along {term.direction}" if term.link == "instrument" and term.direction in AXES else ""
+    return f"{EQUATIONS[term.action].format(size)}{along}, s = {_share_formula(term, len(term.signs) > 1)}"
 
 
-def effect_of(term: Term) -> Effect:
-    """A term as an effect of one parameter, `size`.
-
-    Raises
-    ------
-    ValueError
-        No effect can see the term's variable (`Term.acts`).
-
-    Examples
-    --------
-    >>> tip = Term("table", "Y", "y", "slope", "give", at=(("start", -0.4), ("end", 0.4)))
-    >>> effect_of(tip).parameters[0].key
-    'size_nm_per_N'
-    """
-    if not term.acts:
-        raise ValueError(f"no effect sees the variable {' times '.join(term.variables)!r}")
-    unit, si, bounds, typical = UNITS[term.action]
-    kinds: dict[str, type[TermEffect]] = {
-        "coupling": _Coupling, **dict.fromkeys(IN_SERIES, _Strut), "turning": _Turning, "joint offset": _Offset,
-        "reading factor": _Reading, "reading shift": _Reading,
-    }  # fmt: skip
-    needs = list(dict.fromkeys(NEEDS[one] for one in term.variables if one in NEEDS))
-    if term.action in ("reading factor", "reading shift"):
-        needs += ["direction"] if term.direction in AXES else []
-        needs += ["force_N"] if term.action == "reading shift" and "force_N" not in needs else []
-    link = "geometry" if term.action == "joint offset" else CATALOGUE_LINKS.get(term.link, term.link)
-    attributes: dict[str, Any] = {
-        "__doc__": "A term of a portrait.",
-        "term": term,
-        "name": f"term: {term.key}",
-        "title": term.key,
-        "link": link,
-        "equation": "c += size s(v) sum_k (h_k . [f; w])^2; of turning: K += size s(v) sum_k B_k^T B_k",
-        "source": ASSUMED,
-        "parameters": (Parameter("size", unit, si, bounds, typical, ASSUMED, meaning=f"size of {term.key}"),),
-        "needs": tuple(needs),
-        "load_dependent": not set(OF_FORCES).isdisjoint(term.variables),
-    }
-    made = type("TermOfPortrait", (kinds.get(term.action, _Form),), attributes)
-    found: Effect = made()
-    return found
+def _share_formula(term: Term, signed: bool) -> str:
+    """The share s as a formula of the variable's name."""
+    if term.variable in ("constant", "direction"):
+        share = "1"
+    elif term.variable == "setup":
+        share = f"(1 in set-up {term.column}, else 0)"
+    else:
+        names = tuple(name for name, _ in term.at if name not in PAIR)
+        share = re.sub(r"\bv\b", " ".join((term.variable, term.column)).strip(), FORMULAS[term.shape][names])
+        share = f"max(0, {share})" if names == ("start", "end") and not signed else share
+    return share if term.second is None else f"{share} {_share_formula(term.second, signed=False)}"

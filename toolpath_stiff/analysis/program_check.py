@@ -1,54 +1,43 @@
-"""Checks before any stiffness: a program's extents, lengths, times, arcs, reach and strut speeds; a machine's figures.
-
-Of a machine file: whether it is plausible in its struts, its neutral pose, each joint against the symmetry of the
-others.
-"""
+"""Checks of a program before any stiffness: extents, lengths, times, arcs, reach and strut speeds."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.poses import PoseReport, evaluate_poses
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
-from toolpath_stiff.machine.writer import TEMPLATE_REMARK
 from toolpath_stiff.nc.checking import ERROR, WARNING, Checked, Finding, check_by
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches
 from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.nc.operations import find_operations
-from toolpath_stiff.nc.reader import ZERO
+from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.path import BLOCK, Samples, move_durations, place, sample_moves
+from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import (
     Pose,
     deg_from_rad,
     m_from_mm,
     mm_from_m,
     mm_per_min_from_m_per_s,
-    n_per_mm_from_n_per_m,
-    n_per_um_from_n_per_m,
-    um_from_m,
 )
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RADII_APART = m_from_mm(2e-3)  # what rounding I, J, K, X, Y to 0.001 mm explains, and a little more
 MOST_NAMED = 20  # lines named for one kind of finding
 Extents = dict[str, list[float]]
-
-# N/um of a strut: screws, bearings and joints in series. Below, it is no machine's; above, no screw's.
-STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
-# N/um at the tool: "usually less than 1" for articulated robots, "very often greater than 50" for machining centres
-# (Pan, Zhang, Zhu, Wang 2006, J. Mater. Process. Technol. 173, 301).
-ROBOT, MACHINING_CENTRE, BEYOND = 1.0, 50.0, 1000.0
 
 
 @dataclass(frozen=True)
@@ -253,6 +242,66 @@ def _rest(code: str, count: int) -> list[Finding]:
     return [Finding(0, 0, code, f"and {count - MOST_NAMED} more of the kind {code!r}", WARNING)]
 
 
+class ProgramCheck(Result):
+    r"""What a program uses, what is not understood, extents, times, and what a machine says to it.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
+    >>> found
+    <ProgramCheck: slot.nc, 1 error>
+    >>> found.errors == [one for one in found.findings if one["severity"] == "error"]
+    True
+    >>> found.to_frame()["line"].tolist(), found.to_dict()["complete"]
+    ([3], False)
+    """
+
+    command: ClassVar[str] = "check"
+    shown_by: ClassVar[str] = "check"
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self._document = document
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return self._document
+
+    @property
+    def findings(self) -> list[dict[str, Any]]:
+        """What was found: line, column, subject, text, severity."""
+        return list(self._document["findings"])
+
+    @property
+    def errors(self) -> list[dict[str, Any]]:
+        """The findings that keep the program from running as it stands."""
+        return [finding for finding in self.findings if finding["severity"] == ERROR]
+
+    def to_frame(self) -> pd.DataFrame:
+        """The findings, one a row."""
+        import pandas as pd
+
+        return pd.DataFrame(self.findings, columns=["line", "column", "code", "text", "severity", "count"])
+
+    def save(self, file: str | Path) -> Path:
+        r"""Write the JSON document to a file, whole or not at all.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     tps.check(tps.Program.from_text("G21\nM2")).save(pathlib.Path(folder) / "check.json").name
+        'check.json'
+        """
+        return write_atomically(file, self.to_json())
+
+    def _short(self) -> str:
+        count = len(self.errors)
+        errors = f"{self.view.number(count)} error{'s' * (count > 1)}" if count else "no errors"
+        return f"{self._document['program']}, {errors}"
+
+
 def check_program(
     lines: tuple[str, ...],
     name: str,
@@ -266,7 +315,7 @@ def check_program(
     interpreter: str = "builtin",
     rs274: str | None = None,
     unconfined: bool = False,
-) -> dict[str, Any]:
+) -> ProgramCheck:
     """Everything that is to be said of a program, in the shop's units.
 
     Parameters
@@ -297,22 +346,24 @@ def check_program(
             findings += more
     tools, operations = check_parts(checked, lines, name, rapid_feed, found)
     posted = controller.kinematics if checked.dialect in ("", "linuxcnc") else None
-    return {
-        "program": name,
-        "interpreter": reader,
-        "dialect": checked.dialect or controller.label,
-        "kinematics": posted.label if posted else "",
-        "complete": checked.complete,
-        "used": [asdict(code) for code in checked.used],
-        "unsupported": [asdict(word) for word in checked.unsupported],
-        "findings": [asdict(finding) for finding in sorted(findings, key=lambda one: (one.line, one.column))],
-        **figure_rows(found or Figures({}, {}, {}, {})),
-        "tools": tools,
-        "operations": operations,
-        "fastest_strut": speed,
-        "modal_start": checked.start,
-        "modal_end": checked.end,
-    }
+    return ProgramCheck(
+        {
+            "program": name,
+            "interpreter": reader,
+            "dialect": checked.dialect or controller.label,
+            "kinematics": posted.label if posted else "",
+            "complete": checked.complete,
+            "used": [asdict(code) for code in checked.used],
+            "unsupported": [asdict(word) for word in checked.unsupported],
+            "findings": [asdict(finding) for finding in sorted(findings, key=lambda one: (one.line, one.column))],
+            **figure_rows(found or Figures({}, {}, {}, {})),
+            "tools": tools,
+            "operations": operations,
+            "fastest_strut": speed,
+            "modal_start": checked.start,
+            "modal_end": checked.end,
+        }
+    )
 
 
 def check_parts(
@@ -368,129 +419,3 @@ def figure_rows(found: Figures) -> dict[str, Any]:
         "lengths_mm": found.lengths,
         "times_s": found.times,
     }
-
-
-@dataclass(frozen=True)
-class MachineCheck:
-    """What was found.
-
-    Attributes
-    ----------
-    wrong
-        What cannot be right, in words.
-    doubtful
-        What may be meant but should be looked at.
-    neutral, origin
-        Stiffness and reach at the neutral pose and at the default origin.
-    symmetry
-        Of the joints.
-    """
-
-    wrong: tuple[str, ...]
-    doubtful: tuple[str, ...]
-    neutral: PoseReport
-    origin: PoseReport
-    symmetry: Symmetry
-
-    @property
-    def good(self) -> bool:
-        """Whether nothing is wrong."""
-        return not self.wrong
-
-
-def check_machine(model: StiffnessModel) -> MachineCheck:
-    """Check the machine of a model.
-
-    Raises
-    ------
-    InputError, EffectFault
-        Its effects give no stiffness at the neutral pose or the default origin.
-    """
-    machine = model.given or model.machine
-    neutral, origin = (_at(model, pose) for pose in (machine.limits.neutral_pose, machine.default_origin))
-    symmetry = find_symmetry(machine)
-    wrong = [*_struts(machine)]
-    for name, report in (("neutral pose", neutral), ("default origin", origin)):
-        if not report.reach.reachable[0]:
-            wrong.append(f"the {name} is out of reach: {report.reach.describe(0)}")
-    doubtful = [describe_stray(stray, symmetry.kind) for stray in symmetry.strays]
-    if neutral.reach.reachable[0]:
-        doubtful += _stiffness(neutral)
-    if neutral.extrapolated[0]:
-        lengths = ", ".join(f"{mm_from_m(float(v)):.0f}" for v in neutral.strut_lengths[0])
-        doubtful.append(f"at the neutral pose the struts ({lengths} mm) lie outside the lengths of [strut_law]")
-    same = [section for section, remark in machine.remarks.items() if remark == TEMPLATE_REMARK]
-    if same:
-        sections = ", ".join(f"[{section}]" for section in same)
-        doubtful.append(f"the remark of {sections} still says {TEMPLATE_REMARK!r}: say where its figures are from")
-    return MachineCheck(tuple(wrong), tuple(doubtful), neutral, origin, symmetry)
-
-
-def _at(model: StiffnessModel, pose: Pose) -> PoseReport:
-    values = np.array([pose])
-    return evaluate_poses(model, values[:, :3], values[:, 3:])
-
-
-def _struts(machine: Machine) -> Iterator[str]:
-    """Stiffnesses of a strut that no strut has, at the lengths that the file gives and at the ends of the travel."""
-    law = machine.strut_law
-    given = law.points
-    ends = [length for length in machine.limits.strut_length if np.isfinite(length)]
-    found = [*_implausible("[strut_law]", given)]
-    if not found:
-        found += _implausible(
-            "the strut law at an end of the travel", [(x, float(law.stiffness(np.array(x)))) for x in ends]
-        )
-    yield from found
-
-
-def _implausible(where: str, struts: list[tuple[float, float]]) -> Iterator[str]:
-    for length, stiffness in struts:
-        value = n_per_um_from_n_per_m(stiffness)
-        if STRUT_SOFTEST <= value <= STRUT_STIFFEST:
-            continue
-        per, other = ("N/mm", value / 1e3) if value > STRUT_STIFFEST else ("kN/um", value * 1e3)
-        meant = f"; if it is in {per}, it is {other:g} N/um" if STRUT_SOFTEST <= other <= STRUT_STIFFEST else ""
-        yield (
-            f"{where}: a strut of {mm_from_m(length):g} mm with {value:g} N/um; "
-            f"expected {STRUT_SOFTEST:g} to {STRUT_STIFFEST:g} N/um{meant}"
-        )
-
-
-def _stiffness(report: PoseReport) -> list[str]:
-    softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
-    if ROBOT <= softest <= BEYOND:
-        return []
-    beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
-    return [f"at the neutral pose the softest direction has {softest:.3g} N/um at the tool, {beside}"]
-
-
-def neutral_words(machine: Machine, report: PoseReport) -> str:
-    """Stiffness at the neutral pose as one would say it."""
-    x, y, z, *angles = (float(v) for v in machine.limits.neutral_pose)
-    pose = " ".join(f"{axis}{mm_from_m(v) + 0.0:g}" for axis, v in zip("XYZ", (x, y, z), strict=True))
-    turned = [f"{axis}{deg_from_rad(v) + 0.0:g}" for axis, v in zip("ABC", angles, strict=True) if v]
-    kx, ky, kz = (n_per_mm_from_n_per_m(float(v)) for v in report.along_axes[0])
-    along = (um_from_m(defaults.FORCE / float(k)) for k in report.along_axes[0])
-    moved = ", ".join(f"{moved:.3g} um along {axis}" for axis, moved in zip("XYZ", along, strict=True))
-    softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
-    if softest < ROBOT:
-        words = "as soft as a robot arm"
-    elif softest <= MACHINING_CENTRE:
-        words = "between a robot arm (1 N/um) and a machining centre (50 N/um)"
-    elif softest <= BEYOND:
-        words = "as stiff as a machining centre (50 N/um) or stiffer"
-    else:
-        words = "stiffer than any machine tool"
-    return (
-        f"at the neutral pose {' '.join([pose, *turned])}: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; "
-        f"{defaults.FORCE:g} N move the tool by {moved}; softest direction {softest:.3g} N/um, {words}"
-    )
-
-
-def symmetry_words(symmetry: Symmetry) -> str:
-    """What holds for the joints that follow."""
-    if not symmetry.kind:
-        return "the joints follow neither a three-fold symmetry nor a mirror plane: nothing to hold one against"
-    count = 12 - len(symmetry.strays)
-    return f"{count} of 12 joints follow a {symmetry.kind} symmetry within {mm_from_m(symmetry.residual):.2g} mm"

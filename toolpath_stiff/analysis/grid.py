@@ -1,0 +1,238 @@
+"""Stiffness on a grid: planes of the workspace under one load, as the paper's Figures 8 and 9."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from toolpath_stiff import defaults
+from toolpath_stiff.analysis.evaluation import Progress, evaluate
+from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
+from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.files import Content
+from toolpath_stiff.results import FolderResult
+from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+MOST_POINTS = 5_000_000
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class StiffnessMap(FolderResult):
+    """Stiffness over planes of the workspace, along one load; arrays in SI.
+
+    Attributes
+    ----------
+    model
+        The machine with its effects.
+    x, y, z
+        (nx,), (ny,), (nz,) m, coordinates of the grid.
+    stiffness
+        (nz, ny, nx) N/m along the load; nan where out of reach.
+    reachable
+        (nz, ny, nx).
+    load, abc
+        The load's direction; roll, pitch, yaw of the platform in rad.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.map_stiffness("nist", z_mm=(800, 1200), points=5)
+    >>> [plane["z_mm"] for plane in found.to_dict()["slices"]]
+    [800.0, 1200.0]
+    >>> found.to_frame().columns.tolist(), len(found.to_frame())
+    (['x_mm', 'y_mm', 'z_mm', 'stiffness_N_per_mm', 'reachable'], 50)
+    >>> [plane["x_mm"].size for plane in found.columns()], found.grid is found
+    ([25, 25], True)
+    >>> type(found.plot()).__name__
+    'Figure'
+    """
+
+    command: ClassVar[str] = "map"
+    shown_by: ClassVar[str] = "map"
+
+    model: StiffnessModel
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    stiffness: FloatArray
+    reachable: BoolArray
+    load: Load
+    abc: tuple[float, float, float]
+    inputs: tuple[str, ...] = ()
+
+    @property
+    def grid(self) -> StiffnessMap:
+        """The grid and the stiffness on it, arrays in SI."""
+        return self
+
+    def to_dict(self) -> dict[str, Any]:
+        """Extremes of each plane, and of a circle about the machine axis where the planes hold one: `map.json`."""
+        return self._document
+
+    @cached_property
+    def _document(self) -> dict[str, Any]:
+        return {
+            "machine": self.model.machine.name,
+            "load": str(self.load),
+            "abc_deg": [deg_from_rad(v) for v in self.abc],
+            "points": int(self.stiffness.size),
+            "slices": [self._slice(i) for i in range(len(self.z))],
+            **effects_stated(self.model),
+            "warnings": condition_warnings(self.model),
+        }
+
+    def _slice(self, i: int) -> dict[str, Any]:
+        height, layer = float(self.z[i]), self.stiffness[i]
+        row: dict[str, Any] = {"z_mm": mm_from_m(height), "reachable_share": float(self.reachable[i].mean())}
+        if not self.reachable[i].any():
+            return row
+        for name, place in (("softest", np.nanargmin(layer)), ("stiffest", np.nanargmax(layer))):
+            j, k = np.unravel_index(int(place), layer.shape)
+            row[name] = {
+                "x_mm": mm_from_m(float(self.x[k])),
+                "y_mm": mm_from_m(float(self.y[j])),
+                "stiffness_N_per_mm": n_per_mm_from_n_per_m(float(layer[j, k])),
+            }
+        radius = float(min(-self.x[0], self.x[-1], -self.y[0], self.y[-1]))
+        if radius > 0.0 and not any(self.abc):
+            turns = turning_points(self.model, radius, height, self.load)
+            row["circle"] = {
+                "radius_mm": mm_from_m(radius),
+                **{f"{k}_deg": [round(deg_from_rad(v), 2) for v in angles] for k, angles in turns.items()},
+            }
+        return row
+
+    def columns(self) -> Iterator[dict[str, AnyArray]]:
+        """Column of `map.csv` -> values, plane by plane."""
+        ys, xs = np.meshgrid(mm_from_m(self.y), mm_from_m(self.x), indexing="ij")
+        for i, height in enumerate(self.z):
+            yield {
+                "x_mm": xs.ravel(),
+                "y_mm": ys.ravel(),
+                "z_mm": np.full(xs.size, mm_from_m(float(height))),
+                "stiffness_N_per_mm": n_per_mm_from_n_per_m(self.stiffness[i].ravel()),
+                "reachable": self.reachable[i].ravel(),
+            }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a point of the grid: x_mm, y_mm, z_mm, stiffness_N_per_mm (nan out of reach), reachable."""
+        import pandas as pd
+
+        return pd.concat([pd.DataFrame(columns) for columns in self.columns()], ignore_index=True)
+
+    def plot(self) -> Figure:
+        """Contours over each plane."""
+        figure: Figure = self.view.map_picture.figure(self)
+        return figure
+
+    def _short(self) -> str:
+        return f"{self.model.machine.name}, load {self.load}, {self.stiffness.size} points"
+
+    def files(self, *, plots: bool = True) -> Mapping[str, Content]:
+        """Name -> content of each file that `save` writes."""
+        files: Mapping[str, Content] = self.view.files(self, plots)
+        return files
+
+
+def map_stiffness(
+    model: StiffnessModel,
+    x: tuple[float, float],
+    y: tuple[float, float],
+    heights: list[float],
+    load: Load,
+    points: int = 61,
+    abc: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    force: float = defaults.FORCE,
+    progress: Progress | None = None,
+) -> StiffnessMap:
+    """Evaluate a grid of poses.
+
+    Parameters
+    ----------
+    model
+        Machine and effects.
+    x, y
+        (low, high) m.
+    heights
+        z of the slices, m.
+    load
+        Any direction but tangential and normal, which need a path.
+    points
+        Grid points along the longer side; the other side has the same spacing or finer.
+    abc
+        Orientation of the platform, rad.
+
+    Raises
+    ------
+    InputError
+        The load needs a path, an area has no extent, or there are too many points.
+    UnreachableError
+        Nothing of the grid can be reached.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.analysis.loads import parse_load
+    >>> from toolpath_stiff.machine.file import load_machine
+    >>> from toolpath_stiff.stiffness.model import build_model
+    >>> found = map_stiffness(build_model(load_machine("nist")), (-0.1, 0), (-0.1, 0), [0.8], parse_load("x"), points=3)
+    >>> found.stiffness.shape, round(float(found.stiffness[0, 2, 2]) / 1e3)  # N/mm in the middle
+    ((1, 3, 3), 54823)
+    """
+    _check_map(x, y, load)
+    spacing = max(x[1] - x[0], y[1] - y[0]) / (points - 1)
+    nx, ny = (int(np.ceil((hi - lo) / spacing - 1e-9)) + 1 for lo, hi in (x, y))
+    if nx * ny * len(heights) > MOST_POINTS:
+        raise InputError(f"{nx * ny * len(heights)} grid points", expected=f"at most {MOST_POINTS}")
+    xs, ys, zs = np.linspace(*x, nx), np.linspace(*y, ny), np.array(heights)
+    grid = np.stack(np.meshgrid(zs, ys, xs, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
+    turned = np.broadcast_to(np.array(abc), grid.shape)
+    found = evaluate(model, grid, turned, np.zeros_like(grid), load=load, force=force, progress=progress)
+    if not found.reachable.any():
+        nearest = int(np.argmax(found.margin))
+        raise UnreachableError(
+            f"nothing of the map is within reach; the nearest point: {found.reach.describe(nearest)}"
+        )
+    shape = (len(zs), ny, nx)
+    return StiffnessMap(model, xs, ys, zs, found.stiffness.reshape(shape), found.reachable.reshape(shape), load, abc)
+
+
+def _check_map(x: tuple[float, float], y: tuple[float, float], load: Load) -> None:
+    if load.kind in ("tangential", "normal"):
+        raise InputError(
+            f"load {load} needs a path, and a map has none", expected="radial, axial, softest, x, y, z or DX,DY,DZ"
+        )
+    if not (x[0] < x[1] and y[0] < y[1]):
+        raise InputError("the area of the map has no extent", expected="LO:HI with LO below HI in x and in y")
+
+
+def around_axis(model: StiffnessModel, radius: float, height: float, load: Load, angles: FloatArray) -> FloatArray:
+    """Stiffness N/m on a circle about the machine axis at angles (n,) rad; nan where out of reach."""
+    position = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(len(angles), height)])
+    zeros = np.zeros_like(position)
+    return evaluate(model, position, zeros, zeros, load=load).stiffness
+
+
+def turning_points(model: StiffnessModel, radius: float, height: float, load: Load) -> dict[str, list[float]]:
+    """Angles in rad of the maxima and minima on a circle about the machine axis, to a hundredth of a degree.
+
+    Where the whole circle varies by less than a millionth there are none.
+    """
+    angles = np.linspace(0.0, 2.0 * np.pi, 36000, endpoint=False)
+    values = around_axis(model, radius, height, load, angles)
+    if np.isnan(values).any() or np.ptp(values) < 1e-6 * values.mean():
+        return {"maxima": [], "minima": []}
+    before, after = np.roll(values, 1), np.roll(values, -1)
+    return {
+        "maxima": [float(a) for a in angles[(values > before) & (values >= after)]],
+        "minima": [float(a) for a in angles[(values < before) & (values <= after)]],
+    }

@@ -1,0 +1,176 @@
+"""Slips in a machine file: whether struts, neutral pose and joints are plausible, each joint against the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from toolpath_stiff.analysis.poses import PoseStiffness, evaluate_poses
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
+from toolpath_stiff.machine.writer import TEMPLATE_REMARK
+from toolpath_stiff.results import Result
+from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
+from toolpath_stiff.units import Pose, mm_from_m, n_per_um_from_n_per_m
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+# N/um of a strut: screws, bearings and joints in series. Below, it is no machine's; above, no screw's.
+STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
+# N/um at the tool: "usually less than 1" for articulated robots, "very often greater than 50" for machining centres
+# (Pan, Zhang, Zhu, Wang 2006, J. Mater. Process. Technol. 173, 301).
+ROBOT, MACHINING_CENTRE, BEYOND = 1.0, 50.0, 1000.0
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class MachineCheck(Result):
+    """A machine file held against what is plausible.
+
+    Attributes
+    ----------
+    file, model
+        The machine's name or file; the machine with its effects.
+    wrong
+        What cannot be right, in words.
+    doubtful
+        What may be meant but should be looked at.
+    neutral, origin
+        Stiffness and reach at the neutral pose and at the default origin.
+    symmetry
+        Of the joints.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.Machine.load("nist").check()
+    >>> found.good, found.to_dict()["wrong"], found.warnings, len(found.to_frame())
+    (True, [], [], 0)
+    >>> found.file, found.found is found, found.symmetry.kind
+    ('nist', True, 'three-fold')
+    >>> type(found.plot()).__name__
+    'Figure'
+    """
+
+    command: ClassVar[str] = "machine"
+    shown_by: ClassVar[str] = "machine_check"
+
+    file: str
+    model: StiffnessModel
+    wrong: list[str]
+    doubtful: list[str]
+    neutral: PoseStiffness
+    origin: PoseStiffness
+    symmetry: Symmetry
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.wrong
+
+    @property
+    def found(self) -> MachineCheck:
+        """What cannot be right, what is doubtful, the machine at its neutral pose and default origin."""
+        return self
+
+    @property
+    def warnings(self) -> list[str]:
+        """Effects that do not act on a program as the file stands."""
+        return condition_warnings(self.model)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return {
+            "file": self.file,
+            "machine": self.model.machine.name,
+            "good": self.good,
+            "wrong": self.wrong,
+            "doubtful": self.doubtful,
+            **effects_stated(self.model),
+            "warnings": self.warnings,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a finding: severity (wrong, doubtful, warning), text."""
+        import pandas as pd
+
+        kinds = (("wrong", self.wrong), ("doubtful", self.doubtful), ("warning", self.warnings))
+        rows = [(severity, text) for severity, texts in kinds for text in texts]
+        return pd.DataFrame(rows, columns=["severity", "text"])
+
+    def plot(self) -> Figure:
+        """The machine at its neutral pose from two sides, doubtful joints marked."""
+        figure: Figure = self.view.machine_views.figure(self)
+        return figure
+
+    def picture(self) -> bytes:
+        """The same as a PNG."""
+        return bytes(self.view.machine_views(self))
+
+    def _short(self) -> str:
+        return f"{self.model.machine.name}, {len(self.wrong)} wrong, {len(self.doubtful)} doubtful"
+
+
+def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
+    """Check the machine of a model.
+
+    Raises
+    ------
+    InputError, EffectFault
+        Its effects give no stiffness at the neutral pose or the default origin.
+    """
+    machine = model.given or model.machine
+    neutral, origin = (_at(model, pose) for pose in (machine.limits.neutral_pose, machine.default_origin))
+    symmetry = find_symmetry(machine)
+    wrong = _struts(machine)
+    for name, report in (("neutral pose", neutral), ("default origin", origin)):
+        if not report.reach.reachable[0]:
+            wrong.append(f"the {name} is out of reach: {report.reach.describe(0)}")
+    doubtful = [describe_stray(stray, symmetry.kind) for stray in symmetry.strays]
+    if neutral.reach.reachable[0]:
+        doubtful += _stiffness(neutral)
+    if neutral.extrapolated[0]:
+        lengths = ", ".join(f"{mm_from_m(float(v)):.0f}" for v in neutral.strut_lengths[0])
+        doubtful.append(f"at the neutral pose the struts ({lengths} mm) lie outside the lengths of [strut_law]")
+    same = [section for section, remark in machine.remarks.items() if remark == TEMPLATE_REMARK]
+    if same:
+        sections = ", ".join(f"[{section}]" for section in same)
+        doubtful.append(f"the remark of {sections} still says {TEMPLATE_REMARK!r}: say where its figures are from")
+    return MachineCheck(file, model, wrong, doubtful, neutral, origin, symmetry)
+
+
+def _at(model: StiffnessModel, pose: Pose) -> PoseStiffness:
+    values = np.array([pose])
+    return evaluate_poses(model, values[:, :3], values[:, 3:])
+
+
+def _struts(machine: Machine) -> list[str]:
+    """Stiffnesses of a strut that no strut has, at the lengths that the file gives, else at the ends of the travel."""
+    law = machine.strut_law
+    ends = [(x, float(law.stiffness(np.array(x)))) for x in machine.limits.strut_length if np.isfinite(x)]
+    return [*_implausible("[strut_law]", law.points)] or [*_implausible("the strut law at an end of the travel", ends)]
+
+
+def _implausible(where: str, struts: list[tuple[float, float]]) -> Iterator[str]:
+    for length, stiffness in struts:
+        value = n_per_um_from_n_per_m(stiffness)
+        if STRUT_SOFTEST <= value <= STRUT_STIFFEST:
+            continue
+        per, other = ("N/mm", value / 1e3) if value > STRUT_STIFFEST else ("kN/um", value * 1e3)
+        meant = f"; if it is in {per}, it is {other:g} N/um" if STRUT_SOFTEST <= other <= STRUT_STIFFEST else ""
+        yield (
+            f"{where}: a strut of {mm_from_m(length):g} mm with {value:g} N/um; "
+            f"expected {STRUT_SOFTEST:g} to {STRUT_STIFFEST:g} N/um{meant}"
+        )
+
+
+def _stiffness(report: PoseStiffness) -> list[str]:
+    softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
+    if ROBOT <= softest <= BEYOND:
+        return []
+    beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
+    return [f"at the neutral pose the softest direction has {softest:.3g} N/um at the tool, {beside}"]

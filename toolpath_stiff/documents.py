@@ -1,0 +1,22 @@
+"""Results as plain data: dataclasses as JSON has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+Document = Mapping[str, Any]  # what a JSON file holds, or a part of it, by the file's own keys
+
+
+def to_dict(value: Any) -> Any:
+    """Plain data: dataclasses as dictionaries, their fields in order; None is kept, numpy becomes Python."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: to_dict(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: to_dict(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [to_dict(part) for part in value]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

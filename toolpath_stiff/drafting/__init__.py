@@ -1,1 +1,0 @@
-"""A portrait as the source text of an effect file."""

@@ -1,0 +1,76 @@
+"""Effects that readings cannot tell apart: canonical correlations of their signatures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.hypotheses import Family
+
+CONFOUNDED = 0.95  # canonical correlation above which two effects cannot be told apart by these data
+
+
+@dataclass(frozen=True)
+class Confounding:
+    """Largest canonical correlation of any two effects' signatures.
+
+    Attributes
+    ----------
+    names
+        Effects, ordered so that those of one set stand together.
+    matrix
+        (m, m) from 0 to 1.
+    sets
+        Sets of two and more effects, linked by correlations above `CONFOUNDED`.
+    """
+
+    names: tuple[str, ...]
+    matrix: FloatArray
+    sets: tuple[tuple[str, ...], ...]
+
+
+def confounding(problem: Problem, families: Sequence[Family]) -> Confounding:
+    """The confounding of effects on these data; for an effect with choices, that of its worst choice."""
+    names = sorted(family.name for family in families)
+    bases: dict[str, list[FloatArray]] = {}
+    for family in families:
+        bases[family.name] = []
+        for table in family.tables:
+            columns = problem.sight.projected.white((table.columns / problem.base_compliance[:, None]).T).T
+            lengths = np.linalg.norm(columns, axis=0)
+            if lengths.max() > 0.0:
+                kept = columns[:, lengths > 1e-9 * lengths.max()] / lengths[lengths > 1e-9 * lengths.max()]
+                bases[family.name].append(np.linalg.qr(kept)[0])
+    matrix = np.eye(len(names))
+    for i, first in enumerate(names):
+        for j, second in enumerate(names[:i]):
+            matrix[i, j] = matrix[j, i] = max(
+                (float(np.linalg.norm(a.T @ b, 2)) for a in bases[first] for b in bases[second]), default=0.0
+            )
+    matrix = np.clip(matrix, 0.0, 1.0)
+    sets = _linked(matrix > CONFOUNDED)
+    # Sets first, each as a block; then the rest, every one next to what it resembles most.
+    order = [i for group in sorted(sets, key=lambda group: (-len(group), group)) for i in group]
+    return Confounding(
+        tuple(names[i] for i in order),
+        matrix[np.ix_(order, order)],
+        tuple(tuple(names[i] for i in group) for group in sets if len(group) > 1),
+    )
+
+
+def _linked(close: NDArray[np.bool_]) -> list[list[int]]:
+    """Connected components of a symmetric relation."""
+    left, groups = set(range(len(close))), []
+    while left:
+        group, edge = set(), {min(left)}
+        while edge:
+            group |= edge
+            edge = {j for i in edge for j in np.flatnonzero(close[i]).tolist()} - group
+        groups.append(sorted(group))
+        left -= group
+    return groups

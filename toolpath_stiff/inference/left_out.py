@@ -1,0 +1,117 @@
+"""Residuals at points that are left out of a fit in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.covariances import Groups, Precision
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
+
+SAME_ERROR = 1e-10  # of a stiffness; rounding makes 1e-14
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Residuals at left-out points.
+
+    Attributes
+    ----------
+    residual
+        (n,) ln measured - ln modelled, each by the fit without its point.
+    moves
+        (points, 2 + free) by how much law and sizes moved.
+    point
+        (n,) labels of the points.
+    """
+
+    residual: FloatArray
+    moves: FloatArray
+    point: NDArray[np.str_]
+
+    @property
+    def errors(self) -> FloatArray:
+        """(n,) |modelled - measured| / measured."""
+        return np.abs(np.expm1(-self.residual))
+
+    def of_readings(self, rows: NDArray[np.bool_]) -> HeldOut:
+        """Of some of the readings."""
+        return HeldOut(self.residual[rows], self.moves, self.point[rows])
+
+    @property
+    def mean_error(self) -> float:
+        """Mean of `errors`."""
+        return float(self.errors.mean())
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of (modelled - measured) / measured."""
+        return float(np.sqrt(np.mean(np.expm1(-self.residual) ** 2)))
+
+
+def of_readings(fit: Fit, rows: NDArray[np.bool_]) -> Fit:
+    """A fit with the residuals of some of its readings alone: for counting errors, no longer for fitting."""
+    return fit if rows.all() else replace(fit, residual=fit.residual[rows], jacobian=fit.jacobian[rows])
+
+
+def held_out(fit: Fit, point: NDArray[np.str_]) -> HeldOut:
+    """Leave each point out in turn; with fewer than three points nothing can be left out and all is nan."""
+    points = Groups.by(point)
+    residual = np.full(len(fit.residual), np.nan)
+    moves = np.zeros((points.count, fit.jacobian.shape[1]))
+    if points.count < 3:
+        return HeldOut(residual, moves, point)
+    prior = np.zeros((fit.jacobian.shape[1],) * 2)
+    prior[:2, :2] = np.eye(2) * (1.0 / LAW_PRIOR**2 if fit.law_free else 1e12)
+    precision = fit.scatter.precision
+    scale = np.sqrt(np.maximum(precision.squares(fit.jacobian.T) + np.diag(prior), 1e-300))
+    columns = fit.jacobian / scale
+    for which, out, products in products_without(precision, columns, fit.residual, points):
+        pull = products[..., -1]
+        pull[:, :2] -= (prior[:2, :2] @ fit.law) / scale[:2]
+        information = products[..., :-1] + prior / np.outer(scale, scale)
+        moves[which] = (np.linalg.pinv(information, hermitian=True) @ pull[..., None])[..., 0] / scale
+        residual[out] = fit.residual[out] - (fit.jacobian[out] @ moves[which][..., None])[..., 0]
+    return HeldOut(residual, moves, point)
+
+
+def products_without(
+    precision: Precision, columns: FloatArray, residual: FloatArray, points: Groups
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]]:
+    """For points left out in turn, those of k readings together: the points (m,), their readings (m, k), products.
+
+    The products are (m, p, p + 1) J^T A [J, r] of the readings that stay. Their inverse covariance is the Schur
+    complement A_ss - A_so A_oo^-1 A_os of the inverse covariance of all, of which the products need the readings that
+    are left out only: J^T A J - (A J)_o^T A_oo^-1 (A J)_o.
+    """
+    solved = precision.times(np.concatenate([columns.T, residual[None]]))
+    whole = solved[:-1] @ np.concatenate([columns, residual[:, None]], axis=1)
+    members = points.members()
+    sizes = np.array([len(out) for out in members])
+    for size in np.unique(sizes).tolist():
+        which = np.flatnonzero(sizes == size)
+        out = np.array([members[k] for k in which])
+        part = np.moveaxis(solved[:, out], 0, 1)  # (m, p + 1, k)
+        taken = part[:, :-1] @ np.linalg.solve(precision.block(out), np.swapaxes(part, 1, 2))
+        yield which, out, whole - taken
+
+
+def error_falls(before: HeldOut, after: HeldOut) -> FloatArray:
+    """(n,) fall of each reading's held-out error; 0 where rounding makes it, whose sign is the processor's."""
+    falls = before.errors - after.errors
+    return np.asarray(np.where(np.abs(falls) < SAME_ERROR, 0.0, falls))
+
+
+def gain_in_standard_errors(before: HeldOut, after: HeldOut) -> float:
+    """Mean fall of the held-out error over its standard error, paired by point; nan with fewer than three points."""
+    labels = np.unique(before.point)
+    fallen = error_falls(before, after)
+    falls = np.array([fallen[before.point == label].mean() for label in labels])
+    if len(labels) < 3 or not np.isfinite(falls).all():
+        return float("nan")
+    error = float(falls.std(ddof=1)) / np.sqrt(len(falls))
+    return float(falls.mean() / error) if error > 0.0 else 0.0

@@ -1,0 +1,192 @@
+"""Priors of sizes: flat in the logarithm of the change that a size makes, as far as it is expected and would show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.candidates import Table
+from toolpath_stiff.inference.covariances import Precision
+
+# Rms change of ln stiffness between which an effect's size is expected, flat in its logarithm; assumed: effects are
+# "a few to thirty per cent", smaller ones do no harm, larger ones are seen with the naked eye.
+EXPECTED = (0.005, 0.30)
+
+
+TAIL = 1.0  # sd of ln size beyond them
+
+
+USUAL = np.log(10.0)  # distance in ln size from the typical range at which the prior has halved
+
+
+# Mean and sd of ln(change by a component / change by the strongest): what gives way along X gives way along Y, too, by
+# an amount of the same order; assumed.
+COMPARABLE = (-0.7, 0.9)
+
+
+VISIBLE = 3.0  # whitened length of a signature from which on it can be seen
+
+
+FADES = 0.7  # sd by which visibility fades below
+
+
+LIKELY = 3.84  # 95 % quantile of chi-square with one degree of freedom
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What these data can see: the base model's compliance (n,) and the inverse covariance of what its refit leaves."""
+
+    compliance: FloatArray
+    projected: Precision
+
+    def change(self, delta: FloatArray) -> FloatArray:
+        """(..., n) change of ln compliance by added compliances (..., n)."""
+        return np.asarray(np.log1p(np.maximum(delta / self.compliance, -0.9)))
+
+    def length(self, change: FloatArray) -> FloatArray:
+        """(...,) whitened length of changes (..., n) beside the strut law."""
+        return np.asarray(np.sqrt(np.maximum(self.projected.squares(change), 0.0)))
+
+
+def _log_visible(lengths: FloatArray, longest: float) -> FloatArray:
+    """Log weight of sizes whose signatures have these lengths; all alike if even the longest is not visible."""
+    if longest < VISIBLE:
+        return np.zeros(len(lengths))
+    return np.asarray(-0.5 * (np.maximum(VISIBLE - lengths, 0.0) / FADES) ** 2)
+
+
+def log_expected(rms: FloatArray) -> FloatArray:
+    """Log prior density of ln rms change, not normalised: flat between `EXPECTED`, normal tails."""
+    logs = np.log(np.maximum(rms, 1e-9))
+    low, high = np.log(EXPECTED[0]), np.log(EXPECTED[1])
+    beyond = np.maximum(0.0, np.maximum(low - logs, logs - high))
+    return np.asarray(-0.5 * (beyond / TAIL) ** 2)
+
+
+def log_usual(sizes: FloatArray, typical: tuple[float, float]) -> FloatArray:
+    """Log weight for being far from the typical range: a tenth of it or ten times it counts half."""
+    logs = np.log(np.maximum(np.abs(sizes), 1e-300))
+    low = np.log(typical[0]) if typical[0] > 0.0 else -np.inf
+    high = np.log(typical[1]) if 0.0 < typical[1] < np.inf else np.inf
+    with np.errstate(invalid="ignore"):
+        beyond = np.maximum(0.0, np.maximum(low - logs, logs - high))
+    return np.asarray(-np.log1p((beyond / USUAL) ** 2))
+
+
+def log_comparable(ratio: float) -> float:
+    """Log density of ln(ratio) of a component's change of stiffness to that of the effect's strongest component."""
+    return float(
+        -0.5 * ((np.log(max(ratio, 1e-9)) - COMPARABLE[0]) / COMPARABLE[1]) ** 2
+        - np.log(np.sqrt(2.0 * np.pi) * COMPARABLE[1])
+    )
+
+
+@dataclass(frozen=True)
+class SizePrior:
+    """Prior of one component's size, tabulated over the sizes that its table covers; beyond them it is 0.
+
+    Attributes
+    ----------
+    log_sizes, log_density
+        Sign -> (g,) logarithms of sizes, and of the density over the logarithm of the size, normalised over all signs.
+    """
+
+    log_sizes: dict[float, FloatArray]
+    log_density: dict[float, FloatArray]
+
+    @classmethod
+    def of(cls, table: Table, j: int, sight: Sight) -> SizePrior:
+        """Of component `j` of a table."""
+        component = table.candidate.components[j]
+        logs, density, lengths = {}, {}, {}
+        for sign in component.signs:
+            if table.knots and sign not in table.knots:
+                continue
+            logs[sign] = np.log(_sizes(table, j, sign, sight))
+            sizes = np.zeros((len(logs[sign]), len(table.candidate.components)))
+            sizes[:, j] = sign * np.exp(logs[sign])
+            change = sight.change(table.delta(sizes))
+            rms = np.sqrt(np.mean(change**2, axis=1))
+            lengths[sign] = sight.length(change)
+            density[sign] = log_expected(rms) + log_usual(sizes[:, j], component.typical())
+        longest = max(float(found.max()) for found in lengths.values())
+        density = {sign: density[sign] + _log_visible(lengths[sign], longest) for sign in logs}
+        mass = sum(_trapezoid(logs[sign], density[sign]) for sign in logs)
+        return cls(logs, {sign: density[sign] - np.log(max(mass, 1e-300)) for sign in logs})
+
+    def log_at(self, sizes: FloatArray) -> FloatArray:
+        """(g,) log density of the size itself."""
+        out = np.full(len(sizes), -1e9)
+        for sign, logs in self.log_sizes.items():
+            where = sizes * sign > 0.0
+            at = np.log(np.abs(sizes[where]))
+            out[where] = np.interp(at, logs, self.log_density[sign], left=-1e9, right=-1e9) - at
+        return out
+
+    def integrate(self, sizes: FloatArray, log_likelihood: FloatArray) -> float:
+        """Log of the integral of likelihood times prior over rising sizes (g,) of both signs."""
+        return _log_integral(sizes, log_likelihood + self.log_at(sizes))[0]
+
+    def log_mean_likelihood(self, peak: float, sd: float) -> float:
+        """Ln of the prior mean of exp(-(size - peak)^2 / (2 sd^2)), which is 1 at its peak, wherever that lies."""
+        total = 0.0
+        for sign, logs in self.log_sizes.items():
+            fine = sign * (peak + sd * np.linspace(-6.0, 6.0, 241))
+            inside = (fine > np.exp(logs[0])) & (fine < np.exp(logs[-1]))
+            at = np.unique(np.concatenate([logs, np.log(fine[inside])]))
+            likelihood = np.exp(-0.5 * ((sign * np.exp(at) - peak) / sd) ** 2)
+            values = np.exp(np.interp(at, logs, self.log_density[sign])) * likelihood
+            total += float((0.5 * (values[1:] + values[:-1]) * np.diff(at)).sum())
+        return float(np.log(max(total, 1e-300)))
+
+    def log_density_around(self, size: float, sd: float) -> float:
+        """Log density at a size; where the posterior is wide, at its width."""
+        around = np.sign(size) * max(abs(size), sd)
+        return float(max(self.log_at(np.array([around]))[0], -60.0))
+
+
+def likely_interval(sizes: FloatArray, log_likelihood: FloatArray) -> FloatArray:
+    """(2,) 95 % interval of a size from its likelihood alone at rising sizes (g,) of both signs.
+
+    Quantiles, which would always leave out a truth at the bound: where the likelihood there is not small, by the 95 %
+    of a likelihood ratio, the interval reaches to the bound and is one-sided.
+    """
+    _, cumulative = _log_integral(sizes, log_likelihood)
+    at_bounds = [float(log_likelihood[end] - log_likelihood.max()) > -0.5 * LIKELY for end in (0, -1)]
+    if at_bounds[0] == at_bounds[1]:
+        found = np.interp([0.025, 0.975], cumulative, sizes)
+        return np.array([sizes[0], sizes[-1]]) if at_bounds[0] else found
+    low, high = np.interp([0.05, 0.95], cumulative, sizes)
+    return np.array([sizes[0], high]) if at_bounds[0] else np.array([low, sizes[-1]])
+
+
+def _log_integral(sizes: FloatArray, logs: FloatArray) -> tuple[float, FloatArray]:
+    """Log of the integral of exp(logs), the gap about 0 left out; its share up to each size (g,)."""
+    top = float(logs.max())
+    weights = np.exp(logs - top)
+    pieces = 0.5 * (weights[1:] + weights[:-1]) * np.diff(sizes)
+    pieces[(sizes[1:] > 0.0) & (sizes[:-1] < 0.0)] = 0.0
+    total = max(float(pieces.sum()), 1e-300)
+    return top + float(np.log(total)), np.concatenate([[0.0], np.cumsum(pieces)]) / total
+
+
+def _sizes(table: Table, j: int, sign: float, sight: Sight) -> FloatArray:
+    """Sizes of one sign to tabulate the prior at."""
+    if table.knots:
+        logs = table.knots[sign][0]
+        return np.exp(np.linspace(logs[0], logs[-1], 96))
+    unit = np.zeros(len(table.candidate.components))
+    unit[j] = sign
+    # Linear in its components: the rms change of a unit tells which sizes make a few per cent.
+    scale = float(np.sqrt(np.mean((table.delta(unit) / sight.compliance) ** 2)))
+    largest = min(20.0 * EXPECTED[1] / max(scale, 1e-300), table.candidate.components[j].reach(sign))
+    smallest = min(0.05 * EXPECTED[0] / max(scale, 1e-300), 0.1 * largest)
+    return np.geomspace(smallest, largest, 160)
+
+
+def _trapezoid(x: FloatArray, logs: FloatArray) -> float:
+    weights = np.exp(logs)
+    return float((0.5 * (weights[1:] + weights[:-1]) * np.abs(np.diff(x))).sum())

@@ -1,0 +1,20 @@
+"""A line of a file, which an error names."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from toolpath_stiff.errors import ProgramError
+
+
+class Place(NamedTuple):
+    """A line (from 1) of a file, and the column in it where that is known."""
+
+    name: str
+    line: int
+    column: int | None = None
+
+    def fail(self, found: str, expected: str = "", hint: str = "", column: int | None = None) -> ProgramError:
+        """An error of the line, at the place's own column unless another is given."""
+        where = self.column if column is None else column
+        return ProgramError(found, expected=expected, hint=hint, file=self.name, line=self.line, column=where)

@@ -1,0 +1,323 @@
+"""A program placed: the result of a search, and the advice that terminal, placement.json, page and sheet give alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, cast
+
+import numpy as np
+
+from toolpath_stiff.analysis.results import Analysis
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import Content
+from toolpath_stiff.hints import both_names
+from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.placement.climb import Bounds
+from toolpath_stiff.placement.evaluator import PlacementFigures
+from toolpath_stiff.placement.rows import FIGURES, PlacementRow
+from toolpath_stiff.placement.task import Task
+from toolpath_stiff.results import FolderResult
+from toolpath_stiff.rewriting.program import OffsetBlocks, offset_blocks
+from toolpath_stiff.stiffness.model import effects_stated
+from toolpath_stiff.units import deg_from_rad, mm_from_m
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+WORSE = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
+ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
+AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
+NAMES = ("x", "y", "z", "tilt-a", "tilt-b", "rotate")
+
+
+@dataclass(frozen=True, repr=False)
+class Placement(FolderResult):
+    r"""A program at the placement that was chosen for it, and the others of the front.
+
+    Attributes
+    ----------
+    task
+        What was to be placed, and how, in SI.
+    front
+        Placements of which none is better than another in all three figures, by rising mean.
+    search
+        The search, as `placement.json` has it.
+    chosen, present
+        The chosen placement and the present one, which is None where it is out of reach.
+    present_figures, present_reason
+        What the present placement keeps, in SI; why it is out of reach.
+    best, before
+        Analyses at the chosen and at the present placement.
+    program
+        As read for the chosen placement.
+    rewritten, written
+        Bytes of the program written for the placement, and what `placement.json` says of it; None unless asked for.
+    inputs
+        Files that were read.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> found = tps.place("nist", slot, x_mm=0, y_mm=0, z_mm=800, rotate_deg=0, step_mm=10, points=2, write="new.nc")
+    >>> found
+    <Placement: slot.nc, X0 Y0 Z800 A0 B0 C0 of 1 placements>
+    >>> found.origin_mm_deg, found.worse, found.warnings
+    ((0.0, 0.0, 800.0, 0.0, 0.0, 0.0), [], [])
+    >>> found.refusal, found.program_bytes.decode().splitlines()[1]
+    ('', 'G0 X0 Y0 Z5')
+    >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
+    (1, ['placements.csv', 'placement.json'], 'balanced')
+    >>> found.objective, found.picked, list(found.trade_offs), found.machine_stated["machine"]
+    ('balanced', False, ['mean', 'range', 'weakest'], 'nist')
+    >>> found.offsets.linuxcnc[:3]
+    'G21'
+    >>> type(found.plot()).__name__
+    'Figure'
+    """
+
+    command: ClassVar[str] = "place"
+    shown_by: ClassVar[str] = "place.page"
+
+    task: Task
+    front: list[PlacementRow]
+    search: dict[str, Any]
+    chosen: PlacementRow
+    present: PlacementRow | None
+    present_figures: PlacementFigures
+    present_reason: str
+    best: Analysis
+    before: Analysis | None
+    program: Program
+    rewritten: bytes | None
+    written: dict[str, Any] | None
+    inputs: tuple[str, ...] = ()
+
+    @property
+    def origin_mm_deg(self) -> tuple[float, ...]:
+        """The chosen placement: what `analyze` takes as `origin_mm_deg`."""
+        return self.chosen.origin_mm_deg
+
+    @property
+    def objective(self) -> str:
+        """What the recommended placement is best at."""
+        return str(self.search["options"]["--objective"])
+
+    @property
+    def picked(self) -> bool:
+        """Another one of the front than the recommended placement is chosen."""
+        return bool(self.chosen.number != self.search["recommended"])
+
+    @cached_property
+    def worse(self) -> list[dict[str, Any]]:
+        """What is worse there than at the present placement, and by how much."""
+        if self.present is None:
+            return []
+        worse = []
+        for figure, key in FIGURES.items():
+            chosen, before = getattr(self.chosen, key), getattr(self.present, key)
+            worse_by = chosen - before if figure == "range" else before - chosen
+            if worse_by > ROUNDING * self.present.mean_N_per_mm:
+                values = {"chosen_N_per_mm": chosen, "before_N_per_mm": before, "worse_by_N_per_mm": worse_by}
+                worse.append({"figure": figure, **values})
+        return worse
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What deserves a look, what gets worse first."""
+        warnings = [nothing_better_words(self.search)] if self.search.get("nothing_better") else []
+        warnings += [self._worse_words(worse) for worse in self.worse]
+        if self.worse and not self.picked:
+            warnings.append("no placement was found within the bounds that is as good as the present one in all three")
+        if self.present is None:
+            warnings.append(
+                "the present placement is out of reach, so nothing says what must not get worse: "
+                f"{self.present_reason or 'no figures'}"
+            )
+        warnings += [
+            f"line {rapid['line']}: no placement within the bounds keeps this rapid within reach ({rapid['reason']}); "
+            "it does not follow the work, and was left out of the search"
+            for rapid in self.search["rapids_left_out"]
+        ]
+        warnings += [] if self.present is None else _present_words(self.task.rules.margin, self.present_figures)
+        if self.chosen.extrapolated_share:
+            share = "" if self.present is None else f" (at present at {100.0 * self.present.extrapolated_share:.0f} %)"
+            warnings.append(
+                f"the strut law is extrapolated at {100.0 * self.chosen.extrapolated_share:.0f} % of the samples"
+                f"{share}: outside the lengths that it was measured at"
+            )
+        origin = np.array(self.chosen.origin)
+        warnings += bound_warnings(self.task.bounds, origin, self.best.machine.limits.workspace)
+        if self.best.plunging[self.best.counted].all():
+            warnings.append(
+                "the program only plunges along the tool axis: mean, range and weakest are those of plunges"
+            )
+        return list(dict.fromkeys([*warnings, *self.best.warnings]))
+
+    def _worse_words(self, worse: dict[str, Any]) -> str:
+        share = 100.0 * worse["worse_by_N_per_mm"] / max(abs(worse["before_N_per_mm"]), 1e-12)
+        chosen, before = (f"{worse[key]:,.0f}".replace(",", " ") for key in ("chosen_N_per_mm", "before_N_per_mm"))
+        return (
+            f"WORSE: at the {'picked' if self.picked else 'recommended'} placement {WORSE[worse['figure']]} than at "
+            f"the present one, {chosen} instead of {before} N/mm ({share:.1f} % worse)"
+        )
+
+    @property
+    def program_bytes(self) -> bytes:
+        """The program written for the placement; it was asked for with `write`.
+
+        Raises `InputError` where it cannot be written there; the rest of the result stands.
+        """
+        if self.refusal:
+            raise InputError(self.refusal)
+        if self.rewritten is None:
+            raise InputError("the program was not written for the placement", hint="ask for it with write=FILE")
+        return self.rewritten
+
+    @property
+    def refusal(self) -> str:
+        """Why the program could not be written for the placement, "" unless that is so."""
+        return str((self.written or {}).get("refused", ""))
+
+    @property
+    def offsets(self) -> OffsetBlocks:
+        """What to key in at the control."""
+        return offset_blocks(self.program, self.best.origin)
+
+    @property
+    def trade_offs(self) -> dict[str, dict[str, float]]:
+        """What the choice costs in each objective: the best on the front beside it."""
+        return {
+            name: {
+                "chosen_N_per_mm": getattr(self.chosen, key),
+                "best_on_front_N_per_mm": (min if name == "range" else max)(getattr(row, key) for row in self.front),
+            }
+            for name, key in FIGURES.items()
+        }
+
+    @property
+    def machine_stated(self) -> dict[str, Any]:
+        """The machine and what acts on it, as every JSON document has them."""
+        return {"machine": self.best.machine.name, **effects_stated(self.best.model)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        offsets = self.offsets
+        return {
+            "warnings": self.warnings,
+            "worse": self.worse,
+            "program": self.program.name,
+            **self.machine_stated,
+            "load": str(self.best.load),
+            "force_N": self.best.force,
+            "objective": self.objective,
+            "chosen": vars(self.chosen).copy(),
+            "picked": self.picked,
+            "recommended": vars(self.front[self.search["recommended"] - 1]).copy(),
+            "before": None if self.present is None else self.present.figures(),
+            "before_reason": self.present_reason or None,
+            "trade_offs": self.trade_offs,
+            "front": [vars(row).copy() for row in self.front],
+            "binding_limits": self._binding_limits(),
+            "offset_blocks": {
+                "linuxcnc": offsets.linuxcnc or None,
+                "linuxcnc_reason": offsets.linuxcnc_reason or None,
+                "fanuc": offsets.fanuc or None,
+                "fanuc_reason": offsets.fanuc_reason or None,
+            },
+            "written": self.written,
+            "search": self.search,
+            "assumptions": self.best.assumptions,
+        }
+
+    def _binding_limits(self) -> list[dict[str, Any]]:
+        """The limits that the cuts come nearest to, at most three."""
+        at, cutting = self.best.at, self.best.samples.cutting
+        near = np.argsort(at.margin + np.where(cutting, 0.0, np.inf), kind="stable")[:200]
+        names = list(dict.fromkeys(at.limits[int(at.limit[i])].name for i in near))[:3]
+        smallest = float(at.margin[cutting].min())
+        return [{"limit": name, **({"smallest_margin": smallest} if i == 0 else {})} for i, name in enumerate(names)]
+
+    def to_frame(self) -> pd.DataFrame:
+        """The front, one placement a row, as in `placements.csv`."""
+        import pandas as pd
+
+        return pd.DataFrame(self.front)
+
+    def plot(self) -> Figure:
+        """The front: mean against range, the chosen and the present placement marked."""
+        return cast("Figure", self.view.front_picture.figure(self))
+
+    def __str__(self) -> str:
+        return str(self.view.text(self))
+
+    def _short(self) -> str:
+        words = [f"{axis}{value:.6g}" for axis, value in zip("XYZABC", self.origin_mm_deg, strict=True)]
+        return f"{self.program.name}, {' '.join(words)} of {len(self.front)} placements"
+
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """Name -> content of each file that `save` writes."""
+        return cast("Mapping[str, Content]", self.view.files(self, plots=plots))
+
+
+def nothing_better_words(search: dict[str, Any]) -> str:
+    """That the front is the present placement alone, and how hard another was looked for."""
+    return (
+        f"nothing better than the present placement was found within the bounds, in {search['searches']} searches from "
+        f"the beginning, {search['pose_evaluations']} poses evaluated"
+    )
+
+
+def _present_words(margin: float, present: PlacementFigures) -> list[str]:
+    """What the present placement itself does not keep."""
+    words = []
+    if present.rapid_margin[0] < 0.0:
+        words.append("at the present placement a rapid is out of reach")
+    least = float(min(present.margin[0], present.rapid_margin[0]))
+    if 0.0 <= least < margin:
+        words.append(
+            f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
+            f"{100.0 * margin:g} % asked for with {both_names('--margin')}"
+        )
+    if present.clearance[0] < 0.0:
+        words.append(
+            f"the present placement runs {mm_from_m(-float(present.clearance[0])):.1f} mm deep into a keep-out"
+        )
+    return words
+
+
+def bound_warnings(bounds: Bounds, placement: FloatArray, workspace: FloatArray) -> list[str]:
+    """Which bounds of the search a placement (6,) lies on, with the options that widen them by half."""
+    words = []
+    for i in bounds.free:
+        if bounds.round[i] or (i == 2 and bounds.heights):
+            continue
+        low, high = float(bounds.low[i]), float(bounds.high[i])
+        # The file's rotation is within 0 to 360 degrees, the bounds may lie elsewhere.
+        value = low + float(np.mod(placement[i] - low + 1e-9, 2.0 * np.pi)) - 1e-9 if i == 5 else float(placement[i])
+        span = high - low
+        ends = [(value - low, low, -1), (high - value, high, 1)]
+        for room, end, side in ends:
+            limit = float(workspace[(side + 1) // 2, i]) if i < 3 else np.inf
+            if room > AT_BOUND * span or (np.isfinite(limit) and (limit - end) * side <= 1e-9):
+                continue  # not there, or the end is the machine's own and cannot be widened
+            wider = [low - 0.5 * span, high] if side < 0 else [low, high + 0.5 * span]
+            if i < 3:
+                wider = [max(wider[0], float(workspace[0, i])), min(wider[1], float(workspace[1, i]))]
+            unit, shown = ("mm", mm_from_m) if i < 3 else ("degrees", deg_from_rad)
+            words.append(
+                f"the search ended on its own bound of {NAMES[i]}, {round(shown(end), 3):g} {unit}: widen it with "
+                f"--{NAMES[i]}={round(shown(wider[0]), 3):g}:{round(shown(wider[1]), 3):g}"
+            )
+    if len(bounds.heights) > 1:
+        for end, which in ((min(bounds.heights), "lowest"), (max(bounds.heights), "highest")):
+            if abs(placement[2] - end) < 1e-9:
+                words.append(
+                    f"the search took the {which} height, {mm_from_m(end):g} mm, of {both_names('--z-values')}: "
+                    "try one beyond it"
+                )
+    return words

@@ -1,0 +1,110 @@
+"""A plan's visits as a measurement file whose stiffness is left empty."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.planning.visits import AXES, VECTORS, Visits
+from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m
+
+POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+
+
+VECTOR = ("dx", "dy", "dz")
+
+
+def plan_rows(
+    visits: Visits, chosen: Sequence[int], taken: Iterable[str] = (), repeats: Sequence[int] = ()
+) -> list[dict[str, Any]]:
+    """Rows of a measurement file in shop units, in measuring order.
+
+    Parameters
+    ----------
+    visits, chosen
+        The visits in measuring order; each is one clamping.
+    taken
+        Names of points that new points must not have.
+    repeats
+        Which repeat of its place each visit is, where places are clamped several times; else the rounds of a visit.
+    """
+    names = _point_names(visits, chosen, set(taken))
+    readings = visits.readings
+    planned = np.concatenate([visits.rows(visit) for visit in chosen])
+    timed, beside = not np.isnan(readings.time).any(), bool((readings.loop[planned] != "").any())
+    axes_only = set(visits.names[planned].tolist()) <= set(AXES)
+    named = bool((visits.setup[list(chosen)] != "").any())
+    rows = []
+    for clamp, visit in enumerate(chosen, 1):
+        pose = [*mm_from_m(visits.pose[visit, :3]), *deg_from_rad(visits.pose[visit, 3:])]
+        for row in visits.rows(visit):
+            name = str(visits.names[row])
+            # Files allow vectors of any length: directions in whole numbers.
+            vector = [int(component != 0.0) for component in VECTORS[name]]
+            rows.append(
+                dict(zip(POSE, map(_round, pose), strict=True))
+                | ({"direction": name} if axes_only else dict(zip(VECTOR, vector, strict=True)))
+                | {"stiffness_N_per_mm": ""}
+                | ({"loop": str(readings.loop[row]), "displacement_um": ""} if beside else {})
+                | {"force_N": _round(readings.force[row])}
+                | ({"setup": str(visits.setup[visit])} if named else {})
+                | {"clamp": clamp}
+                | {"repeat": repeats[clamp - 1] if len(repeats) else int(visits.rounds[row])}
+                | {"point": names[clamp - 1]}
+                | ({"time_min": _round(min_from_s(readings.time[row]))} if timed else {})
+                | {"tool_extension_mm": _round(mm_from_m(visits.extension[visit]))}
+            )
+    return rows
+
+
+def _point_names(visits: Visits, chosen: Sequence[int], taken: set[str]) -> list[str]:
+    """The name that a pose had before, or a new one; one name a pose."""
+    known: dict[tuple[float, ...], str] = {}
+    number, names = 0, []
+    for visit in chosen:
+        pose = tuple(visits.pose[visit].tolist())
+        if pose not in known:
+            name = str(visits.label[visit])
+            while not name or (not visits.label[visit] and name in taken):
+                number += 1
+                name = f"plan {number}"
+            known[pose] = name
+        names.append(known[pose])
+    return names
+
+
+def _round(value: float) -> float:
+    """To ten digits after the unit's point at most: 0.30000000000000004 is 0.3 to whoever keys it in."""
+    return round(float(value), 6) + 0.0
+
+
+def visit_entries(rows: list[dict[str, Any]], kinds: Sequence[str], why: Sequence[str]) -> list[dict[str, Any]]:
+    """One entry a clamping: where, how, what is read, why."""
+    entries = []
+    for clamp, (kind, reason) in enumerate(zip(kinds, why, strict=True), 1):
+        readings = [row for row in rows if row["clamp"] == clamp]
+        first = readings[0]
+        entry = {key: first[key] for key in ("clamp", "point", *POSE, "tool_extension_mm")}
+        entry |= {
+            "setup": first.get("setup", ""),
+            "forces_N": sorted({row["force_N"] for row in readings}),
+            "directions": list(dict.fromkeys(map(_direction, readings))),
+            "loops": list(dict.fromkeys(row["loop"] for row in readings if row.get("loop"))),
+            "kind": kind,
+            "why": reason,
+        }
+        entries.append(entry)
+    return entries
+
+
+def _direction(row: dict[str, Any]) -> str:
+    return str(row.get("direction") or "".join(axis for axis, key in zip("XYZ", VECTOR, strict=True) if row[key]))
+
+
+def plan_csv(rows: Sequence[dict[str, Any]]) -> str:
+    """The rows as CSV."""
+    cells = [[value if isinstance(value, str) else f"{value:.10g}" for value in row.values()] for row in rows]
+    return csv_text(rows[0], cells)

@@ -1,0 +1,95 @@
+"""Poses of readings, held against what the machine can be: beyond a limit is doubtful, singular is impossible."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputErrors, MeasurementError
+from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
+from toolpath_stiff.machine.limits import reach
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.units import mm_from_m
+
+SINGULAR = 1e-6  # singularity index: the tip would be a million times softer than at the neutral pose
+
+
+# Section of the machine file -> the word in its limits' names.
+LIMIT_WORDS = {
+    "limits.strut_length": "length",
+    "limits.joint_angle": "angle",
+    "limits.workspace": "workspace",
+    "limits.singularity": "singularity",
+}
+
+
+NAMED = 5  # so many poses are named in a warning
+
+
+def pose_warnings(
+    machine: Machine,
+    position: FloatArray,
+    angles: FloatArray,
+    tool_extension: FloatArray,
+    places: Sequence[tuple[str, int]],
+) -> tuple[str, ...]:
+    """Warnings about measured poses beyond limits.
+
+    Parameters
+    ----------
+    machine
+        The machine that was measured.
+    position, angles, tool_extension
+        (n, 3) m, (n, 3) rad, (n,) m.
+    places
+        File and line of each.
+
+    Raises
+    ------
+    InputErrors
+        Singular and impossible poses, all of them.
+    """
+    rotation = rotation_matrices(angles)
+    struts = solve_struts(machine, position, rotation, tool_extension + machine.reference_tool_length)
+    index = singularity_index(machine, struts)
+    stiffness = machine.strut_law.stiffness(struts.lengths)
+    errors = []
+    for i in range(len(position)):
+        where = f"pose {_shown(position[i], angles[i])}"
+        if not index[i] >= SINGULAR:
+            found = f"{where} is singular: the struts cannot hold the platform"
+        elif stiffness[i].min() <= 0.0:
+            found = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
+        else:
+            continue
+        errors.append(MeasurementError(found, hint="check the pose's unit", file=places[i][0], line=places[i][1]))
+    if errors:
+        raise InputErrors(errors)
+    stand = reach(machine, position, struts, rotation)
+    beyond: dict[str, list[int]] = {}
+    for row in np.flatnonzero(~stand.reachable).tolist():
+        beyond.setdefault(stand.limits[int(stand.limit[row])].name, []).append(row)
+    warnings = []
+    for name, those in beyond.items():
+        poses = list(dict.fromkeys(_shown(position[i], angles[i]) for i in those))
+        more = f" and {len(poses) - NAMED} more" if len(poses) > NAMED else ""
+        warnings.append(
+            f"measured beyond a limit of the machine file ({name}, {_origin(machine, name)}): "
+            f"{'; '.join(poses[:NAMED])}{more}. {stand.describe(those[0])}"
+        )
+    return tuple(warnings)
+
+
+def _origin(machine: Machine, limit: str) -> str:
+    """Where a limit comes from."""
+    quantity = next((q for q, word in LIMIT_WORDS.items() if word in limit), "")
+    return machine.origins.get(quantity, "origin not stated")
+
+
+def _shown(position: FloatArray, angles: FloatArray) -> str:
+    mm = ", ".join(f"{mm_from_m(value):g}" for value in position)
+    degrees = np.degrees(angles)
+    return f"({mm}) mm" + (f" at ({', '.join(f'{d:.4g}' for d in degrees)}) deg" if degrees.any() else "")

@@ -1,0 +1,101 @@
+"""Effects that a machine can carry, and trials of them, as text and for JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from toolpath_stiff.stiffness.catalogue import EffectCatalogue
+    from toolpath_stiff.stiffness.contract import Effect, Parameter
+    from toolpath_stiff.stiffness.trial import EffectCheck
+
+TRIAL_WORDS = {True: "good", False: "FAILS", None: "note"}
+
+
+def trials_text(check: EffectCheck) -> str:
+    """What the trial of each effect of a file showed."""
+    lines = []
+    for trial in check.trials:
+        lines.append(f"{trial.effect.name}, on machine {check.machine}: {'good' if trial.passed else 'FAILS'}")
+        width = max(len(outcome.name) for outcome in trial.outcomes)
+        lines += [f"  {TRIAL_WORDS[one.passed]:<5}  {one.name:<{width}}  {one.found}" for one in trial.outcomes]
+    return "\n".join(lines)
+
+
+def describe_effect(effect: Effect) -> dict[str, object]:
+    """What the effect declares, in its own units; JSON has no infinity, so that "inf" stands for it."""
+    return {
+        "name": effect.name,
+        "title": effect.title,
+        "link": effect.link,
+        "equation": effect.equation,
+        "source": effect.source,
+        "load_dependent": effect.load_dependent,
+        "needs": list(effect.needs),
+        "parameters": [
+            {
+                "name": p.name,
+                "key": p.key,
+                "unit": p.unit,
+                "bounds": [_json_number(value) for value in p.bounds],
+                "typical": [_json_number(value) for value in p.typical],
+                "neutral": _json_number(p.neutral),
+                "kind": p.kind,
+                "meaning": p.meaning,
+                "source": p.source,
+            }
+            for p in effect.parameters
+        ],
+    }
+
+
+def text(catalogue: EffectCatalogue) -> str:
+    """One line an effect: link, name, title, parameters with their units; then the plug-ins that do not load."""
+    rows = [("link", "name", "title", "parameters")]
+    for effect in catalogue.effects:
+        parameters = ", ".join(f"{p.name} ({p.unit})" if p.unit else p.name for p in effect.parameters)
+        rows.append((effect.link, effect.name, effect.title, parameters or "-"))
+    widths = [max(len(row[i]) for row in rows) for i in range(4)]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    if catalogue.broken:
+        lines += ["", "plug-ins that do not load:"]
+        lines += [f"  {name}: {reason}" for name, reason in catalogue.broken.items()]
+    return "\n".join(lines)
+
+
+def effect_details(effect: Effect) -> str:
+    """The whole effect, for people, with the lines for a machine file."""
+    lines = [
+        f"{effect.name}: {effect.title}",
+        f"  link       {effect.link}",
+        f"  equation   {effect.equation}",
+        f"  source     {effect.source}",
+    ]
+    if effect.load_dependent:
+        lines.append("  load       depends on the size of the load (--force, force_N): the stiffness is the secant one")
+    if effect.needs:
+        lines.append(f"  needs      columns {', '.join(effect.needs)} in the measurements")
+    for p in effect.parameters:
+        lines += ["", f"  {p.key}", f"    meaning  {p.meaning or p.name}"]
+        if p.discrete:
+            lines += [f"    value    {p.expected}; chosen, not fitted", f"    source   {p.source}"]
+            continue
+        lines += [
+            f"    bounds   {_range(p.bounds, p)}",
+            f"    typical  {_range(p.typical, p)}",
+            f"    source   {p.source}",
+            f"    neutral  {p.neutral:g}",
+        ]
+    kind = "instrument" if effect.is_instrument else "effect"
+    lines += ["", "In a machine file:", f"  [[{kind}]]", f'  name = "{effect.name}"']
+    lines += [f'  {p.key} = ""' if p.kind == "text" else f"  {p.key} = {p.typical[0]:g}" for p in effect.parameters]
+    return "\n".join(lines)
+
+
+def _range(values: tuple[float, float], parameter: Parameter) -> str:
+    return f"{values[0]:g} to {values[1]:g} {parameter.unit}".rstrip()
+
+
+def _json_number(value: float) -> float | str:
+    return value if math.isfinite(value) else str(value)

@@ -1,0 +1,30 @@
+"""Stiffness at a pose as text."""
+
+from __future__ import annotations
+
+from toolpath_stiff.analysis.poses import POSE_COLUMNS, PoseStiffness
+from toolpath_stiff.report.words import machine_text
+from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
+
+
+def text(found: PoseStiffness) -> str:
+    """A single pose: stiffnesses, struts, the nearest limit."""
+    model, values = found.model, {name: column[0] for name, column in found.columns.items()}
+    x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
+    named = machine_text({"machine": model.machine.title, **effects_stated(model)})
+    lines = [f"{named}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n"]
+    for axis in "xyz":
+        lines.append(f"  stiffness along {axis.upper()}   {values[f'k{axis}_N_per_mm']:10.0f} N/mm")
+    for which in ("softest", "stiffest"):
+        dx, dy, dz = (values[f"{which}_d{axis}"] + 0.0 for axis in "xyz")
+        lines.append(
+            f"  {which:<10} direction{values[f'{which}_N_per_mm']:10.0f} N/mm along ({dx:.3f}, {dy:.3f}, {dz:.3f})"
+        )
+    lengths = "  ".join(f"{values[f'strut{i}_mm']:.3f}" for i in range(1, 7))
+    lines.append(f"  struts 1 to 6        {lengths} mm")
+    lines.append(f"  nearest limit        {found.reach.describe(0)} (margin {values['margin']:.3f} of its span)")
+    if values["extrapolated"]:
+        lines.append("  the strut law is extrapolated at this pose")
+    for warning in condition_warnings(model):
+        lines.append(f"  warning              {warning}")
+    return "\n".join(lines)

@@ -1,0 +1,195 @@
+"""Effect files without code: terms as `[[effect]] name = "term"` entries of a TOML file, which a draft writes.
+
+The terms of a file are one effect; those of the geometry and those of readings have one of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from toolpath_stiff.errors import EffectError
+from toolpath_stiff.stiffness.contract import Effect, Parameter
+from toolpath_stiff.stiffness.guard import NAME, wrong_in
+from toolpath_stiff.stiffness.term_effect import ASSUMED, TermEffect, kind_of
+from toolpath_stiff.stiffness.terms import (
+    ALONG,
+    AXES,
+    FORMULAS,
+    IN_SERIES,
+    LINKS,
+    OF_FORCES,
+    PAIR,
+    PLACE,
+    SWINGS,
+    UNITS,
+    VARIABLES,
+    Constants,
+    Factor,
+    Term,
+)
+from toolpath_stiff.toml_reader import TomlReader, is_text
+from toolpath_stiff.units import RAD_PER_DEG
+
+# Variable -> unit of its constants in files and its SI value; the rest, and those named below, are plain numbers.
+CONSTANT_UNITS = {
+    **dict.fromkeys((*PLACE, "strut length"), ("mm", 1e-3)),
+    **dict.fromkeys(("strut force", "load"), ("N", 1.0)),
+    "tilt": ("deg", RAD_PER_DEG),
+    "time": ("min", 60.0),
+    "temperature": ("C", 1.0),
+}
+PLAIN = ("power", "side", *PAIR)
+
+LARGEST = 1e9
+
+SHAPE_KEYS = ("varies_with", "of", "shape", "constants")
+KEYS = ("name", "size", "meaning", "link", "action", "where", "along", *SHAPE_KEYS, "times")
+SHAPES_OF = {**dict.fromkeys(("constant", "direction", "setup"), ("offset",)), "force sign": ("sign",)}
+COLUMNS = {"tilt": ("", *AXES, *SWINGS), "joint offset": ("frame", "platform")}
+
+
+def constant_key(name: str, variable: str) -> tuple[str, float]:
+    """What a constant is called in files, with its unit, and the SI value of that."""
+    unit, si = CONSTANT_UNITS.get(variable, ("", 1.0))
+    return (f"{name}_{unit}", si) if unit and name not in PLAIN else (name, 1.0)
+
+
+def entry_of(term: Term, size: str, meaning: str) -> dict[str, Any]:
+    """A term as an entry of a file, in the order of its keys."""
+    parameter = Parameter(size, *UNITS[term.action], ASSUMED, meaning=meaning)
+    bounds, typical = _range_keys(parameter)
+    entry = {"name": "term", "size": size, "meaning": meaning, "link": term.link, "action": term.action}
+    more = {} if term.where is None else {"where": term.where}
+    times = {} if term.second is None else {"times": _shape_entry(term.second)}
+    ranges = {bounds: list(parameter.bounds), typical: list(parameter.typical)}
+    return {**entry, **more, "along": term.direction, **_shape_entry(term), **ranges, **times}
+
+
+def _shape_entry(term: Term) -> dict[str, Any]:
+    of = {"of": term.column} if term.column else {}
+    constants = {}
+    for name, value in term.at:
+        key, si = constant_key(name, term.variable)
+        constants[key] = float(f"{value / si:.12g}")
+    return {"varies_with": term.variable, **of, "shape": term.shape, "constants": constants}
+
+
+def _range_keys(parameter: Parameter) -> tuple[str, str]:
+    """What bounds and usual sizes are called, with their unit."""
+    unit = parameter.key.removeprefix(parameter.name)
+    return f"bounds{unit}", f"typical{unit}"
+
+
+def effects_of_terms(file: str) -> dict[str, Effect]:
+    """Name -> effect of a file's terms. Raises `InputError` with file, line and key."""
+    toml = TomlReader.read(file, "effect file", EffectError)
+    toml.only("", toml.data, ("name", "source", "effect", "drawn_from"))
+    own, rows = _text(toml, "name", toml.data.get("name")), toml.data.get("effect")
+    if not NAME.fullmatch(own):
+        raise toml.error(f"name = {own!r}", "letters, digits and underscores, such as missing", where="name")
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) for row in rows):
+        raise toml.error("no [[effect]]", '[[effect]] with name = "term"', where="effect")
+    source = _text(toml, "source", toml.data.get("source", ASSUMED))
+    drawn_from = toml.table("drawn_from", toml.data.get("drawn_from", {}), "[drawn_from] with readings")
+    toml.only("drawn_from", drawn_from, ("readings",))
+    marks = tuple(_text(toml, "drawn_from.readings", drawn_from.get("readings", "-")).replace("-", " ").split())
+    sized: dict[type[TermEffect], dict[str, tuple[Term, Parameter]]] = {}
+    names: set[str] = set()
+    for number, row in enumerate(rows, 1):
+        term, parameter = _entry(toml, f"effect[{number}]", row)
+        if parameter.name in names:
+            raise toml.error(f"size {parameter.name!r} is there twice", where=f"effect[{number}].size")
+        names.add(parameter.name)
+        sized.setdefault(kind_of(term), {})[parameter.name] = (term, parameter)
+    effects: dict[str, Effect] = {}
+    for kind in sorted(sized, key=lambda kind: kind.ending):
+        terms, parameters = zip(*sized[kind].values(), strict=True)
+        name = own if len(sized) == 1 else f"{own}{kind.ending}"
+        effects[name] = kind(name, dict(zip(sized[kind], terms, strict=True)), parameters, source, marks, file)
+    return effects
+
+
+def _entry(toml: TomlReader, where: str, row: Mapping[str, Any]) -> tuple[Term, Parameter]:
+    """One entry, checked."""
+    toml.choice(f"{where}.name", row.get("name"), ("term",), '"term"; other effects are Python files')
+    link = toml.choice(f"{where}.link", row.get("link"), LINKS, f"one of {', '.join(LINKS)}")
+    actions = [action for action, place in ALONG if place == link]
+    action: Any = toml.choice(f"{where}.action", row.get("action"), actions, f"of {link}: {', '.join(actions)}")
+    ways = ALONG[action, link]
+    along = toml.choice(f"{where}.along", row.get("along"), ways, f"of {action}: {', '.join(ways)}")
+    parameter = _parameter(toml, where, row, action)
+    toml.only(where, row, (*KEYS, *_range_keys(parameter)))
+    variable, shape, at, column = _shape(toml, where, row, action, action)
+    times = row.get("times")
+    if times is not None:
+        toml.only(f"{where}.times", toml.table(f"{where}.times", times, "a table"), SHAPE_KEYS)
+        times = Factor(*_shape(toml, f"{where}.times", times, "", action))
+    term = Term(link, along, variable, shape, action, _place(toml, where, row, action), at, column, times=times)
+    return term, parameter
+
+
+def _parameter(toml: TomlReader, where: str, row: Mapping[str, Any], action: str) -> Parameter:
+    """The size, with what it may be."""
+    unit, si, bounds, typical = UNITS[action]
+    size = _text(toml, f"{where}.size", row.get("size"))
+    meaning = _text(toml, f"{where}.meaning", row.get("meaning"))
+    keys = _range_keys(Parameter(size, unit, si, bounds, typical, ASSUMED))
+    given = (row.get(key, usual) for key, usual in zip(keys, (bounds, typical), strict=True))
+    bounds, typical = (tuple(pair) if isinstance(pair, list) else pair for pair in given)
+    parameter = Parameter(size, unit, si, bounds, typical, ASSUMED, meaning=meaning)
+    if wrong := wrong_in(parameter):
+        raise toml.error(f"size {size}: {wrong[0]}", wrong[1], where=where)
+    return parameter
+
+
+def _shape(
+    toml: TomlReader, where: str, row: Mapping[str, Any], action: str, of: str
+) -> tuple[str, str, Constants, str]:
+    """Variable, shape, constants and column of an action; "" for a second variable, which is one `of` the first's."""
+    by_strut = () if of in (*IN_SERIES, "turning") else (*OF_FORCES, "strut length")
+    seen = [name for name in VARIABLES if name not in ("order", *by_strut)]
+    variable = toml.choice(f"{where}.varies_with", row.get("varies_with"), seen, f"one of {', '.join(seen)}")
+    shapes = SHAPES_OF.get(variable, (*FORMULAS,)[1:-1])
+    shape = toml.choice(f"{where}.shape", row.get("shape"), shapes, f"one of {', '.join(shapes)}")
+    column = row.get("of", "")
+    columns = [name for name in COLUMNS.get(action, COLUMNS.get(variable, ("",))) if not by_strut or name not in SWINGS]
+    if variable == "setup" and action != "joint offset":
+        column = _text(toml, f"{where}.of", column)
+    else:
+        toml.choice(f"{where}.of", column, columns, f"one of {', '.join(map(repr, columns))}")
+    constants = toml.table(f"{where}.constants", row.get("constants", {}), "a table of numbers")
+    pair = PAIR if action == "coupling" else ()
+    known = [{constant_key(name, variable)[0]: name for name in (*names, *pair)} for names in FORMULAS[shape]]
+    names = next((keys for keys in known if keys.keys() == constants.keys()), None)
+    if names is None:
+        ways = " or ".join(", ".join(keys) or "none" for keys in known)
+        raise toml.error(
+            f"constants {', '.join(constants) or 'none'}", f"of {shape}: {ways}", where=f"{where}.constants"
+        )
+    at = tuple(
+        (name, toml.number(f"{where}.constants", constants[key], LARGEST) * constant_key(name, variable)[1])
+        for key, name in names.items()
+    )
+    if pair and not {dict(at)[name] for name in pair} <= set(range(1, 7)):
+        raise toml.error("first and second", "two numbers of struts, 1 to 6", where=f"{where}.constants")
+    return variable, shape, at, column
+
+
+def _place(toml: TomlReader, where: str, row: Mapping[str, Any], action: str) -> int | None:
+    """Number of the strut or of the vertex; None: all of them."""
+    number = row.get("where")
+    needed = action == "joint offset" or row["link"] == "one strut"
+    most = 3 if action == "vertex" else 6 if needed or row["link"] in ("joints", "struts") else 0
+    if number is None and not needed:
+        return None
+    if not isinstance(number, int) or isinstance(number, bool) or not 1 <= number <= most:
+        expected = f"a number from 1 to {most}" if most else f"no `where` of {action} of {row['link']}"
+        raise toml.error(f"{where}.where = {number!r}", expected, where=f"{where}.where")
+    return number
+
+
+def _text(toml: TomlReader, where: str, value: object) -> str:
+    if not is_text(value):
+        raise toml.error(f"{where} = {value!r}", "a text that is not empty", where=where)
+    return value
