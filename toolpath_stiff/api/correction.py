@@ -292,8 +292,8 @@ def plan(
     <Plan: rivals, 2 clampings>
     >>> len(found.to_dict()["visits"]), found.to_frame().columns.tolist()[:6]
     (2, ['x_mm', 'y_mm', 'z_mm', 'a_deg', 'b_deg', 'c_deg'])
-    >>> list(found.files(plots=False))
-    ['plan.csv', 'plan.json', 'plan_tables.npz']
+    >>> list(found.files(plots=False)), len(found.rows) == len(found.to_frame())
+    (['plan.csv', 'plan.json', 'plan_tables.npz'], True)
     """
     from toolpath_stiff.planning.result import plan as plan_visits
     from toolpath_stiff.planning.visits import Costs

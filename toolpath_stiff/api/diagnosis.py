@@ -327,7 +327,7 @@ def diagnose(
     ('adequate', ['none', 'joint_moment_stiffness'], 'joint_moment_stiffness')
     >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape
     (12, 3)
-    >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
+    >>> list(found.files(plots=False)), len(found.document["plausible"])
     (['diagnose.json', 'residuals.csv'], 6)
     """
     from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings

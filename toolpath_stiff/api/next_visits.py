@@ -45,7 +45,7 @@ def next_visit(
     <NextVisit: 0 readings, open>
     >>> found.probability, found.settled
     ({'spindle_compliance': 0.5, 'none': 0.5}, False)
-    >>> len(found.to_frame()) == len(found.to_dict()["rows"])
+    >>> len(found.to_frame()) == len(found.to_dict()["rows"]) == len(found.rows)
     True
     """
     from toolpath_stiff.planning.next_visit import next_visit as choose_next
