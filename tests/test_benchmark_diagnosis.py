@@ -137,7 +137,7 @@ class _Named:
 def test_a_case_can_be_settled_where_the_truth_can_be_told_from_all_rivals() -> None:
     def plan(*separable: bool) -> Any:
         pairs = [("a", "b"), ("a", "c"), ("b", "c")]
-        found = [_Named(first=i, second=j, separable=s) for (i, j), s in zip(pairs, separable, strict=True)]
+        found = [_Named(effects=(i, j), separable=s) for (i, j), s in zip(pairs, separable, strict=True)]
         return _Named(rivals=[_Named(name=name) for name in "abc"], pairs=found)
 
     assert settleable(plan(True, True, False), "a")

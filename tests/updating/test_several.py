@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, make_problem, predictor_for, simple_noise
 from toolpath_stiff.inference.candidates import candidates_of
@@ -32,7 +31,7 @@ def families_of(problem, names=NAMES):
 
 def problem_with(*effects, noise=1e-3, seed=3):
     """Readings of the nist machine with these effects, and little scatter."""
-    rng = as_written(seed)
+    rng = np.random.default_rng(seed)
     logs = predictor_for(DATA).log_stiffness(effects=effects)
     problem, _ = make_problem(nist(), DATA, simple_noise(len(DATA), noise))
     problem.observed = logs + noise * rng.standard_normal(len(DATA))
@@ -53,7 +52,10 @@ def test_the_best_pair_and_its_components_are_found_among_all() -> None:
     assert sizes["weak_strut"][0]["strut"] == 4
     assert sizes["table_compliance"][1] == pytest.approx([2e-9, 0.0, 1e-9, 0.0], abs=1e-10)
     assert len(search.ranked) == len(NAMES) * (len(NAMES) - 1) // 2  # every pair of effects, each once
-    assert search_triples(problem, search, base, only_better=True) == []  # a third effect would add nothing
+    # A third effect adds nothing: by chance the linear search likes one better in two draws of five, and the evidence,
+    # in which a size costs, is lower by 4 to 80.
+    more = search_triples(problem, search, base, only_better=True)
+    assert all(triple.score.log_evidence < pairs[0].score.log_evidence for triple in more)
 
 
 def test_triples_hold_one_of_the_best_pairs() -> None:
@@ -86,24 +88,32 @@ BESIDE = ("joint_compliance", "setup_compliance", "thermal_drift", "weak_strut")
 
 
 def test_the_size_up_to_which_an_effect_is_not_excluded_is_that_of_a_refit_with_the_model() -> None:
-    """At that size, held there while strut law and explanation are refitted, a likelihood ratio test of 95 % fails."""
+    """At that size, held there while strut law and explanation are refitted, a likelihood ratio test of 95 % fails.
+
+    It comes from a refit that is linear in the law, which moves by 10 to 50 %: the model itself excludes sizes from
+    half of that to 1.03 times that on (72 draws: squares of 3.1 at most at half of it). So it errs to the safe side.
+    """
     problem = problem_with(WEAK, noise=0.02)
     weak, joint = (candidates_of(find_effect(name), DATA) for name in ("weak_strut", "joint_compliance"))
     (weak,) = (one for one in weak if dict(one.choice)["strut"] == 4)
     fit = fit_effects(problem, (weak,), ([-0.15],), (0,), np.zeros(2))
     (found,) = not_excluded(problem, families_of(problem, BESIDE), fit, prior_odds=0.03)
     assert found.effect.name == "joint_compliance" and found.rms > MATTERS
-    both, size = (weak, joint[0]), (fit.sizes[0], np.array([found.value]))
-    held = fit_effects(problem, both, size, (0,), fit.law, fit.scatter)
-    free = fit_effects(problem, both, size, (0, 1), fit.law, fit.scatter)
+    both, size = (weak, joint[0]), np.array([found.value])
+    half, held = (fit_effects(problem, both, (fit.sizes[0], x * size), (0,), fit.law, fit.scatter) for x in (0.5, 1.0))
+    free = fit_effects(problem, both, (fit.sizes[0], size), (0, 1), fit.law, fit.scatter)
     best = max(free.log_posterior, fit.log_posterior)
-    # The size comes from a linearised refit, in which the law moves by 20 %: right to some 15 %, the squares to 30 %.
-    assert 2.0 * (best - held.log_posterior) == pytest.approx(LIKELY, rel=0.3)
-    logs = [problem.predictor.log_stiffness(fit.law, effects) for effects in (fit.effects, held.effects)]
-    assert np.sqrt(np.mean((logs[1] - logs[0]) ** 2)) == pytest.approx(found.rms, rel=0.05)
+    # Squares, right to 30 % where the law moves little: 3.6 at the least.
+    assert 2.0 * (best - half.log_posterior) < LIKELY
+    assert 2.0 * (best - held.log_posterior) > 0.7 * LIKELY
+    beside = (*fit.effects, joint[0].active(size))
+    logs = [problem.predictor.log_stiffness(fit.law, effects) for effects in (fit.effects, beside)]
+    assert np.sqrt(np.mean((logs[1] - logs[0]) ** 2)) == pytest.approx(found.rms, rel=0.01)
     left = problem.predictor.log_stiffness(held.law, held.effects) - problem.predictor.log_stiffness(
         free.law, free.effects
     )
     assert found.left < 0.01 and np.sqrt(np.mean(left**2)) < 0.01
-    # The readings say next to nothing of it: it keeps the probability that it had, or a little less.
-    assert 0.2 * 0.03 < found.probability < 0.03
+    # At most what the best size gains. At least: half of the prior, flat in the logarithm, lies below a change of 5 %,
+    # where the squares lose no more than `LIKELY`; 0.26 of what it had in the worst of the draws.
+    gain = best - fit.log_posterior
+    assert 0.1 * 0.03 < found.probability < 0.03 * np.exp(gain)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -174,12 +173,3 @@ def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[
     missed = np.flatnonzero(~(lowest >= required))
     order = missed[np.argsort(np.nan_to_num(lowest[missed], nan=-np.inf), kind="stable")]
     return [(int(lines[i]), n_per_mm_from_n_per_m(float(lowest[i]))) for i in order]
-
-
-def without_nan(value: Any) -> Any:
-    """The same with None for every float that JSON cannot hold."""
-    if isinstance(value, dict):
-        return {key: without_nan(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [without_nan(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.document import without_nan
 from toolpath_stiff.analysis.evaluation import refuse_no_number
 from toolpath_stiff.analysis.loads import softest_directions, stiffest_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
+from toolpath_stiff.documents import without_nan
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, reach
 from toolpath_stiff.machine.model import Machine

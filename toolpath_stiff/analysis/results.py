@@ -15,7 +15,6 @@ from toolpath_stiff.analysis.document import (
     idle_on,
     required_stiffness_missed,
     summarise,
-    without_nan,
     words_turn_the_platform,
 )
 from toolpath_stiff.analysis.evaluation import Evaluation, Progress, evaluate
@@ -25,6 +24,7 @@ from toolpath_stiff.analysis.statistics import (
     sample_columns,
 )
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.documents import without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names

@@ -29,6 +29,7 @@ from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.hypotheses import Family, averaged_interval
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
+from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.portrait.document import alike_entry, portrait_entry
 from toolpath_stiff.stiffness.contract import joined
 from toolpath_stiff.units import DIGITS, certain, json_number, mm_from_m, n_per_um_from_n_per_m
@@ -64,26 +65,9 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_measurements": list(diagnosis.next_measurements),
         "next": next_steps(diagnosis, diagnosis.asked or Asked(diagnosis.names)),
         "by_noise": {name: _in_short(judgement) for name, judgement in diagnosis.judgements.items()},
-        "noise": {
-            "name": main.noise.name,
-            "repeat_percent": _percent(main.noise.typical_repeat, 4),
-            "clamping_percent": _percent(main.noise.clamping, 4),
-            "strut_spread_percent": _percent(main.noise.strut_spread, 4),
-            "joint_error_mm": json_number(float(mm_from_m(main.noise.joint_error)), 4),
-            "origin": main.noise.origin,
-        },
+        "noise": _noise(main.noise),
         "gates": _gates(main),
-        "detectable": [
-            {
-                "effect": smallest.effect,
-                "parameter": smallest.parameter.name,
-                "unit": smallest.parameter.unit,
-                "size": json_number(smallest.value / smallest.parameter.si) if smallest.seen else None,
-                "rms_percent": _percent(smallest.rms),
-                "detectable": smallest.seen,
-            }
-            for smallest in diagnosis.detectable
-        ],
+        "detectable": _detectable(diagnosis),
         "confounding": {
             "effects": list(diagnosis.confounding.names),
             "matrix": [[json_number(x, 3) for x in row] for row in diagnosis.confounding.matrix.tolist()],
@@ -93,21 +77,7 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "path": diagnosis.path,
         "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
         "looks_the_same": None if alike is None else alike_entry(diagnosis.explanations[0], alike),
-        "not_excluded": [
-            {
-                "effect": hidden.effect.name,
-                "title": hidden.effect.title,
-                "parameter": hidden.parameter.name,
-                "unit": hidden.parameter.unit,
-                "choice": dict(hidden.candidate.choice),
-                "up_to": json_number(hidden.value / hidden.parameter.si, 2),
-                "rms_percent": _percent(hidden.rms, 2),
-                "left_percent": _percent(hidden.left, 2),
-                "probability": json_number(hidden.probability, 2),
-                "would_tell": would_tell(hidden),
-            }
-            for hidden in diagnosis.unexcluded
-        ],
+        "not_excluded": _not_excluded(diagnosis),
         "not_excluded_text": beside_text(diagnosis.unexcluded),
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
@@ -124,6 +94,52 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "loops": certain(diagnosis.loops),
         "command": diagnosis.line,
     }
+
+
+def _noise(noise: Noise) -> dict[str, str | float | None]:
+    """The noise of the likeliest model."""
+    return {
+        "name": noise.name,
+        "repeat_percent": _percent(noise.typical_repeat, 4),
+        "clamping_percent": _percent(noise.clamping, 4),
+        "strut_spread_percent": _percent(noise.strut_spread, 4),
+        "joint_error_mm": json_number(float(mm_from_m(noise.joint_error)), 4),
+        "origin": noise.origin,
+    }
+
+
+def _detectable(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """The smallest sizes that these readings would show, effect by effect."""
+    return [
+        {
+            "effect": smallest.effect,
+            "parameter": smallest.parameter.name,
+            "unit": smallest.parameter.unit,
+            "size": json_number(smallest.value / smallest.parameter.si) if smallest.seen else None,
+            "rms_percent": _percent(smallest.rms),
+            "detectable": smallest.seen,
+        }
+        for smallest in diagnosis.detectable
+    ]
+
+
+def _not_excluded(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Effects that the readings neither show nor exclude."""
+    return [
+        {
+            "effect": hidden.effect.name,
+            "title": hidden.effect.title,
+            "parameter": hidden.parameter.name,
+            "unit": hidden.parameter.unit,
+            "choice": dict(hidden.candidate.choice),
+            "up_to": json_number(hidden.value / hidden.parameter.si, 2),
+            "rms_percent": _percent(hidden.rms, 2),
+            "left_percent": _percent(hidden.left, 2),
+            "probability": json_number(hidden.probability, 2),
+            "would_tell": would_tell(hidden),
+        }
+        for hidden in diagnosis.unexcluded
+    ]
 
 
 def _percent(share: float, digits: int = DIGITS) -> float | None:
