@@ -217,11 +217,6 @@ NO_EXAMPLE = {
         ),
         "update",
     },
-    "Comparison": {"variance"},
-    # What documents, pages and pictures are made from.
-    "Diagnosis": {"noise", "predictor", "explanations", "before", "after", "law", "ranking"},
-    "NextVisit": {"sentences"},
-    "Plan": {"sentences", "notes", "visits"},
     "Machine": {"picture"},
     "MachineCheck": {"picture"},
 }
