@@ -118,42 +118,31 @@ def unknowns_table() -> str:
 
 def commands() -> str:
     """Every command and every action of a command, with its usage and options, from the parsers themselves."""
-    from toolpath_stiff.cli.main import COMMANDS, build_parser
+    from toolpath_stiff.cli.main import GROUPS, actions_of
 
     lines: list[str] = []
-    for group in dict.fromkeys(command.group for command in COMMANDS):
-        lines += [f"## {group}", ""]
-        for command in COMMANDS:
-            if command.group == group:
-                whole = build_parser(command.name)
-                lines += _command(_actions(whole)[command.name], command.help, 3)
+    for group, names in GROUPS.items():
+        lines += [f"## {group.capitalize()}", ""]
+        for name, about in names.items():
+            actions = actions_of(name)
+            if "" not in actions:
+                lines += [f"### tps {name}", "", _escaped(about[:1].upper() + about[1:]) + ".", ""]
+            for action, command in actions.items():
+                title = f"tps {name} {action}".strip()
+                lines += _command(command.parser(title), about if not action else "", 4 if action else 3)
     return "\n".join(lines)
-
-
-def _actions(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            return dict(action.choices)
-    return {}
 
 
 def _command(parser: argparse.ArgumentParser, about: str, level: int) -> list[str]:
     formatter = argparse.HelpFormatter(parser.prog, width=HELP_WIDTH)
     formatter.add_usage(parser.usage, parser._actions, parser._mutually_exclusive_groups)
+    about = about or (parser.description or "").rstrip(".")
     lines = ["#" * level + " " + parser.prog, "", _escaped(about[:1].upper() + about[1:]) + ".", ""]
     lines += ["```text", formatter.format_help().strip(), "```", ""]
     for group in parser._action_groups:
         lines += _options(group, formatter)
     if parser.epilog:
         lines += ["```text", parser.epilog.strip(), "```", ""]
-    helps = {
-        choice.dest: choice.help or ""
-        for action in parser._actions
-        if isinstance(action, argparse._SubParsersAction)
-        for choice in action._choices_actions
-    }
-    for name, sub in _actions(parser).items():
-        lines += _command(sub, helps[name], level + 1)
     return lines
 
 
@@ -161,9 +150,7 @@ def _options(group: argparse._ArgumentGroup, formatter: argparse.HelpFormatter) 
     """Definitions of a group's options; what every command has, and the actions, are left out."""
     lines = []
     for action in group._group_actions:
-        if action.help in (None, argparse.SUPPRESS) or isinstance(
-            action, argparse._HelpAction | argparse._SubParsersAction
-        ):
+        if not action.help or isinstance(action, argparse._HelpAction):
             continue
         lines += [f"`{formatter._format_action_invocation(action)}`"]
         lines += [f": {_escaped(formatter._expand_help(action))}", ""]

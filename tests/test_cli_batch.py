@@ -116,7 +116,7 @@ def test_a_program_that_cannot_be_read_is_one_of_the_failures(shop, capsys):
     ("arguments", "words"),
     [
         (["jobs", "--jobs", "0"], "--jobs 0"),
-        (["jobs", "--jobs", "two"], "invalid int"),
+        (["jobs", "--jobs", "two"], "expected 1 or more"),
         (["jobs", "--machine", "none"], "neither a packaged machine nor a file"),
         (["jobs", "--compare", "none"], "neither a packaged machine nor a file"),
         (["jobs", "--effects", "none.py"], "does not exist"),
@@ -331,7 +331,7 @@ def test_programs_may_be_given_as_objects_and_read_their_own_way(shop):
     ("programs", "options", "words"),
     [
         ([], {}, "no programs"),
-        (["jobs"], {"step_mm": -1.0}, "step -1 mm"),
+        (["jobs"], {"step_mm": -1.0}, "--step -1"),
         (["jobs"], {"load": "sideways"}, "sideways"),
         (["jobs"], {"table": "xls"}, "xls"),
         (["jobs"], {"jobs": 0}, "--jobs 0"),

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolpath_stiff.cli.program import ANALYZE_EPILOG as EPILOG
+from toolpath_stiff.cli.program import analyze
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.report.batch.programs import RESERVED, Found, endings, find_programs, report_folders
 
@@ -46,7 +46,7 @@ def test_numbers_in_names_are_sorted_as_numbers(jobs):
 
 
 def test_the_help_names_every_ending():
-    assert all(f" {ending}" in EPILOG for ending in endings())
+    assert all(f" {ending}" in analyze.__doc__ for ending in endings())
 
 
 def test_a_file_named_twice_in_any_way_is_read_once(jobs):

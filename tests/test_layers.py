@@ -60,7 +60,7 @@ def test_the_help_imports_nothing_heavy():
 
     Commands import numpy and its like in `run`, so that a slip in an option is answered at once.
     """
-    asked = [["--help"], ["--version"], [], *([command.name, "--help"] for command in COMMANDS)]
+    asked = [["--help"], ["--version"], [], *([command, "--help"] for command in COMMANDS)]
     code = (
         "import sys, io, contextlib\n"
         "from toolpath_stiff.cli.main import main\n"

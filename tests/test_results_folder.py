@@ -11,8 +11,8 @@ import pytest
 
 from tests.faults import all_writes_by_files
 from toolpath_stiff import results_folder
-from toolpath_stiff.cli.arguments import joined_names
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.cli.outputs import joined_names
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.results_folder import MANIFEST, Rules, check_folder, write_folder
 

@@ -7,6 +7,20 @@ import unicodedata
 from collections.abc import Iterable, Mapping
 from decimal import Decimal, InvalidOperation
 from functools import cache
+from typing import Annotated
+
+from toolpath_stiff.options import Option
+
+# What --columns says, or column -> theirs; of every function that reads measurements or raw records.
+Mapped = Annotated[
+    str | Mapping[str, str] | None,
+    Option(
+        "--columns",
+        "MAPPING",
+        help='Columns that files call otherwise: "stiffness=stiff_mean:N/um, date=day:DD.MM.YYYY, setup==bare" '
+        "(default: as FILE.columns.toml beside a file says).",
+    ),
+]
 
 # Units of one quantity and their sizes (BIPM: The International System of Units, 9th ed.; inch, pound-force and
 # kilogram-force: NIST Special Publication 811:2008, B.8, exact).

@@ -75,8 +75,9 @@ def test_without_it_the_message_says_how_to_get_it(program, capsys, monkeypatch,
 
 
 def test_diagnose_reads_its_program_as_analyze_does():
-    from toolpath_stiff.cli.main import build_parser
+    from toolpath_stiff.cli.main import actions_of
 
     options = ["--interpreter", "linuxcnc", "--dialect", "haas", "--block-delete=2", "--origin", "0,0,800"]
-    args = build_parser("diagnose").parse_args(["diagnose", "readings.csv", "--program", "part.ngc", *options])
+    words = ["readings.csv", "--program", "part.ngc", *options]
+    args = actions_of("diagnose")[""].read("tps diagnose", words)
     assert (args.interpreter, args.dialect, args.block_delete) == ("linuxcnc", "haas", frozenset({2}))

@@ -206,7 +206,7 @@ def test_command(tmp_path, monkeypatch, capsys):
         (["--x", "nan"], "not a finite number"),
         (["--keep-out", "vice:1,2,3"], "NAME:X0"),
         (["--keep-out", "vice:5,0,0,1,1,1"], "is not above"),
-        (["--objective", "best"], "invalid choice"),
+        (["--objective", "best"], "expected one of balanced"),
         (["--objective", "min"], "called 'weakest' now"),
         (["--margin", "60"], "expected 0 to less than 50"),
         (["--pick", "3"], "no earlier search"),

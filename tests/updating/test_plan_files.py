@@ -230,7 +230,7 @@ def test_between_two_effects_before_any_data(tmp_path, capsys):
         (["nist-table1", "--between", "none,strut_law", "--n", "0"], "0 poses"),
         (["--n", "2"], "8 to 200"),
         (["--heights", "5000,5100,5200,5300"], "reaches"),
-        (["--cost", "lunch=30"], "expected reading, pose"),
+        (["--cost", "lunch=30"], "expected one of reading, pose"),
         (["--cost", "pose=-1"], "0 or more"),
         (["--loads", "0,500"], "loads of 0, 500 N"),
         (["--max-tilt", "95"], "less than 90"),

@@ -6,21 +6,23 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolpath_stiff.api.inputs import LONGEST_STEP_MM, Program, pose_si, positive, program_from
+from toolpath_stiff.api.inputs import Program, Step, pose_si, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.options import checked
 from toolpath_stiff.units import m_from_mm
 
 if TYPE_CHECKING:
     from toolpath_stiff.placement.case_study import CaseStudy, Region
 
 
+@checked
 def case_study(
     machine: Machine | str | Path = "nist",
     program: Program | str | Path | None = None,
     regions: Mapping[str, Sequence[float]] | str | Path | None = None,
     *,
-    step_mm: float = 1.0,
+    step_mm: Step = 1.0,
 ) -> CaseStudy:
     r"""One tool path in several regions, at several heights, displaced and turned, as the paper's Figure 10.
 
@@ -58,7 +60,7 @@ def case_study(
     part = None if program is None else program_from(program)
     model = on.running(part)
     default = model.machine.default_origin
-    step = m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM))
+    step = m_from_mm(step_mm)
     read = None if part is None else lambda origin: part.moves(origin, default)
     where, files = _regions(regions)
     return run_case_study(model, step, read, where, (*(part.inputs if part else ()), *files, *on.inputs))

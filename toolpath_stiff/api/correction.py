@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from toolpath_stiff.api.diagnosis import Data, Mapped, Noise, Question
-from toolpath_stiff.api.inputs import FARTHEST_MM, positive
+from toolpath_stiff.api.diagnosis import Data, NoisePercent, Question, Seed, StrutSpread
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import options
+from toolpath_stiff.options import Option, checked, distinct_numbers, finite_number, names
 from toolpath_stiff.results import FolderResult, Progress, machine_by_name, one_of, teller
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.diagnosis.result import Diagnosis
     from toolpath_stiff.planning.result import Plan
 
-STEEPEST_TILT_DEG = 90.0
 COSTS = ("reading", "pose", "tool", "setup", "indicator")
 
 
@@ -144,21 +144,22 @@ class Update(FolderResult):
 
 
 @machine_by_name
+@checked
 def update(
     machine: Machine | str | Path,
     data: Data,
     *,
-    add: str | Iterable[str] = (),
-    strut_law: bool = False,
-    keep_strut_law: bool = False,
-    auto: bool = False,
-    force: bool = False,
-    objective: str = "likelihood",
+    add: Annotated[str | Iterable[str], Option("--add", "EFFECT[:KEY=VALUE,..]", count="append")] = (),
+    strut_law: Annotated[bool, Option("--strut-law")] = False,
+    keep_strut_law: Annotated[bool, Option("--keep-strut-law", instead_of="strut_law")] = False,
+    auto: Annotated[bool, Option("--auto")] = False,
+    force: Annotated[bool, Option("--force")] = False,
+    objective: Annotated[str, Option("--objective", choices=("likelihood", "mean-error"))] = "likelihood",
     machine_file: str | Path = "machine.toml",
     columns: Mapped = None,
-    noise_percent: Noise = None,
-    strut_spread_percent: float = 1.0,
-    seed: int = 0,
+    noise_percent: NoisePercent = None,
+    strut_spread_percent: StrutSpread = 1.0,
+    seed: Seed = 0,
     progress: Progress | None = None,
 ) -> Update:
     """Fit effects to measurements, judge whether the data support them, make the machine that carries them.
@@ -169,14 +170,17 @@ def update(
         The machine; measurements, or the files that hold them.
     add
         Effects to add: "weak_strut", or with what they act on, "weak_strut:strut=3".
-    strut_law, keep_strut_law
-        Keep the refitted strut law even without an effect; keep the one of the machine file.
+    strut_law
+        Write the refitted strut law even without an effect.
+    keep_strut_law
+        Keep the strut law as given; else its two stiffnesses are refitted along with every effect.
     auto
-        Go on adding effects while the data support them.
+        Add effects as long as the error at left-out points falls and the data support it.
     force
-        Keep what the data do not support; never what fits worse than the machine given.
+        Write what the data do not support as well, never what fits worse than the machine given; and as
+        --replace.
     objective
-        "likelihood"; or "mean-error", the strut law alone, as the paper fitted it.
+        Mean-error: the strut law alone, as the paper fitted it.
     machine_file
         Name that the new machine file is to have, for the record.
     columns
@@ -198,7 +202,6 @@ def update(
     >>> found.to_frame()["name"].tolist()
     ['as given', 'strut law refitted']
     """
-    from toolpath_stiff.correction.update import OBJECTIVES
     from toolpath_stiff.correction.update import update as update_machine
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
@@ -210,7 +213,7 @@ def update(
         keep_strut_law=keep_strut_law,
         auto=auto,
         force=force,
-        objective=one_of("objective", objective, OBJECTIVES),
+        objective=objective,
         files=asked.files,
         machine_file=str(machine_file),
         asked=asked.asked,
@@ -221,24 +224,25 @@ def update(
 
 
 @machine_by_name
+@checked
 def plan(
     machine: Machine | str | Path,
     data: Data | None = None,
     *,
-    between: Sequence[str] = (),
-    n: int | None = None,
-    radius_mm: float | None = None,
-    heights_mm: Sequence[float] | None = None,
-    max_tilt_deg: float | None = None,
-    loads_N: Sequence[float] | None = None,
-    tool_extensions_mm: Sequence[float] | None = None,
-    setups: Sequence[str] | None = None,
-    indicators: bool = False,
-    minutes: Mapping[str, float] | None = None,
+    between: Annotated[Sequence[str], Option("--between", "A,B", read=names)] = (),
+    n: Annotated[int | None, Option("--n")] = None,
+    radius_mm: Annotated[float | None, Option("--radius", "mm", above=0, at_most=1e5)] = None,
+    heights_mm: Annotated[Sequence[float] | None, Option("--heights", "Z,Z,...", read=distinct_numbers)] = None,
+    max_tilt_deg: Annotated[float | None, Option("--max-tilt", "deg", at_least=0, below=90)] = None,
+    loads_N: Annotated[Sequence[float] | None, Option("--loads", "N,N,...", read=distinct_numbers)] = None,
+    tool_extensions_mm: Annotated[Sequence[float] | None, Option("--tools", "MM,MM,...", read=distinct_numbers)] = None,
+    setups: Annotated[Sequence[str] | None, Option("--setups", "NAME,...", read=names)] = None,
+    indicators: Annotated[bool, Option("--indicators")] = False,
+    minutes: Annotated[Mapping[str, float] | None, Option("--cost", "WHAT=MINUTES", read=_cost, count="append")] = None,
     columns: Mapped = None,
-    noise_percent: Noise = None,
-    strut_spread_percent: float = 1.0,
-    seed: int = 0,
+    noise_percent: NoisePercent = None,
+    strut_spread_percent: StrutSpread = 1.0,
+    seed: Seed = 0,
     diagnosis: Diagnosis | None = None,
 ) -> Plan:
     """What to measure next to tell explanations apart; without data, what to measure first.
@@ -251,11 +255,20 @@ def plan(
         Effects to tell apart, or "none"; unless given, what a diagnosis of the data leaves standing.
     n
         Poses; unless given 6, or 24 of a first campaign.
-    radius_mm, heights_mm, max_tilt_deg, loads_N, tool_extensions_mm, setups
-        What may vary: how far from the axis, heights of the tool tip, tilt of the spindle, loads, tools longer than the
-        reference tool by so much (the first is in the spindle), set-ups (the first is on the table).
+    radius_mm
+        How far poses may lie from the axis; unless given, 300 mm.
+    heights_mm
+        Of the tool tip; unless given, five levels.
+    max_tilt_deg
+        Of the spindle; unless given, 25 degrees.
+    loads_N
+        Unless given, 500, 1000, 4000 and those of the data.
+    tool_extensions_mm
+        Tools, longer than the reference tool by; the first is in the spindle. Unless given, as last, and 150.
+    setups
+        The first is on the table; unless given, those of the data.
     indicators
-        Whether a second indicator may be set across a link of the load path, where that tells more.
+        Take a second indicator across a link of the load path where that tells more.
     minutes
         What work costs: of a "reading" (1), a "pose" (15), another "tool" (10), another "setup" (45), a second
         "indicator" (10).
@@ -279,16 +292,14 @@ def plan(
     <Plan: rivals, 2 clampings>
     >>> len(found.to_dict()["visits"]), found.to_frame().columns.tolist()[:6]
     (2, ['x_mm', 'y_mm', 'z_mm', 'a_deg', 'b_deg', 'c_deg'])
-    >>> list(found.files(plots=False))
-    ['plan.csv', 'plan.json', 'plan_tables.npz']
+    >>> list(found.files(plots=False)), len(found.rows) == len(found.to_frame())
+    (['plan.csv', 'plan.json', 'plan_tables.npz'], True)
     """
     from toolpath_stiff.planning.result import plan as plan_visits
     from toolpath_stiff.planning.visits import Costs
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     costs = _costs(minutes or {})
-    if max_tilt_deg is not None and not 0.0 <= max_tilt_deg < STEEPEST_TILT_DEG:
-        raise InputError(f"{max_tilt_deg:g} degrees", expected="0 or more and less than 90")
     own = _own_words(
         between=between or None,
         n=n,
@@ -307,7 +318,7 @@ def plan(
         None if asked.data is None else asked.readings,
         between=tuple(between),
         n=n,
-        radius=None if radius_mm is None else m_from_mm(positive("radius", radius_mm, "mm", FARTHEST_MM)),
+        radius=None if radius_mm is None else m_from_mm(radius_mm),
         heights=_in_metres(heights_mm),
         max_tilt=None if max_tilt_deg is None else rad_from_deg(max_tilt_deg),
         loads=loads_N,
@@ -321,6 +332,12 @@ def plan(
         inputs=asked.inputs,
         **asked.common,
     )
+
+
+def _cost(text: str) -> tuple[str, float]:
+    """`pose=15`."""
+    name, _, value = text.partition("=")
+    return name, finite_number(value)
 
 
 def _costs(minutes: Mapping[str, float]) -> dict[str, float]:

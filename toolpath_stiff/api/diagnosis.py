@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from toolpath_stiff.api.inputs import Program, origin_word, pose_si, program_from, whole
+from toolpath_stiff.api.inputs import Origin, Program, origin_si, origin_word, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, options
+from toolpath_stiff.options import Option, checked, numbers
 from toolpath_stiff.results import Progress, machine_by_name, teller
 
 if TYPE_CHECKING:
@@ -26,9 +28,6 @@ if TYPE_CHECKING:
 
 
 Noise = float | tuple[float, float] | None
-
-
-LARGEST_SPREAD_PERCENT = 50.0
 
 
 class Measurements:
@@ -146,7 +145,6 @@ def _is_nan(value: object) -> bool:
 
 
 Data = Measurements | str | Path | Sequence[str | Path]
-Mapped = str | Mapping[str, str] | None
 
 
 def columns_text(columns: Mapped) -> str | None:
@@ -179,10 +177,8 @@ class Question:
         self.model = self.on.model.given or self.on.model.machine
         self.data = None if data is None else measurements_from(data, columns)
         self.noise = _noise(noise_percent)
-        if not 0.0 <= strut_spread_percent <= LARGEST_SPREAD_PERCENT:
-            raise InputError(f"strut spread {strut_spread_percent:g} %", expected=f"0 to {LARGEST_SPREAD_PERCENT:g} %")
         self.strut_spread = strut_spread_percent / 100.0
-        self.seed = whole("seed", seed, 0)
+        self.seed = seed
         self.files = self.data.files if self.data else ()
         columns = self.data.columns if self.data else None
         self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread, columns)
@@ -205,6 +201,29 @@ class Question:
         }
 
 
+def _percents(text: str) -> float | tuple[float, ...]:
+    """`2` or `2,1.5`."""
+    values = numbers(text)
+    return values[0] if len(values) == 1 else values
+
+
+# Options that the functions on measurements share.
+NoisePercent = Annotated[
+    Noise,
+    Option(
+        "--noise",
+        "PERCENT[,PERCENT]",
+        read=_percents,
+        help="Standard deviation of one reading, re-clamping included; or of the reading alone and of a clamping. "
+        "Unless given, from repeats, else from sd_N_per_mm, else a guess.",
+    ),
+]
+StrutSpread = Annotated[
+    float, Option("--strut-spread", "%", at_least=0, at_most=50, help="Standard deviation of the struts' stiffness.")
+]
+Seed = Annotated[int, Option("--seed", at_least=0, help="Of every random draw.")]
+
+
 def _noise(percent: Noise) -> Noise:
     """Percentages as relative standard deviations."""
     if percent is None:
@@ -217,14 +236,15 @@ def _noise(percent: Noise) -> Noise:
 
 
 @machine_by_name
+@checked
 def compare(
     machine: Machine | str | Path,
     data: Data,
     *,
     columns: Mapped = None,
-    noise_percent: Noise = None,
-    strut_spread_percent: float = 1.0,
-    seed: int = 0,
+    noise_percent: NoisePercent = None,
+    strut_spread_percent: StrutSpread = 1.0,
+    seed: Seed = 0,
     progress: Progress | None = None,
 ) -> Comparison:
     """See where the model fails: the machine as its file has it, against measurements.
@@ -265,16 +285,17 @@ def compare(
 
 
 @machine_by_name
+@checked
 def diagnose(
     machine: Machine | str | Path,
     data: Data,
     *,
     columns: Mapped = None,
-    noise_percent: Noise = None,
-    strut_spread_percent: float = 1.0,
-    seed: int = 0,
-    program: Program | str | Path | None = None,
-    origin_mm_deg: Sequence[float] | None = None,
+    noise_percent: NoisePercent = None,
+    strut_spread_percent: StrutSpread = 1.0,
+    seed: Seed = 0,
+    program: Annotated[Program | str | Path | None, Option("--program", "PROGRAM")] = None,
+    origin_mm_deg: Origin = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Find out which physical effect the model lacks, if any.
@@ -306,14 +327,14 @@ def diagnose(
     ('adequate', ['none', 'joint_moment_stiffness'], 'joint_moment_stiffness')
     >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape
     (12, 3)
-    >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
+    >>> list(found.files(plots=False)), len(found.document["plausible"])
     (['diagnose.json', 'residuals.csv'], 6)
     """
     from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     part = None if program is None else program_from(program)
-    origin = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
+    origin = origin_si(origin_mm_deg)
     conditions = asked.on.running(part).conditions
     default = asked.model.default_origin
     own = options(

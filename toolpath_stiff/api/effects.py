@@ -6,10 +6,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.diagnosis import Data, Noise, Question
+from toolpath_stiff.api.diagnosis import Data, NoisePercent, Question, Seed, StrutSpread
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.options import checked
 from toolpath_stiff.results import Progress, Result, machine_by_name, teller
 
 if TYPE_CHECKING:
@@ -179,14 +180,15 @@ def effect_template(name: str) -> EffectFile:
 
 
 @machine_by_name
+@checked
 def draft_effect(
     machine: Machine | str | Path,
     data: Data,
     file: str | Path = "missing.toml",
     *,
-    noise_percent: Noise = None,
-    strut_spread_percent: float = 1.0,
-    seed: int = 0,
+    noise_percent: NoisePercent = None,
+    strut_spread_percent: StrutSpread = 1.0,
+    seed: Seed = 0,
     progress: Progress | None = None,
 ) -> EffectDraft:
     """Describe what a diagnosis leaves unexplained as an effect file to read, edit and put to the test.

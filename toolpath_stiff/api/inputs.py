@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
-from toolpath_stiff.hints import options
+from toolpath_stiff.hints import both_names, options
+from toolpath_stiff.options import Option, arguments_of, checked, numbers
 from toolpath_stiff.units import Pose, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
@@ -21,9 +23,58 @@ if TYPE_CHECKING:
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0
-STRONGEST_N = 1e6
-LONGEST_STEP_MM = 1000.0
-FASTEST_MM_PER_MIN = 1e6
+SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
+
+
+def switches(text: str) -> frozenset[int] | bool:
+    """Block-delete switches, `2,3`; nothing, what the option means alone."""
+    if not text:
+        return True
+    if not SWITCHES.fullmatch(text):
+        raise ValueError("switches 1 to 9, as 2,3")
+    return frozenset(map(int, text.split(",")))
+
+
+# Options that several functions share.
+Step = Annotated[float, Option("--step", "mm", above=0, at_most=1000, help="Largest distance of two samples.")]
+Force = Annotated[
+    float,
+    Option(
+        "--force",
+        "N",
+        above=0,
+        at_most=1e6,
+        help="Load at the tool tip: for deflections, and for effects that depend on it.",
+    ),
+]
+LoadDirection = Annotated[
+    str,
+    Option(
+        "--load",
+        "DIRECTION",
+        help="Direction of the load: tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ.",
+    ),
+]
+Origin = Annotated[
+    Sequence[float] | None,
+    Option(
+        "--origin",
+        "X,Y,Z[,A,B,C]",
+        read=numbers,
+        help="Where program zero (G54) sits in machine coordinates, mm and degrees. Unless given, where the program's "
+        "G10 says, else the machine's default.",
+    ),
+]
+Linearised = Annotated[
+    float | None,
+    Option(
+        "--linearise",
+        "mm",
+        above=0,
+        at_most=10,
+        help="Write arcs that the turn takes out of the planes as straight moves within so much; else refuse them.",
+    ),
+]
 
 
 def finite(name: str, value: Any) -> float:
@@ -35,22 +86,6 @@ def finite(name: str, value: Any) -> float:
     if not math.isfinite(number):
         raise InputError(f"{name} {str(value)[:40]!r}".strip(), expected="a finite number")
     return number
-
-
-def positive(name: str, value: float, unit: str, highest: float) -> float:
-    """A number above 0 and up to `highest`. Raises `InputError`."""
-    if not 0.0 < value <= highest:
-        raise InputError(f"{name} {value:g} {unit}", expected=f"more than 0 and at most {highest:g} {unit}")
-    return float(value)
-
-
-def whole(name: str, value: int, lowest: int, highest: int | None = None) -> int:
-    """A whole number within bounds. Raises `InputError`."""
-    if value < lowest or (highest is not None and value > highest):
-        raise InputError(
-            f"{name} {value}", expected=f"{lowest} or more" if highest is None else f"{lowest} to {highest}"
-        )
-    return value
 
 
 def pose_si(name: str, pose: Sequence[float]) -> Pose:
@@ -66,6 +101,11 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
             expected=f"positions within +-{FARTHEST_MM:g} mm and angles within +-{FARTHEST_DEG:g} degrees",
         )
     return pose_in_si((x, y, z, a, b, c))
+
+
+def origin_si(origin_mm_deg: Sequence[float] | None) -> Pose | None:
+    """A placement in SI, None where none is given. Raises `InputError`."""
+    return None if origin_mm_deg is None else pose_si(both_names("--origin"), origin_mm_deg)
 
 
 def origin_word(origin: Pose) -> str:
@@ -117,20 +157,21 @@ class Program:
     _last: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
+    @checked
     def read(
         cls,
         file: str | Path,
         *,
-        dialect: str | None = None,
-        controller: str | Path | None = None,
-        offsets: str | Path | None = None,
-        tools: str | Path | None = None,
-        block_delete: bool | Iterable[int] = False,
-        interpreter: str = "builtin",
-        rs274: str | None = None,
-        feed_mm_per_min: float | None = None,
-        subprograms: str | Path | None = None,
-        unconfined: bool = False,
+        dialect: Annotated[str | None, Option("--dialect", choices=("generic", "linuxcnc", "fanuc", "haas"))] = None,
+        controller: Annotated[str | Path | None, Option("--controller", "FILE")] = None,
+        offsets: Annotated[str | Path | None, Option("--offsets", "FILE")] = None,
+        tools: Annotated[str | Path | None, Option("--tools", "FILE")] = None,
+        block_delete: Annotated[bool | Iterable[int], Option("--block-delete", "N,N", read=switches)] = False,
+        interpreter: Annotated[str, Option("--interpreter", choices=("builtin", "linuxcnc", "auto"))] = "builtin",
+        rs274: Annotated[str | None, Option("--rs274", "PATH")] = None,
+        feed_mm_per_min: Annotated[float | None, Option("--feed", "mm/min", above=0, at_most=1e6)] = None,
+        subprograms: Annotated[str | Path | None, Option("--subprograms", "FOLDER")] = None,
+        unconfined: Annotated[bool, Option("--unconfined")] = False,
     ) -> Program:
         r"""A program in a file.
 
@@ -139,16 +180,19 @@ class Program:
         file
             NC program or cutter-location file.
         dialect
-            "generic", "linuxcnc", "fanuc" or "haas": how the control reads what others read otherwise; unless given, as
-            the controller file says, else generic.
+            The control, for what controls read differently: X10 without a decimal point, the time of G4 P, G70 and G71,
+            `;`. Unless given, as the controller file says, else generic.
         controller
-            File of what belongs to the control: dialect, block delete, offsets, tools, kinematics.
-        offsets, tools
-            Work offsets G54 to G59.3; tool table. They win over the controller file's.
+            File of what belongs to the control (TOML: dialect, block_delete, offsets, tools, the kinematics that the
+            program was posted for; or LinuxCNC's .var or .tbl).
+        offsets
+            Work offsets G54 to G59.3, instead of the controller file's.
+        tools
+            Tool table, instead of the controller file's: LinuxCNC .tbl, or CSV tool,length_mm,diameter_mm.
         block_delete
-            Leave out blocks that begin with a slash: True, all of them; or the switches that are on, 1 to 9.
+            Leave out blocks that begin with a slash, or those of the switches that are on, 1 to 9 (/ is /1).
         interpreter
-            "builtin"; "linuxcnc", LinuxCNC's rs274; "auto", the second where the first refuses.
+            What reads the program: the built-in reader; LinuxCNC's rs274; auto: rs274 where the built-in one refuses.
         rs274
             LinuxCNC's interpreter, if it is not on PATH.
         feed_mm_per_min
@@ -156,7 +200,7 @@ class Program:
         subprograms
             Folder of the files that the program calls (`o<name> call`, `M98 P1234`); without it none is opened.
         unconfined
-            Run it even where bubblewrap, which keeps it from all files but its own, cannot be used.
+            Run rs274 even where bubblewrap, which keeps it from all files but its own, cannot be used.
 
         Raises
         ------
@@ -204,6 +248,9 @@ class Program:
         >>> tps.Program.from_text("G1 X40 F300\nM2", name="slot.nc", dialect="linuxcnc")
         <Program slot.nc: 2 lines>
         """
+        feed = reading.get("feed_mm_per_min")
+        if feed is not None:
+            arguments_of(cls.read)["feed_mm_per_min"].check(feed)
         said = _said(**reading)
         return cls(name, None, *_control(said, reading.get("block_delete", False)), text, said)
 
@@ -306,7 +353,7 @@ def _said(
         "block_delete": ",".join(map(str, switches)) if isinstance(switches, list) else switches,
         "interpreter": interpreter if interpreter != "builtin" else None,
         "rs274": rs274,
-        "feed": None if feed_mm_per_min is None else positive("feed", feed_mm_per_min, "mm/min", FASTEST_MM_PER_MIN),
+        "feed": feed_mm_per_min,
         "subprograms": str(subprograms) if subprograms else None,
         "unconfined": unconfined,
     }

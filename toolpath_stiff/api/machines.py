@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from toolpath_stiff.api.inputs import Program, pose_si, whole
+from toolpath_stiff.api.inputs import Program, pose_si
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.results import Result, TextResult, notebook_text, one_of
+from toolpath_stiff.options import Option, checked
+from toolpath_stiff.results import Result, TextResult, notebook_text
 from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
@@ -24,7 +25,33 @@ if TYPE_CHECKING:
     from toolpath_stiff.stiffness.contract import Conditions
     from toolpath_stiff.stiffness.model import StiffnessModel
 
-TEMPERATURES_C = (-50.0, 200.0)
+
+def _named(text: str) -> str:
+    if not text.strip():
+        raise ValueError("a set-up, or none")
+    return text.strip()
+
+
+Setup = Annotated[
+    str | None,
+    Option(
+        "--setup",
+        "NAME",
+        read=_named,
+        help="Set-up that is on the machine, for effects that belong to one; none: a set-up without a name. "
+        "Unless given, the controller file's, else the machine file's.",
+    ),
+]
+Temperature = Annotated[
+    float | None,
+    Option(
+        "--temperature",
+        "C",
+        at_least=-50,
+        at_most=200,
+        help="Degrees Celsius, for effects that need it; unless given, the machine file's.",
+    ),
+]
 FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the paper's Figure 2
 
 
@@ -73,29 +100,30 @@ class Machine:
     allow_unchecked_effects: bool = False
 
     @classmethod
+    @checked
     def load(
         cls,
-        machine: str | Path = "nist",
+        machine: Annotated[str | Path, Option("--machine", "NAME|FILE")] = "nist",
         *,
-        effects: Iterable[str | Path] = (),
+        effects: Annotated[Iterable[str | Path], Option("--effects", "FILE.py", count="append")] = (),
+        allow_unchecked_effects: Annotated[bool, Option("--allow-unchecked-effects")] = False,
         setup: str | None = None,
         temperature_C: float | None = None,
-        allow_unchecked_effects: bool = False,
     ) -> Machine:
         """Load a packaged machine by name, or a machine file.
 
         Parameters
         ----------
         machine
-            Name (`Machine.names()` lists them) or TOML file.
+            Name or file.
         effects
-            Python files with physical effects of one's own, which the machine file may name.
+            File with physical effects of one's own, which the machine file may name.
         setup
             The set-up that is on the machine, for effects that belong to one; "none": none that has a name.
         temperature_C
             Degrees Celsius, for effects that need it.
         allow_unchecked_effects
-            Compute even with effects of one's own that fail `check_effects`; every result says so.
+            Compute even with effects of one's own that fail `tps effects check`; every result says so.
 
         Raises
         ------
@@ -115,7 +143,8 @@ class Machine:
         found.running()
         return found
 
-    def under(self, setup: str | None = None, temperature_C: float | None = None) -> Machine:
+    @checked
+    def under(self, setup: Setup = None, temperature_C: Temperature = None) -> Machine:
         """The same machine under a set-up and a temperature, as of `load`; None: as the files say.
 
         Whether an effect knows the set-up is checked where it matters: beside a second machine one of them has to.
@@ -127,9 +156,6 @@ class Machine:
         >>> machine.under(temperature_C=22).running().conditions.temperature
         22
         """
-        low, high = TEMPERATURES_C
-        if temperature_C is not None and not low <= temperature_C <= high:
-            raise InputError(f"{temperature_C:g} degrees C", expected=f"{low:g} to {high:g}")
         return replace(self, setup=setup, temperature_C=temperature_C)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -532,7 +558,10 @@ def machine_template(file: str | Path = "mine.toml") -> MachineFile:
     return MachineFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
 
 
-def machine_from_linuxcnc(file: str | Path, units: str | None = None) -> MachineFile:
+@checked
+def machine_from_linuxcnc(
+    file: str | Path, units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None
+) -> MachineFile:
     """The machine of the genhexkins pins in a LinuxCNC HAL file.
 
     Parameters
@@ -567,18 +596,25 @@ def machine_from_linuxcnc(file: str | Path, units: str | None = None) -> Machine
             hint="give it with --units mm or --units inch",
             file=str(file),
         )
-    machine, notes = machine_from_hal(text, one_of("units", unit, ("mm", "inch")), path.name)
+    machine, notes = machine_from_hal(text, unit, path.name)
     heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
     return MachineFile(machine.name, machine_toml(machine, heading), notes)
 
 
-def recover_geometry(*, starts: int = 20, seed: int = 1) -> TextResult:
+@checked
+def recover_geometry(
+    *,
+    starts: Annotated[int, Option("--starts", at_least=1, at_most=1000)] = 20,
+    seed: Annotated[int, Option("--seed", at_least=0)] = 1,
+) -> TextResult:
     """Fit the NIST geometry to the paper's Table 1 anew, from scattered starting points.
 
     Parameters
     ----------
-    starts, seed
-        How many starting points, 1 to 1000; seed of where they lie.
+    starts
+        How many starting points.
+    seed
+        Of where they lie.
 
     Examples
     --------
@@ -590,5 +626,5 @@ def recover_geometry(*, starts: int = 20, seed: int = 1) -> TextResult:
     from toolpath_stiff.correction.machines import recover_geometry as recover
     from toolpath_stiff.correction.machines import recovery_text
 
-    found = recover(starts=whole("starts", starts, 1, 1000), seed=whole("seed", seed, 0))
+    found = recover(starts=starts, seed=seed)
     return TextResult(recovery_text(found), found, f"the NIST geometry from {starts} starts")

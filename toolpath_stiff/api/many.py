@@ -13,17 +13,26 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pebble import ProcessExpired
 
-from toolpath_stiff.api.inputs import Program
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Program, Step
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.programs import analyze, path_options
+from toolpath_stiff.api.programs import (
+    JOBS,
+    Compared,
+    Partial,
+    RequiredStiffness,
+    ShowPlunges,
+    Table,
+    analyze,
+    path_options,
+)
 from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.options import checked
 from toolpath_stiff.processes import ProcessPool, death
-from toolpath_stiff.report.analysis.summary import TABLES
 from toolpath_stiff.report.batch.index import files, names
 from toolpath_stiff.report.batch.programs import (
     Found,
@@ -36,7 +45,7 @@ from toolpath_stiff.report.batch.programs import (
     terminal_summary,
 )
 from toolpath_stiff.report.words import counted
-from toolpath_stiff.results import Progress, Result, one_of
+from toolpath_stiff.results import Progress, Result
 from toolpath_stiff.results_folder import Rules, check_folder, clear_up, write_folder
 
 if TYPE_CHECKING:
@@ -118,24 +127,25 @@ class ManyAnalyses(Result):
         return f"{counted(len(self.outcomes), 'program')}, {len(self.failed) or 'none'} failed"
 
 
+@checked
 def analyze_many(
     machine: Machine | str | Path,
     programs: Iterable[str | Path | Program | Found],
     folder: str | Path,
     *,
     executor: Executor | None = None,
-    jobs: int | None = None,
+    jobs: Annotated[int | None, JOBS] = None,
     plots: bool = True,
-    table: str = "csv",
-    show_plunges: bool = False,
+    table: Table = "csv",
+    show_plunges: ShowPlunges = False,
     replace: bool = False,
-    origin_mm_deg: Sequence[float] | None = None,
-    load: str = LOAD,
-    step_mm: float = 1.0,
-    force_N: float = FORCE,
-    partial: bool = False,
-    require_N_per_mm: float | None = None,
-    compare_with: Machine | str | Path | None = None,
+    origin_mm_deg: Origin = None,
+    load: LoadDirection = LOAD,
+    step_mm: Step = 1.0,
+    force_N: Force = FORCE,
+    partial: Partial = False,
+    require_N_per_mm: RequiredStiffness = None,
+    compare_with: Compared = None,
     progress: Progress | None = None,
     **reading: Any,
 ) -> ManyAnalyses:
@@ -157,8 +167,8 @@ def analyze_many(
         `client.get_executor()`. It stays open. Its processes must see the programs and `folder` by the same paths.
         Unless given, processes of this computer.
     jobs
-        Processes of this computer at a time, unless `executor` is given; 1: everything in this process. Unless given,
-        as many as there are CPUs.
+        Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each
+        available CPU.
     plots, table, show_plunges, replace
         As of `Analysis.save`.
     origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm, compare_with
@@ -213,7 +223,7 @@ def analyze_many(
         out=Path(folder),
         rules=Rules(inputs=inputs, replace=replace),
         options=options,
-        saving={"plots": plots, "table": one_of("table", table, tuple(TABLES)), "show_plunges": show_plunges},
+        saving={"plots": plots, "table": table, "show_plunges": show_plunges},
         machines=(on, other),
     )
     check_folder(run.out, names(), run.rules)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from toolpath_stiff.column_names import Mapped
 
 if TYPE_CHECKING:
     from toolpath_stiff.planning.next_visit import NextVisit
 
 
 def next_visit(
-    folder: str | Path, data: Sequence[str | Path] | str | Path = (), *, columns: str | Mapping[str, str] | None = None
+    folder: str | Path, data: Sequence[str | Path] | str | Path = (), *, columns: Mapped = None
 ) -> NextVisit:
     """Which pose of a plan to go to next, after the readings so far.
 
@@ -43,7 +45,7 @@ def next_visit(
     <NextVisit: 0 readings, open>
     >>> found.probability, found.settled
     ({'spindle_compliance': 0.5, 'none': 0.5}, False)
-    >>> len(found.to_frame()) == len(found.to_dict()["rows"])
+    >>> len(found.to_frame()) == len(found.to_dict()["rows"]) == len(found.rows)
     True
     """
     from toolpath_stiff.planning.next_visit import next_visit as choose_next

@@ -6,24 +6,27 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from toolpath_stiff.api.inputs import (
     FARTHEST_MM,
-    LONGEST_STEP_MM,
-    STRONGEST_N,
+    Force,
+    Linearised,
+    LoadDirection,
+    Origin,
     Program,
+    Step,
+    origin_si,
     pose_si,
-    positive,
     program_from,
-    whole,
 )
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.results import Progress, Result, counter, one_of
-from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.options import Option, checked, low_high, numbers
+from toolpath_stiff.results import Progress, Result, counter
+from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis.loads import Load
@@ -36,19 +39,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.placement.task import Rewriting
     from toolpath_stiff.stiffness.model import StiffnessModel
 
-
 FARTHEST_TURN_DEG = 720.0
-
-
-LONGEST_CHORD_MM = 10.0
-
-
 MOST_FRONT_POINTS = 1000
-
-
-LARGEST_MARGIN_PERCENT = 50.0
-
-
 Range = tuple[float, float] | float
 
 
@@ -68,32 +60,35 @@ class KeepOut:
     high_mm: tuple[float, float, float]
 
 
+@checked
 def place(
     machine: Machine | str | Path,
     program: Program | str | Path,
     *,
-    x_mm: Range | None = None,
-    y_mm: Range | None = None,
-    z_mm: Range | None = None,
-    z_values_mm: Sequence[float] = (),
-    rotate_deg: Range = (0.0, 360.0),
-    tilt_a_deg: Range = 0.0,
-    tilt_b_deg: Range = 0.0,
-    keep_out: Iterable[KeepOut] = (),
-    margin_percent: float = 1.0,
-    allow_extrapolation: bool = False,
-    objective: str = "balanced",
-    points: int = 60,
-    seed: int = 1,
-    pick: int | None = None,
+    x_mm: Annotated[Range | None, Option("--x", "LO:HI", read=low_high)] = None,
+    y_mm: Annotated[Range | None, Option("--y", "LO:HI", read=low_high)] = None,
+    z_mm: Annotated[Range | None, Option("--z", "LO:HI", read=low_high)] = None,
+    z_values_mm: Annotated[Sequence[float], Option("--z-values", "Z,Z,...", read=numbers, instead_of="z_mm")] = (),
+    rotate_deg: Annotated[Range, Option("--rotate", "LO:HI", read=low_high)] = (0.0, 360.0),
+    tilt_a_deg: Annotated[Range, Option("--tilt-a", "LO:HI", read=low_high)] = 0.0,
+    tilt_b_deg: Annotated[Range, Option("--tilt-b", "LO:HI", read=low_high)] = 0.0,
+    keep_out: Annotated[
+        Iterable[KeepOut], Option("--keep-out", "NAME:X0,Y0,Z0,X1,Y1,Z1", read=_keep_out, count="append")
+    ] = (),
+    margin_percent: Annotated[float, Option("--margin", "%", at_least=0, below=50)] = 1.0,
+    allow_extrapolation: Annotated[bool, Option("--allow-extrapolation")] = False,
+    objective: Annotated[str, Option("--objective", choices=tuple(OBJECTIVES))] = "balanced",
+    points: Annotated[int, Option("--points", at_least=2, at_most=MOST_FRONT_POINTS)] = 60,
+    seed: Annotated[int, Option("--seed", at_least=0)] = 1,
+    pick: Annotated[int | None, Option("--pick")] = None,
     earlier: Placement | str | Path | Mapping[str, Any] | None = None,
-    origin_mm_deg: Sequence[float] | None = None,
-    load: str = LOAD,
-    step_mm: float = 1.0,
-    force_N: float = FORCE,
-    write: str | Path | None = None,
-    decimals: int | None = None,
-    linearise_mm: float | None = None,
+    origin_mm_deg: Origin = None,
+    load: LoadDirection = LOAD,
+    step_mm: Step = 1.0,
+    force_N: Force = FORCE,
+    write: Annotated[str | Path | None, Option("--write", "FILE")] = None,
+    decimals: Annotated[int | None, Option("--decimals")] = None,
+    linearise_mm: Linearised = None,
     progress: Progress | None = None,
 ) -> Placement:
     r"""Search where the work should sit, or take another point of an earlier search.
@@ -102,32 +97,39 @@ def place(
     ----------
     machine, program
         What it runs on, what runs.
-    x_mm, y_mm, z_mm, rotate_deg, tilt_a_deg, tilt_b_deg
-        (low, high) of what may vary of program zero's position and the set-up's turn, or a number to fix it; None: as
-        far as the machine reaches.
+    x_mm, y_mm, z_mm
+        Of program zero, mm: low and high, or a number to fix it; unless given, as far as the machine reaches.
     z_values_mm
-        The only heights that there are; instead of `z_mm`.
+        The only heights that there are, mm.
+    rotate_deg, tilt_a_deg, tilt_b_deg
+        Turn and tilts of the set-up, degrees: low and high, or a number to fix it.
     keep_out
-        Boxes that the tool tip stays out of.
+        Boxes that the tool tip stays out of, rapids included, machine coordinates, mm.
     margin_percent
         Share of each limit's span that cuts and rapids keep from it.
     allow_extrapolation
-        Whether struts may leave the lengths of their law at more samples than now.
+        Let struts leave the lengths of their law at more samples than now.
     objective
-        "balanced" (mean - range), "mean", "range" or "weakest"; whatever it is, none of mean, range and weakest gets
-        worse where that can be avoided.
-    points, seed
-        Most points of the front; seed of the search.
-    pick, earlier
-        Take this point (its `number`) of the front of an earlier search, without searching again; that search as its
-        result, its document or the file `placement.json`. Everything else has to be as it was.
+        Balanced is mean - range; whatever it is, none of mean, range and weakest gets worse where that can be avoided.
+    points
+        Most points of the front.
+    seed
+        Of the search.
+    pick
+        Take this point (its number in placements.csv) of the front of an earlier search, without searching again.
+        Everything else has to be as it was.
+    earlier
+        That search as its result, its document or the file `placement.json`.
     origin_mm_deg
         The present placement; unless given, as `analyze` takes it.
     load, step_mm, force_N
         As of `analyze`.
-    write, decimals, linearise_mm
-        Write the program itself for the placement, under this file's name, with so many decimals, arcs that the turn
-        takes out of the planes as straight moves within so much; `program_bytes` has it.
+    write
+        The program itself, transformed so that, run at the present origin, it cuts at the placement: name of its file.
+    decimals
+        Of its numbers; unless given, 4 in mm and degrees, 5 in inch.
+    linearise_mm
+        Write arcs that the turn takes out of the planes as straight moves within so much; unless given, refuse them.
     progress
         Called with what is being done, how much of it is done, how much there is.
 
@@ -157,7 +159,7 @@ def place(
     rules = _rules(objective, margin_percent, allow_extrapolation, keep_out, seed, points)
     model = on.running(part)
     default = model.machine.default_origin
-    asked: Pose | None = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
+    asked = origin_si(origin_mm_deg)
     read = part.moves(asked, default)
     task = Task(
         model=model,
@@ -167,8 +169,8 @@ def place(
         bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
         rules=rules,
         load=parse_load(load),
-        step=m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
-        force=positive("force", force_N, "N", STRONGEST_N),
+        step=m_from_mm(step_mm),
+        force=force_N,
         rewriting=None if write is None else _rewriting(part, str(write), decimals, linearise_mm),
     )
     if pick is None:
@@ -190,18 +192,25 @@ def _rules(
     from toolpath_stiff.placement.evaluator import Keepout
     from toolpath_stiff.placement.search import SearchRules
 
-    if not 0.0 <= margin_percent < LARGEST_MARGIN_PERCENT:
-        raise InputError(f"margin {margin_percent:g} %", expected=f"0 to less than {LARGEST_MARGIN_PERCENT:g} per cent")
     return SearchRules(
-        objective=one_of("objective", objective, tuple(OBJECTIVES)),
+        objective=objective,
         margin=margin_percent / 100.0,
         allow_extrapolation=allow_extrapolation,
         keepouts=tuple(
             Keepout(box.name, _corner(box.low_mm), _corner(box.high_mm)) for box in map(_checked_box, keep_out)
         ),
-        seed=whole("seed", seed, 0),
-        points=whole("points", points, 2, MOST_FRONT_POINTS),
+        seed=seed,
+        points=points,
     )
+
+
+def _keep_out(text: str) -> KeepOut:
+    """`NAME:X0,Y0,Z0,X1,Y1,Z1`."""
+    name, _, corners = text.rpartition(":")
+    values = numbers(corners)
+    if not name or len(values) != 6:
+        raise ValueError("NAME:X0,Y0,Z0,X1,Y1,Z1")
+    return _checked_box(KeepOut(name, values[:3], values[3:]))
 
 
 def _corner(corner_mm: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -221,7 +230,7 @@ def _rewriting(part: Program, file: str, decimals: int | None, linearise_mm: flo
 
     chord = None
     if linearise_mm is not None:
-        chord = m_from_mm(positive("linearise", linearise_mm, "mm", LONGEST_CHORD_MM))
+        chord = m_from_mm(linearise_mm)
     return Rewriting(file, decimals, chord, part.read_as)
 
 
@@ -318,13 +327,14 @@ class PlacementTrial:
         return {name: value if np.isfinite(value) else None for name, value in {**stiffnesses, **margins}.items()}
 
 
+@checked
 def try_placement(
     machine: Machine | str | Path,
     program: Program | str | Path,
     *,
-    load: str = LOAD,
-    step_mm: float = 1.0,
-    force_N: float = FORCE,
+    load: LoadDirection = LOAD,
+    step_mm: Step = 1.0,
+    force_N: Force = FORCE,
 ) -> PlacementTrial:
     r"""What a program does wherever it is put: read and sampled once, then the figures of any placement at once.
 
@@ -345,9 +355,9 @@ def try_placement(
     default = model.machine.default_origin
     read = part.moves(None, default)
     present = read.origin if read.origin_source == "program" else default
-    step = m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM))
+    step = m_from_mm(step_mm)
     path = work_path(read, step, asked, present, lambda origin: part.moves(origin, default))
-    return PlacementTrial(model, read, path, asked, positive("force", force_N, "N", STRONGEST_N))
+    return PlacementTrial(model, read, path, asked, force_N)
 
 
 class RewrittenProgram(Result):
@@ -399,7 +409,7 @@ def rewrite(
     to_mm_deg: Sequence[float],
     from_mm_deg: Sequence[float] = (0.0, 0.0, 0.0),
     decimals: int | None = None,
-    linearise_mm: float | None = None,
+    linearise_mm: Linearised = None,
 ) -> RewrittenProgram:
     r"""Write a program so that, run where its zero sits now, it does what it would do untouched at another placement.
 
@@ -434,6 +444,6 @@ def rewrite(
 
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
-    chord = None if linearise_mm is None else m_from_mm(positive("linearise", linearise_mm, "mm", LONGEST_CHORD_MM))
+    chord = None if linearise_mm is None else m_from_mm(linearise_mm)
     written = rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
     return RewrittenProgram(part.name, written.content, written.encoding, written.notes)

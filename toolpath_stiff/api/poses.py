@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from toolpath_stiff.api.inputs import FARTHEST_MM, STRONGEST_N, positive, whole
+from toolpath_stiff.api.inputs import FARTHEST_MM, Force
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE
 from toolpath_stiff.errors import InputError, InputErrors, UnreachableError
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.options import Option, checked, finite_number, low_high, numbers
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.toml_reader import shortened
 from toolpath_stiff.units import m_from_mm, rad_from_deg
@@ -88,11 +89,12 @@ def _coordinate(text: str) -> float:
     return value
 
 
+@checked
 def pose(
     machine: Machine | str | Path,
     pose_mm_deg: ArrayLike,
     *,
-    force_N: float = FORCE,
+    force_N: Force = FORCE,
 ) -> PoseStiffness:
     """Stiffness at a pose, or at many.
 
@@ -140,7 +142,7 @@ def pose(
     if not np.abs(poses).max(initial=0.0) <= FARTHEST:
         raise InputError(f"a pose of {np.abs(poses).max():g} mm or degrees", expected=f"numbers within +-{FARTHEST:g}")
     model = on.running()
-    force = positive("force", force_N, "N", STRONGEST_N)
+    force = force_N
     found = evaluate_poses(model, m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force)
     found = replace(found, pose_mm_deg=poses, single=single)
     if single and not found.reach.reachable[0]:
@@ -151,16 +153,25 @@ def pose(
     return found
 
 
+def _angles(text: str) -> tuple[float, ...]:
+    """`A,B,C` in degrees."""
+    angles = numbers(text)
+    if len(angles) != 3 or max(map(abs, angles)) > 180.0:
+        raise ValueError("A,B,C in degrees, within +-180")
+    return angles
+
+
+@checked
 def map_stiffness(
     machine: Machine | str | Path,
     *,
-    x_mm: tuple[float, float] = (-150.0, 150.0),
-    y_mm: tuple[float, float] = (-150.0, 150.0),
-    z_mm: float | Sequence[float] = 1200.0,
-    load: str = "radial",
-    tilt_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    points: int = 61,
-    force_N: float = FORCE,
+    x_mm: Annotated[tuple[float, float], Option("--x", "LO:HI", read=low_high)] = (-150.0, 150.0),
+    y_mm: Annotated[tuple[float, float], Option("--y", "LO:HI", read=low_high)] = (-150.0, 150.0),
+    z_mm: Annotated[float | Sequence[float], Option("--z", "MM", read=finite_number)] = 1200.0,
+    load: Annotated[str, Option("--load", "DIRECTION")] = "radial",
+    tilt_deg: Annotated[tuple[float, float, float], Option("--tilt", "A,B,C", read=_angles)] = (0.0, 0.0, 0.0),
+    points: Annotated[int, Option("--points", at_least=2, at_most=MOST_POINTS)] = 61,
+    force_N: Force = FORCE,
     progress: Progress | None = None,
 ) -> StiffnessMap:
     """Stiffness over one or several horizontal planes.
@@ -218,9 +229,9 @@ def map_stiffness(
         y,
         [m_from_mm(z) for z in heights],
         parse_load(load),
-        whole("points", points, 2, MOST_POINTS),
+        points,
         (a, b, c),
-        positive("force", force_N, "N", STRONGEST_N),
+        force_N,
         counter(progress, "map: poses"),
     )
     return replace(grid, inputs=on.inputs)

@@ -6,16 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from toolpath_stiff.api.inputs import LONGEST_STEP_MM, STRONGEST_N, Program, pose_si, positive, program_from
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Program, Step, origin_si, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
+from toolpath_stiff.options import Option, checked
 from toolpath_stiff.results import Progress, Result, counter
 from toolpath_stiff.units import (
-    Pose,
     m_from_mm,
     m_per_s_from_mm_per_min,
     n_per_m_from_n_per_mm,
@@ -28,21 +28,49 @@ if TYPE_CHECKING:
     from toolpath_stiff.analysis.program_check import ProgramCheck
     from toolpath_stiff.path import Samples
 
-FASTEST_STRUT_MM_PER_MIN = 1e6
-STIFFEST_N_PER_MM = 1e7
+RequiredStiffness = Annotated[
+    float | None,
+    Option(
+        "--require",
+        "N/mm",
+        above=0,
+        at_most=1e7,
+        help="Stiffness that every cutting move must have; those below are listed (exit code 3).",
+    ),
+]
+Partial = Annotated[
+    bool, Option("--partial", help="Keep the reachable samples of a program that leaves the workspace (exit code 1).")
+]
+Compared = Annotated[
+    Machine | str | Path | None, Option("--compare", "MACHINE", help="Another machine to analyze the program on.")
+]
+JOBS = Option(
+    "--jobs",
+    at_least=1,
+    help="Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each "
+    "available CPU.",
+)
+FORMAT = Option("--format", choices=("csv", "parquet"), help="Format of the samples.")
+SHOW_PLUNGES = Option(
+    "--show-plunges",
+    help="Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).",
+)
+Table = Annotated[str, FORMAT]
+ShowPlunges = Annotated[bool, SHOW_PLUNGES]
 
 
+@checked
 def analyze(
     machine: Machine | str | Path,
     program: Program | str | Path,
     *,
-    origin_mm_deg: Sequence[float] | None = None,
-    load: str = LOAD,
-    step_mm: float = 1.0,
-    force_N: float = FORCE,
-    partial: bool = False,
-    require_N_per_mm: float | None = None,
-    compare_with: Machine | str | Path | None = None,
+    origin_mm_deg: Origin = None,
+    load: LoadDirection = LOAD,
+    step_mm: Step = 1.0,
+    force_N: Force = FORCE,
+    partial: Partial = False,
+    require_N_per_mm: RequiredStiffness = None,
+    compare_with: Compared = None,
     progress: Progress | None = None,
 ) -> Analysis:
     r"""Stiffness along the path of a program.
@@ -120,15 +148,15 @@ def path_options(
 
     parse_load(load)
     options: dict[str, Any] = {
-        "origin": None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
+        "origin": origin_si(origin_mm_deg),
         "load": load,
-        "step": m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
-        "force": positive("force", force_N, "N", STRONGEST_N),
+        "step": m_from_mm(step_mm),
+        "force": force_N,
         "partial": partial,
     }
     required = None
     if require_N_per_mm is not None:
-        required = n_per_m_from_n_per_mm(positive("required", require_N_per_mm, "N/mm", STIFFEST_N_PER_MM))
+        required = n_per_m_from_n_per_mm(require_N_per_mm)
     return options, required
 
 
@@ -203,9 +231,8 @@ class SampledPath(Result):
         return write_atomically(file, self.csv())
 
 
-def sample_path(
-    program: Program | str | Path, *, origin_mm_deg: Sequence[float] | None = None, step_mm: float = 1.0
-) -> SampledPath:
+@checked
+def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, step_mm: Step = 1.0) -> SampledPath:
     r"""The tool's path, sampled along its true shape.
 
     Parameters
@@ -232,8 +259,8 @@ def sample_path(
     from toolpath_stiff.path import place, sample_moves
 
     part = program_from(program)
-    asked: Pose | None = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
-    step = m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM))
+    asked = origin_si(origin_mm_deg)
+    step = m_from_mm(step_mm)
     read = part.moves(asked)
     origin = asked or read.origin
     samples = sample_moves(place(read.moves, origin), step=step, origin=origin)
@@ -241,13 +268,14 @@ def sample_path(
     return SampledPath(read.name, samples, read.warnings, left)
 
 
+@checked
 def check(
     program: Program | str | Path,
     machine: Machine | str | Path | None = "nist",
     *,
-    origin_mm_deg: Sequence[float] | None = None,
-    step_mm: float = 1.0,
-    strut_speed_mm_per_min: float | None = None,
+    origin_mm_deg: Origin = None,
+    step_mm: Step = 1.0,
+    strut_speed_mm_per_min: Annotated[float | None, Option("--strut-speed", "mm/min", above=0, at_most=1e6)] = None,
 ) -> ProgramCheck:
     r"""What a program uses, what is not understood, extents and times; with a machine its reach and strut speeds.
 
@@ -284,15 +312,13 @@ def check(
         raise InputError(f"{both_names('--strut-speed')} without a machine", hint="name one with --machine")
     speed = None
     if strut_speed_mm_per_min is not None:
-        speed = m_per_s_from_mm_per_min(
-            positive("strut speed", strut_speed_mm_per_min, "mm/min", FASTEST_STRUT_MM_PER_MIN)
-        )
+        speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
     return check_program(
         part.lines,
         part.name,
         machine=None if on is None else on.model.machine,
-        origin=None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
-        step=m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
+        origin=origin_si(origin_mm_deg),
+        step=m_from_mm(step_mm),
         strut_speed=speed,
         controller=part.controller,
         **part.options,

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si, positive
+from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.case.contents import reading_arguments
@@ -39,10 +39,11 @@ from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import FileError, InputError, TpsError
 from toolpath_stiff.files import read_bytes, reason
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.options import arguments_of
 
 if TYPE_CHECKING:
     from toolpath_stiff.api.effects import EffectDraft
-    from toolpath_stiff.results import Progress
+from toolpath_stiff.results import Progress
 
 
 class Case(BlindExercise):
@@ -447,11 +448,11 @@ class Case(BlindExercise):
 
     def require(self, stiffness_N_per_mm: float) -> None:
         """Ask a stiffness of every cut; 0: none."""
-        from toolpath_stiff.api.programs import STIFFEST_N_PER_MM
+        from toolpath_stiff.api.programs import analyze
 
         asked = finite("required", stiffness_N_per_mm)
         if asked:
-            positive("required", asked, "N/mm", STIFFEST_N_PER_MM)
+            arguments_of(analyze)["require_N_per_mm"].check(asked)
         self.record(
             "require",
             f"{asked:g} N/mm required",

@@ -5,74 +5,51 @@
 
 from __future__ import annotations
 
-import argparse
 import difflib
 import importlib
 import os
-import re
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any, TextIO
 
-from toolpath_stiff.cli.arguments import read_folders, tell_incomplete, whole_options
+from toolpath_stiff.cli.outputs import read_folders, tell_incomplete
+from toolpath_stiff.cli.parser import Command
 from toolpath_stiff.defaults import THREADS, VERSION
-from toolpath_stiff.errors import FileError, TpsError, harmless
+from toolpath_stiff.errors import FileError, InputError, TpsError, harmless
 
-
-@dataclass(frozen=True)
-class Command:
-    """A command: its name, its line in the help, its group, whose module does the work."""
-
-    name: str
-    help: str
-    group: str
-
-    @property
-    def parts(self) -> tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]:
-        """What declares its arguments, what runs it and gives the exit code."""
-        module = importlib.import_module(f"toolpath_stiff.cli.{MODULES[self.group]}")
-        found: tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]
-        found = module.COMMANDS[self.name]
-        return found
-
-
-MODULES = {
-    "A program": "program",
-    "A machine": "machine",
-    "A placement": "program",
-    "Measurements": "measurements",
-    "Studio": "machine",
+# Module -> its commands, each with its line in the help.
+GROUPS = {
+    "program": {
+        "analyze": "stiffness along the path of NC programs: samples, summary, pictures, page",
+        "path": "the sampled path alone, without a machine",
+        "check": "what a program uses, what is not understood, extents, times, reach",
+    },
+    "machine": {
+        "pose": "stiffness, softest and stiffest direction, strut lengths at single poses",
+        "map": "stiffness over planes of the workspace: picture, table, 3-D page",
+        "machine": "list, show, check, make and import machine files",
+    },
+    "placement": {
+        "place": "where the work should sit: Pareto front and one recommended placement",
+        "case-study": "the paper's four regions: one path at two heights, displaced and turned",
+    },
+    "measurements": {
+        "reduce": "raw force and displacement records to measured stiffnesses, lost motion, loops",
+        "compare": "where the model fails: errors, structure in the residuals, pictures, page",
+        "diagnose": "which physical effect the model lacks, if any: verdict, candidates, confounding",
+        "update": "fit effects to measurements, see how far the error falls, write the machine file",
+        "plan": "what to measure next to tell explanations apart, or a first campaign",
+    },
+    "effects": {"effects": "physical effects that a machine can carry; write your own"},
+    "rig": {"rig": "blind exercises: measurements of a simulated machine that hides an effect"},
+    "studio": {"studio": "measure, see where the model fails, add what is missing: a case in the browser"},
 }
-
-
-COMMANDS = (
-    Command("analyze", "stiffness along the path of NC programs: samples, summary, pictures, page", "A program"),
-    Command("path", "the sampled path alone, without a machine", "A program"),
-    Command("check", "what a program uses, what is not understood, extents, times, reach", "A program"),
-    Command("pose", "stiffness, softest and stiffest direction, strut lengths at single poses", "A machine"),
-    Command("map", "stiffness over planes of the workspace: picture, table, 3-D page", "A machine"),
-    Command("machine", "list, show, check, make and import machine files", "A machine"),
-    Command("place", "where the work should sit: Pareto front and one recommended placement", "A placement"),
-    Command("case-study", "the paper's four regions: one path at two heights, displaced and turned", "A placement"),
-    Command("effects", "physical effects that a machine can carry; write your own", "A machine"),
-    Command("reduce", "raw force and displacement records to measured stiffnesses, lost motion, loops", "Measurements"),
-    Command("compare", "where the model fails: errors, structure in the residuals, pictures, page", "Measurements"),
-    Command(
-        "diagnose", "which physical effect the model lacks, if any: verdict, candidates, confounding", "Measurements"
-    ),
-    Command(
-        "update", "fit effects to measurements, see how far the error falls, write the machine file", "Measurements"
-    ),
-    Command("plan", "what to measure next to tell explanations apart, or a first campaign", "Measurements"),
-    Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements"),
-    Command("studio", "measure, see where the model fails, add what is missing: a case in the browser", "Studio"),
-)
+COMMANDS = {name: module for module, commands in GROUPS.items() for name in commands}
 
 DESCRIPTION = "Stiffness of a hexapod (Stewart-platform) mill along a real NC program."
 EPILOG = """\
@@ -85,44 +62,19 @@ examples:
 `tps COMMAND --help` describes a command. Lengths are in mm, angles in degrees, stiffnesses in N/mm.
 """
 
-# argparse takes "-10,0,800" or "-300:300" for an option; this matches every value that begins like a negative number.
-NEGATIVE_VALUE = re.compile(r"^-(\d|\.\d|inf|nan)")
+
+def help_text() -> str:
+    """The help of `tps` itself."""
+    lines = ["usage: tps [--version] COMMAND ...", "", DESCRIPTION, ""]
+    for group, commands in GROUPS.items():
+        lines += [f"{group}:", *(f"  {name:<11} {about}" for name, about in commands.items())]
+    return "\n".join([*lines, "", EPILOG])
 
 
-class Parser(argparse.ArgumentParser):
-    """An argument parser whose values may begin with a minus, and which suggests the nearest command."""
-
-    def __init__(self, *args: object, **kwargs: object) -> None:
-        super().__init__(*args, **kwargs)  # type: ignore[arg-type]
-        self._negative_number_matcher = NEGATIVE_VALUE
-
-
-def build_parser(chosen: str | None) -> argparse.ArgumentParser:
-    """The parser with the chosen command's arguments; the other commands have only their name."""
-    parser = Parser(
-        prog="tps",
-        description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        usage="tps [--version] COMMAND ...",
-        epilog=_command_list() + "\n" + EPILOG,
-    )
-    parser.add_argument("--version", action="version", version=f"tps {VERSION}")
-    commands = parser.add_subparsers(
-        dest="command", metavar="COMMAND", help=argparse.SUPPRESS, parser_class=Parser, prog="tps"
-    )
-    for command in COMMANDS:
-        sub = commands.add_parser(command.name, description=command.help)
-        if command.name == chosen:
-            command.parts[0](sub)
-    return parser
-
-
-def _command_list() -> str:
-    lines = []
-    for group in dict.fromkeys(command.group for command in COMMANDS):
-        lines.append(f"{group.lower()}:")
-        lines += [f"  {c.name:<11} {c.help}" for c in COMMANDS if c.group == group]
-    return "\n".join(lines) + "\n"
+def actions_of(name: str) -> dict[str, Command]:
+    """The command under "", or its actions."""
+    commands: dict[str, Command] = importlib.import_module(f"toolpath_stiff.cli.{COMMANDS[name]}").COMMANDS
+    return {title.removeprefix(name).strip(): commands[title] for title in commands if title.split()[0] == name}
 
 
 class Screen:
@@ -203,22 +155,40 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _ended(last_resort(error), 2)
 
 
-def _run(arguments: Sequence[str]) -> int:
-    """The command that the arguments name."""
-    chosen = next((word for word in arguments if not word.startswith("-")), None)
-    known = [command.name for command in COMMANDS]
-    if chosen is not None and chosen not in known:
-        near = difflib.get_close_matches(chosen, known, n=1)
-        hint = f"did you mean `tps {near[0]}`?" if near else f"expected one of {', '.join(known)}"
-        print(f"tps: error: unknown command {chosen!r}; {hint}", file=sys.stderr)
-        return 2
-    parser = build_parser(chosen)
-    args = parser.parse_args(whole_options(arguments))
-    if args.command is None:
-        parser.print_help()
-        return 2
+def _run(words: list[str]) -> int:
+    """The command that the words name."""
+    name = next((word for word in words if not word.startswith("-")), "")
+    if not name:
+        print(f"tps {VERSION}" if "--version" in words else help_text())
+        return 0 if words else 2
+    if name not in COMMANDS:
+        raise InputError(f"unknown command {name!r}", hint=_nearest(name, COMMANDS, "tps "))
+    words.remove(name)
+    actions, title = actions_of(name), f"tps {name}"
+    action = words[0] if words and "" not in actions else ""
+    if action not in actions:
+        if action in ("-h", "--help"):
+            print(actions_help(title, actions))
+            return 0
+        raise InputError(f"{title} {action}".strip(), hint=_nearest(action, actions, f"{title} "))
+    if action:
+        title = f"{title} {words.pop(0)}"
+    args = actions[action].read(title, words)
     tell_incomplete(read_folders(args))
-    return next(c for c in COMMANDS if c.name == args.command).parts[1](args)
+    return actions[action].run(args)
+
+
+def _nearest(word: str, known: Iterable[str], before: str) -> str:
+    """What may have been meant."""
+    near = difflib.get_close_matches(word, list(known), n=1)
+    return f"did you mean `{before}{near[0]}`?" if near else f"say one of {', '.join(known)}"
+
+
+def actions_help(title: str, actions: Mapping[str, Command]) -> str:
+    """The actions of a command, a line each, and its examples."""
+    module = importlib.import_module(next(iter(actions.values())).run.__module__)
+    about = [f"  {name:<14} {(command.run.__doc__ or '').partition(chr(10))[0]}" for name, command in actions.items()]
+    return "\n".join([f"usage: {title} ACTION ...", "", "actions:", *about, "", module.EXAMPLES])
 
 
 def _ended(error: str, code: int) -> int:

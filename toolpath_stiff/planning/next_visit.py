@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import FileError, InputError
 from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.planning.gaps import SETTLED, ReadingNoise, choose, further_minutes, pair_shares, why_of
@@ -29,7 +30,7 @@ from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.rivals import Forecast, principal
 from toolpath_stiff.planning.rows import POSE, plan_csv, plan_rows
 from toolpath_stiff.planning.visits import Costs, Menu, Visits, planned_readings
-from toolpath_stiff.readings.mapping import Mapped, mapped_table
+from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.rows import COLUMNS, Row, read_rows
 from toolpath_stiff.results import Result
 from toolpath_stiff.units import certain

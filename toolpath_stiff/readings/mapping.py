@@ -14,14 +14,12 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from toolpath_stiff.column_names import UNITS, heading_key, keys, parted, same_quantity, unit_of
+from toolpath_stiff.column_names import UNITS, Mapped, heading_key, keys, parted, same_quantity, unit_of
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.readings.dates import EXPECTED, is_date
 from toolpath_stiff.tables import Columns, Source, Table, read_table
 from toolpath_stiff.toml_reader import TomlReader
 from toolpath_stiff.workbooks import split_name
-
-Mapped = str | Mapping[str, str] | None  # as --columns has it, or column -> theirs
 
 EXAMPLE = "strut=hp, date=day_ms:ms, stiffness=stiff_mean:N/um"
 BESIDE = ".columns.toml"

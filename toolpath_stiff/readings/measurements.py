@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, TextArray
+from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.dates import day_of, days_since_first
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
-from toolpath_stiff.readings.mapping import Mapped, mapped_table
+from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measured_poses import pose_warnings
 from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices

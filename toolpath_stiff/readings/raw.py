@@ -12,12 +12,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError, TableError
 from toolpath_stiff.files import Content, read_bytes, write_atomically
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.history import HistoryDocument
 from toolpath_stiff.readings.loop_figures import NO_FIGURES, LoopFigures, in_tension, reduce_loops
-from toolpath_stiff.readings.mapping import DATE, Mapped, mapped_table
+from toolpath_stiff.readings.mapping import DATE, mapped_table
 from toolpath_stiff.readings.raw_history import remarks, standstills, struts_over_dates
 from toolpath_stiff.readings.raw_records import COLUMNS, Loop, is_table, read_raw, read_stiffnesses
 from toolpath_stiff.readings.raw_rows import loop_entry, measurement_csv
