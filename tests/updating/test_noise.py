@@ -257,12 +257,16 @@ def pairs_of(seed: int, points: int):
 
 @pytest.mark.parametrize("points", [4, 16])
 def test_how_far_repeats_tell_the_noise_is_what_is_said_of_it(points):
-    """The estimate's logarithm over 80 simulations: its mean is the true one, its sd what `freedom` claims."""
-    found = [from_repeats(pairs_of(seed, points)) for seed in range(80)]
+    """The estimate's logarithm over 240 simulations: its mean is the true one, its sd what `freedom` claims.
+
+    That sd is 0.99 (4 points) or 0.94 times what is claimed, 5 % of it the sampling error of 240; the mean is 3 % low.
+    """
+    count = 240
+    found = [from_repeats(pairs_of(seed, points)) for seed in range(count)]
     off = np.log([one.repeat / REPEAT for one in found])
     claimed = math.sqrt(np.mean([0.5 / one.freedom for one in found]))
     assert not any(one.clamps for one in found)
-    assert abs(off.mean()) < 3.0 * claimed / math.sqrt(80) + 0.03
+    assert abs(off.mean()) < 4.0 * claimed / math.sqrt(count) + 0.03
     assert 0.75 < off.std() / claimed < 1.25
 
 
