@@ -136,7 +136,10 @@ def test_a_reading_set_aside_is_as_if_it_had_never_been_taken():
         problem.projected(law),
         np.random.default_rng(1).multivariate_normal(np.zeros(N), spread, method="cholesky"),
     )
-    residual[9] += 0.12  # six standard deviations
+    # Half of the scatter that is reckoned with, so that no other stands out, and nine standard deviations: 7 at least
+    # of 500 draws.
+    residual = 0.5 * residual
+    residual[9] += 0.2
     found = set_wild_aside(projected.times(residual[None]), projected)
     out = found.pulls
     assert found.count[0] == 1 and np.flatnonzero(found.taken[0]).tolist() == [9]

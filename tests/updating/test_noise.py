@@ -144,7 +144,7 @@ def test_repeats_are_what_differs_in_nothing_but_time_and_clamping():
 
 
 def test_covariance_is_that_of_simulated_campaigns():
-    """The rig's campaigns with nothing hidden, 400 machines, against the assembled matrix: whitened they are unit."""
+    """The rig's campaigns with nothing hidden, 60 machines, against the assembled matrix: whitened they are unit."""
     nuisances = Nuisances(repeat=0.01, clamping=0.02, strut_spread=0.03, joint_error=1e-3, outliers=0.0)
     data = campaign(0, "paper", nuisances=nuisances)[0]
     predictor = Predictor(nist(), data)
@@ -157,14 +157,20 @@ def test_covariance_is_that_of_simulated_campaigns():
     # The sum of squares of count x 42 standard normal numbers, with room for what is not linear in the nuisances.
     low, high = chi2.ppf([1e-4, 1.0 - 1e-4], white.size) / white.size
     assert 0.98 * low < np.mean(white**2) < 1.02 * high
-    # No direction in reading space stands out: largest eigenvalue of a random matrix (Marchenko and Pastur 1967).
-    values = np.linalg.eigvalsh(white.T @ white / count)
-    assert values.max() < 1.25 * (1.0 + math.sqrt(white.shape[1] / count)) ** 2
-    # Each part is needed: without it something stands out far.
+    # No direction in reading space stands out: largest eigenvalue of a random matrix (Marchenko and Pastur 1967), with
+    # five of its standard deviations.
+    edge = 1.25 * (1.0 + math.sqrt(white.shape[1] / count)) ** 2
+
+    def farthest(rows):
+        return np.linalg.eigvalsh(rows.T @ rows / count).max()
+
+    assert farthest(white) < edge
+    # Each part is needed: without it a direction stands out, with at least 10 times the variance; estimated from 60 it
+    # is below 0.44 of that once in 10,000 times, and the edge is at 0.42.
     for without in ({"clamping": 0.0}, {"strut_spread": 0.0}, {"joint_error": 0.0}):
         parts = {"repeat": 0.01, "clamping": 0.02, "strut_spread": 0.03, "joint_error": 1e-3} | without
         bare = np.linalg.inv(np.linalg.cholesky(covariance(simple_noise(len(data), **parts), predictor).dense()))
-        assert np.mean((np.array(logs) @ bare.T) ** 2) > 1.2 * high
+        assert farthest(np.array(logs) @ bare.T) > edge
 
 
 def correlated(n: int = 30, outliers: float = 0.02) -> tuple[Scatter, np.ndarray, np.ndarray]:
@@ -251,12 +257,16 @@ def pairs_of(seed: int, points: int):
 
 @pytest.mark.parametrize("points", [4, 16])
 def test_how_far_repeats_tell_the_noise_is_what_is_said_of_it(points):
-    """The estimate's logarithm over 80 simulations: its mean is the true one, its sd what `freedom` claims."""
-    found = [from_repeats(pairs_of(seed, points)) for seed in range(80)]
+    """The estimate's logarithm over 240 simulations: its mean is the true one, its sd what `freedom` claims.
+
+    That sd is 0.99 (4 points) or 0.94 times what is claimed, 5 % of it the sampling error of 240; the mean is 3 % low.
+    """
+    count = 240
+    found = [from_repeats(pairs_of(seed, points)) for seed in range(count)]
     off = np.log([one.repeat / REPEAT for one in found])
     claimed = math.sqrt(np.mean([0.5 / one.freedom for one in found]))
     assert not any(one.clamps for one in found)
-    assert abs(off.mean()) < 3.0 * claimed / math.sqrt(80) + 0.03
+    assert abs(off.mean()) < 4.0 * claimed / math.sqrt(count) + 0.03
     assert 0.75 < off.std() / claimed < 1.25
 
 
