@@ -203,11 +203,11 @@ def test_command(tmp_path, monkeypatch, capsys):
     ("arguments", "words"),
     [
         (["--x", "300:-300"], "above the upper bound"),
-        (["--x", "nan"], "not a finite number"),
+        (["--x", "nan"], "expected finite numbers"),
         (["--keep-out", "vice:1,2,3"], "NAME:X0"),
         (["--keep-out", "vice:5,0,0,1,1,1"], "is not above"),
         (["--objective", "best"], "expected one of balanced"),
-        (["--objective", "min"], "called 'weakest' now"),
+        (["--objective", "min"], "range, weakest"),
         (["--margin", "60"], "expected 0 to less than 50"),
         (["--pick", "3"], "no earlier search"),
         (["--points", "1"], "2 to 1000"),
