@@ -1,1 +1,1 @@
-"""Machines of six struts: their files here; model, kinematics with symmetry, and limits in the modules beside."""
+"""Machines of six struts: files, model, kinematics with symmetry, limits."""

@@ -1,1 +1,1 @@
-"""Where the work should sit: search or an earlier search's front, one placement chosen, analyzed, all said about it."""
+"""Where the work should sit: the search, the front, the placement chosen and what is said about it."""

@@ -1,1 +1,1 @@
-"""Pictures, pages and tables; here how figures are written for people: alike on terminal, pictures and pages."""
+"""Pictures, pages and tables of results, alike on terminal, pictures and pages."""

@@ -1,1 +1,1 @@
-"""Blind simulator of a measuring campaign on a machine that hides something; here a blind exercise as a folder."""
+"""Blind simulator of a measuring campaign on a machine that hides something; shares nothing with the stack."""
