@@ -18,7 +18,7 @@ from pathlib import Path
 import toolpath_stiff as tps
 machine = tps.Machine.load("nist")
 for file in sorted(Path("programs").iterdir()):
-    tps.analyze(machine, tps.Program.read(file)).save(Path("alone", file.stem), plots=False)
+    tps.analyze(tps.Program.read(file), machine).save(Path("alone", file.stem), plots=False)
 """
 
 
