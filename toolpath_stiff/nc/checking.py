@@ -22,13 +22,13 @@ from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
 from toolpath_stiff.nc.reader import (
     INTERPRETERS,
     feed_assumption,
     foreign_program,
-    lathe_warning,
     millimetre_warning,
     parse_program,
     refused_program,
