@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from toolpath_stiff.api.inputs import Origin, Program, origin_si, origin_word, program_from
+from toolpath_stiff.api.inputs import Origin, origin_si, origin_word
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, options
+from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, numbers
 from toolpath_stiff.results import Progress, teller
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.comparison.compare import Comparison
     from toolpath_stiff.diagnosis.result import Diagnosis
     from toolpath_stiff.machine.model import Machine as MachineModel
-    from toolpath_stiff.nc.moves import Program as NcProgram
+    from toolpath_stiff.nc.moves import ReadProgram
     from toolpath_stiff.readings.measurements import Measurements as Readings
 
 
@@ -358,7 +359,7 @@ def diagnose(
     )
 
 
-def _case_study() -> NcProgram:
+def _case_study() -> ReadProgram:
     """The packaged case study, loaded only where the choice between explanations is worked out on it."""
     from toolpath_stiff.placement.case_study import case_study_program
 

@@ -46,7 +46,7 @@ from toolpath_stiff.stiffness.model import build_model, setup_of
 
 if TYPE_CHECKING:
     from toolpath_stiff.comparison.loop_readings import LoopsDocument
-    from toolpath_stiff.nc.moves import Program
+    from toolpath_stiff.nc.moves import ReadProgram
     from toolpath_stiff.units import Pose
 
 
@@ -63,7 +63,7 @@ def diagnose(
     effect_files: Sequence[str | Path] = (),
     seed: int = 0,
     plan_next: bool = True,
-    program: Program | Callable[[], Program] | None = None,
+    program: ReadProgram | Callable[[], ReadProgram] | None = None,
     origin: Pose | None = None,
     setup: str | None = None,
     temperature: float | None = None,
@@ -324,7 +324,7 @@ def next_measurements(
 
 
 def choice_on_path(
-    diagnosis: Diagnosis, program: Program, origin: Pose | None = None, given: Conditions | None = None
+    diagnosis: Diagnosis, program: ReadProgram, origin: Pose | None = None, given: Conditions | None = None
 ) -> dict[str, Any]:
     """Mean, range and minimum along a program under each plausible explanation: how much the choice matters.
 

@@ -16,7 +16,7 @@ from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
 from toolpath_stiff.placement.paths import work_path
@@ -139,7 +139,7 @@ def _placed(
     )
 
 
-def _analyzed(task: Task, program: Program, at: Pose) -> tuple[Analysis | None, str]:
+def _analyzed(task: Task, program: ReadProgram, at: Pose) -> tuple[Analysis | None, str]:
     """The program at a placement, or None and why."""
     try:
         return analyze(task.model, program, origin=at, load=task.load, step=task.step, force=task.force), ""
@@ -147,7 +147,7 @@ def _analyzed(task: Task, program: Program, at: Pose) -> tuple[Analysis | None, 
         return None, str(error)
 
 
-def _rewritten(task: Task, program: Program, best: Analysis) -> tuple[bytes | None, dict[str, Any] | None]:
+def _rewritten(task: Task, program: ReadProgram, best: Analysis) -> tuple[bytes | None, dict[str, Any] | None]:
     """The transformed program's bytes, and what `placement.json` says of it; None, None unless asked for."""
     writing = task.rewriting
     if writing is None:
@@ -164,7 +164,7 @@ def _rewritten(task: Task, program: Program, best: Analysis) -> tuple[bytes | No
     }
 
 
-def _written_there(task: Task, writing: Rewriting, program: Program, best: Analysis) -> Rewritten:
+def _written_there(task: Task, writing: Rewriting, program: ReadProgram, best: Analysis) -> Rewritten:
     return rewrite_program(
         program,
         best.origin,
@@ -175,7 +175,7 @@ def _written_there(task: Task, writing: Rewriting, program: Program, best: Analy
     )
 
 
-def _linearised_words(task: Task, writing: Rewriting, program: Program, best: Analysis) -> str:
+def _linearised_words(task: Task, writing: Rewriting, program: ReadProgram, best: Analysis) -> str:
     """What a refused program would be with chords; nothing where these were asked for or do not help."""
     if writing.linearise is not None:
         return ""

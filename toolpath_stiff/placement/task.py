@@ -9,7 +9,7 @@ from typing import Any
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.writer import machine_toml
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.climb import Bounds
 from toolpath_stiff.placement.paths import Read
 from toolpath_stiff.placement.search import SearchRules
@@ -49,7 +49,7 @@ class Task:
     """
 
     model: StiffnessModel
-    program: Program
+    program: ReadProgram
     present: Pose
     read: Read
     bounds: Bounds
