@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolpath_stiff.comparison.loop_readings import BesideTip, beside_tip
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.diagnosis.result import NAMING, Diagnosis
 from toolpath_stiff.errors import InputError, TpsError
@@ -45,7 +46,6 @@ from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
 if TYPE_CHECKING:
-    from toolpath_stiff.comparison.loop_readings import LoopsDocument
     from toolpath_stiff.nc.moves import Program
     from toolpath_stiff.units import Pose
 
@@ -214,17 +214,15 @@ def _all_fits(main: Judgement) -> dict[str, Fit]:
     return fits
 
 
-def _loops(main: Judgement, fits: dict[str, Fit]) -> LoopsDocument:
+def _loops(main: Judgement, fits: dict[str, Fit]) -> BesideTip:
     """Readings of loops beside the tip against the likeliest explanation."""
     problem = main.problem
     if problem.predictor.data.beside is None:
-        return {"by_loop": [], "readings": []}
-    from toolpath_stiff.comparison.loop_readings import loops_document
-
+        return BesideTip()
     likeliest = max(main.probability, key=lambda name: main.probability[name], default=NONE)
     fit = fits.get(likeliest)
     residual = main.base.residual if fit is None else fit.residual
-    return loops_document(problem.predictor.data, problem.observed - residual, problem.scatter.covariance)
+    return beside_tip(problem.predictor.data, problem.observed - residual, problem.scatter.covariance)
 
 
 def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:

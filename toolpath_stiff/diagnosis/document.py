@@ -20,7 +20,7 @@ from toolpath_stiff.diagnosis.words import (
     why,
     would_tell,
 )
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.confounding import CONFOUNDED
@@ -91,7 +91,7 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "effects": diagnosis.predictor.effects_that_act,
         "data": list(diagnosis.names),
         "readings": len(diagnosis.data),
-        "loops": certain(diagnosis.loops),
+        "loops": certain(to_dict(diagnosis.loops)),
         "command": diagnosis.line,
     }
 

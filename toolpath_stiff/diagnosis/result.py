@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.comparison.loop_readings import BesideTip
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.confounding import Confounding
@@ -30,8 +31,6 @@ from toolpath_stiff.stiffness.contract import Effect
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
-
-    from toolpath_stiff.comparison.loop_readings import LoopsDocument
 
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
@@ -112,7 +111,7 @@ class Diagnosis(FolderResult):
     unexcluded: tuple[Unexcluded, ...] = ()
     suspects: tuple[SuspectEntry, ...] = ()
     slips: tuple[SlipSize, ...] = ()
-    loops: LoopsDocument = field(default_factory=lambda: cast("LoopsDocument", {"by_loop": [], "readings": []}))
+    loops: BesideTip = field(default_factory=BesideTip)
     inputs: tuple[str, ...] = ()
 
     @cached_property

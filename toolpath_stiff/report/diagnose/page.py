@@ -9,6 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.comparison.loop_readings import BesideTip
 from toolpath_stiff.documents import Document
 from toolpath_stiff.files import Content
 from toolpath_stiff.inference.errors import deviation_percent
@@ -101,7 +102,7 @@ def diagnose_html(document: Document, pictures: Mapping[str, bytes]) -> str:
         picture("before_after.png", pictures, QUESTIONS),
         picture("confounding.png", pictures, QUESTIONS),
         picture("detectable.png", pictures, QUESTIONS),
-        *loops_section(document["loops"]),
+        *loops_section(BesideTip.read(document["loops"])),
         section("What to measure or do next", _next(document)),
         section("What these data cannot test", _cannot_test(document)),
         section("How much the choice matters on the tool path", _path(document)),
