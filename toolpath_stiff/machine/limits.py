@@ -354,15 +354,15 @@ class Extremes:
 
 def gauge_of(machine: Machine) -> Gauge:
     """The gauge of a machine, made once."""
-    if "gauge" not in machine.derived:
-        limits = machine_limits(machine)
-        kinds = [(limit.quantity, limit.lower) for limit in limits]
-        distinct = tuple(
-            (limits[kinds.index(kind)], np.flatnonzero([kind == other for other in kinds]))
-            for kind in dict.fromkeys(kinds)
-        )
-        neutral = solve_struts_at(machine, machine.limits.neutral_pose)
-        determinant = float(np.abs(np.linalg.det(neutral.jacobian[0])))
-        machine.derived["gauge"] = Gauge(machine, limits, distinct, neutral_axes(machine), determinant)
-    gauge: Gauge = machine.derived["gauge"]
-    return gauge
+    return machine.once("gauge", lambda: _gauge(machine))
+
+
+def _gauge(machine: Machine) -> Gauge:
+    limits = machine_limits(machine)
+    kinds = [(limit.quantity, limit.lower) for limit in limits]
+    distinct = tuple(
+        (limits[kinds.index(kind)], np.flatnonzero([kind == other for other in kinds])) for kind in dict.fromkeys(kinds)
+    )
+    neutral = solve_struts_at(machine, machine.limits.neutral_pose)
+    determinant = float(np.abs(np.linalg.det(neutral.jacobian[0])))
+    return Gauge(machine, limits, distinct, neutral_axes(machine), determinant)

@@ -8,10 +8,9 @@ shows, so that the one is known better once the other is.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from toolpath_stiff.errors import EffectError, InputError, MachineFileError
 from toolpath_stiff.toml_reader import TomlReader
 from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
 
+Derived = TypeVar("Derived")
 ORIGINS = ("published", "recovered", "assumed", "fitted")
 
 UNCERTAINTY_KEYS = ("parameters", "sd", "correlation")
@@ -266,10 +266,13 @@ class Machine:
     instruments: tuple[EffectEntry, ...] = ()
     uncertainty: Uncertainty | None = None
 
-    @cached_property
-    def derived(self) -> dict[Any, Any]:
-        """What other modules computed of this machine, once; a machine never changes, `with_changes` makes another."""
-        return {}
+    def once(self, key: object, make: Callable[[], Derived]) -> Derived:
+        """What `make` computes of this machine, computed once: it never changes, `with_changes` makes another."""
+        known: dict[object, Any] = self.__dict__.setdefault("_derived", {})
+        if key not in known:
+            known[key] = make()
+        derived: Derived = known[key]
+        return derived
 
     def platform_joints_for(self, tool_length: float) -> FloatArray:
         """(6, 3) m, platform joints relative to the tip of a tool of that length; nan: the reference tool.

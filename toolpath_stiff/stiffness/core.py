@@ -117,7 +117,7 @@ def _fast(
 ) -> FloatArray:
     """Closed form or compiled loops for one tool length; doubtful poses go to the exact route."""
     kernel = closed_form.prepare(model.machine, tool_length)
-    if route == "compiled" and kernel.table is None:
+    if route == "compiled" and not kernel.law.shape:
         from toolpath_stiff.stiffness import compiled
 
         compliance, good = compiled.tip_compliance(kernel, position, rotation)
@@ -145,7 +145,7 @@ def compliance_along_columns(
     one of the fast routes. Where a pose is not good the exact route must be asked.
     """
     kernel = closed_form.prepare(machine, tool_length)
-    if route == "compiled" and kernel.table is None:
+    if route == "compiled" and not kernel.law.shape:
         from toolpath_stiff.stiffness import compiled
 
         return compiled.compliance_along_columns(kernel, position, direction, rotation)
@@ -172,10 +172,7 @@ def compliance_with_effects(
     kernel, n = closed_form.prepare(model.machine, tool_length), position.shape[1]
     sure = np.ones(n, dtype=bool)
     if model.control is not None:
-        order = list(kernel.order)
-        platform = np.ascontiguousarray(model.control.platform_joints_for(tool_length)[order].T)
-        frame = np.ascontiguousarray(model.control.frame_joints[order].T)
-        control = replace(kernel, frame=frame, platform=platform)
+        control = kernel.on_joints_of(model.control, tool_length)
         position, rotation, sure = closed_form.followed_columns(kernel, control, position, rotation)
     if not any(map(_gives_way, acting_effects(model))):
         found, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
