@@ -35,6 +35,7 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.results import FolderResult
+from toolpath_stiff.units import certain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -219,7 +220,7 @@ def compare(
         tuple(residuals.numbers),
         tuple(residuals.names),
         load_path_shares(residuals.predictor.base, data),
-        summary_of(residuals, answers, cannot, beside, seed, following),
+        certain(summary_of(residuals, answers, cannot, beside, seed, following)),
     )
 
 

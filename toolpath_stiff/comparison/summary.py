@@ -28,7 +28,7 @@ from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.inference.question import question
 from toolpath_stiff.inference.slips import SuspectEntry, suspect_entries, suspect_rows
 from toolpath_stiff.readings.history import StrutHistory
-from toolpath_stiff.units import certain, mm_from_m, n_per_um_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 HINTS = 3  # patterns named where none stands out
 
@@ -225,7 +225,7 @@ def summary_of(
     seed: int,
     following: list[str],
 ) -> ComparisonSummary:
-    """The content of compare.json.
+    """The content of compare.json, its figures not rounded yet.
 
     Parameters
     ----------
@@ -262,41 +262,38 @@ def summary_of(
     doubts += [suspect["words"] for suspect in suspects]
     text = [asked, overall_text(baseline, noises, pattern=bool(findings))]
     text += [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in doubts]
-    summary: ComparisonSummary = certain(
-        ComparisonSummary(
-            machine=residuals.predictor.machine.name,
-            effects=residuals.predictor.effects_that_act,
-            data=list(dict.fromkeys(data.file.tolist())),
-            readings=len(data),
-            seed=seed,
-            baseline=baseline,
-            by_direction=by(along),
-            by_plane={
-                name: PlaneErrors(**vars(errors), z_mm=heights[name])
-                for name, errors in sorted(by(where).items(), key=lambda plane: heights[plane[0]])
-            },
-            by_setup=by(data.setup),
-            by_plane_and_direction=by(np.array([f"{p} / {d}" for p, d in zip(where, along, strict=True)])),
-            findings=findings,
-            by_noise=by_noise,
-            tests=tests,
-            outliers=_far_readings(residuals, last),
-            loops=beside[0],
-            history=beside[1],
-            model_free=ModelFree(_checks(answers), cannot),
-            noise=noises,
-            not_tested=[*(f"no column {name}" for name in data.missing), *residuals.notes],
-            assumptions=_assumptions([one.noise for one in answers]),
-            warnings=list(data.warnings),
-            notes=[*data.notes, *doubts],
-            suspect_rows=suspects,
-            hints=[] if findings else _hints(last, tests, values),
-            text=" ".join(filter(None, text)),
-            question=asked,
-            next=following,
-        )
+    return ComparisonSummary(
+        machine=residuals.predictor.machine.name,
+        effects=residuals.predictor.effects_that_act,
+        data=list(dict.fromkeys(data.file.tolist())),
+        readings=len(data),
+        seed=seed,
+        baseline=baseline,
+        by_direction=by(along),
+        by_plane={
+            name: PlaneErrors(**vars(errors), z_mm=heights[name])
+            for name, errors in sorted(by(where).items(), key=lambda plane: heights[plane[0]])
+        },
+        by_setup=by(data.setup),
+        by_plane_and_direction=by(np.array([f"{p} / {d}" for p, d in zip(where, along, strict=True)])),
+        findings=findings,
+        by_noise=by_noise,
+        tests=tests,
+        outliers=_far_readings(residuals, last),
+        loops=beside[0],
+        history=beside[1],
+        model_free=ModelFree(_checks(answers), cannot),
+        noise=noises,
+        not_tested=[*(f"no column {name}" for name in data.missing), *residuals.notes],
+        assumptions=_assumptions([one.noise for one in answers]),
+        warnings=list(data.warnings),
+        notes=[*data.notes, *doubts],
+        suspect_rows=suspects,
+        hints=[] if findings else _hints(last, tests, values),
+        text=" ".join(filter(None, text)),
+        question=asked,
+        next=following,
     )
-    return summary
 
 
 def _errors(values: FloatArray, answers: Sequence[Answer], rows: BoolArray) -> GroupErrors:
