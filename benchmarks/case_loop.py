@@ -5,15 +5,17 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import tempfile
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 
+from benchmarks.bars import Figure, Record, bars_table, summary
 from benchmarks.pages import write_page
 
-Record = dict[str, Any]
 Collect = Callable[[str, Callable[[Any], Record], Sequence[Any]], list[Record]]
 
 
@@ -66,6 +68,15 @@ def _command(parser: argparse.ArgumentParser, args: argparse.Namespace) -> str:
     return " ".join(words)
 
 
+def record_of(heading: Record, work: Callable[[Path], Record]) -> Record:
+    """The heading of a case and what work in a folder of its own says; with `error`, the traceback, where it failed."""
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            return heading | work(Path(folder))
+    except Exception:  # a case that breaks must be counted, not end the run
+        return heading | {"error": traceback.format_exc()}
+
+
 def run_cases(args: argparse.Namespace, name: str, run: Callable[[Any], Record], jobs: Sequence[Any]) -> list[Record]:
     """The records of all cases, in as many processes as the options say."""
     with case_loop(args.jobs, args.records) as collect:
@@ -98,11 +109,25 @@ def case_loop(workers: int, into: Path) -> Iterator[Collect]:
             yield lambda name, run, jobs: collect(name, pool.imap_unordered(run, jobs, chunksize=1), len(jobs))
 
 
+def sound(records: Sequence[Record], order: Callable[[Record], Any]) -> list[Record]:
+    """The records of cases that did not break, in order."""
+    return sorted((r for r in records if "error" not in r), key=order)
+
+
 def document(
-    title: str, what: str, parts: Sequence[tuple[str, Sequence[str]]], broken: Sequence[Record], command: str
-) -> str:
-    """A page in markdown: parts under their headings, after the first the cases that broke, and the command."""
-    shown = list(parts)
+    title: str,
+    what: str,
+    figures: Sequence[Figure],
+    parts: Sequence[tuple[str, Sequence[str]]],
+    records: Sequence[Record],
+    command: str,
+) -> tuple[str, bool]:
+    """A page in markdown, and whether all bars are cleared and no case broke.
+
+    What fails in a sentence, the cases that broke, the bars, parts under their headings, and the command.
+    """
+    broken = [r for r in records if "error" in r]
+    shown = [("", [summary(figures)]), ("Bars", bars_table(figures)), *parts]
     if broken:
         rows = [
             f"- {' '.join(str(r[key]) for key in ('layout', 'group', 'hidden', 'seed') if key in r)}: "
@@ -113,7 +138,8 @@ def document(
     lines = [f"# {title}", "", what, ""]
     for heading, body in shown:
         lines += [*([f"## {heading}", ""] if heading else []), *body, ""]
-    return "\n".join([*lines, f"Made by `{command}`."]) + "\n"
+    text = "\n".join([*lines, f"Made by `{command}`."]) + "\n"
+    return text, not broken and all(figure.cleared is not False for figure in figures)
 
 
 def read_records(file: Path) -> list[Record]:

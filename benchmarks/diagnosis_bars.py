@@ -1,142 +1,34 @@
-"""Figures of the diagnosis benchmark: shares with Wilson intervals, means, medians, each against its bar."""
+"""Figures of the diagnosis benchmark, each against its bar."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from statistics import NormalDist, fmean, median, stdev
-from typing import Any
 
-Record = dict[str, Any]
+from benchmarks.bars import (
+    JUST_SEEN,
+    Figure,
+    Record,
+    holds_truth,
+    mean,
+    middle_of,
+    misnamed,
+    named,
+    share,
+    truth_of,
+)  # fmt: skip
 
-NORMAL_95 = NormalDist().inv_cdf(0.975)
 # Repeat noise and clamping of the rig's cases, as one reading's standard deviation, percent; times the mean absolute
 # value of a standard normal, sqrt(2 / pi) = 0.80: the mean error that scatter alone leaves.
 SCATTER_PERCENT = math.hypot(2.0, 1.0)
 FLOOR_PERCENT = 0.80 * SCATTER_PERCENT
 FLOOR_RATIO = 1.3
-# Detectability of the smallest effects that the rig draws (`toolpath_stiff.rig.effects.DETECTABLE`); one whose largest
-# size of 30 % stays below cannot be seen in the layout.
-JUST_SEEN = 3.9
-
-
-def wilson(count: int, of: int) -> tuple[float, float]:
-    """95 % interval of a share.
-
-    Score interval without continuity correction (Wilson 1927, Journal of the American Statistical Association 22, 209).
-    """
-    if of < 1:
-        return 0.0, 1.0
-    share, squared = count / of, NORMAL_95**2
-    middle = (share + squared / (2 * of)) / (1.0 + squared / of)
-    reach = NORMAL_95 / (1.0 + squared / of) * math.sqrt(share * (1.0 - share) / of + squared / (4 * of**2))
-    # At a share of 0 or 1 the end is exact; rounding must not leave it a hair off.
-    return (0.0 if count == 0 else middle - reach), (1.0 if count == of else middle + reach)
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One line of the table of bars.
-
-    Attributes
-    ----------
-    layout, what
-        Of which cases, and what was counted.
-    value, interval
-        As text.
-    bar
-        As text; "" where the issue sets none.
-    cleared
-        None where there is no bar.
-    """
-
-    layout: str
-    what: str
-    value: str
-    interval: str
-    bar: str
-    cleared: bool | None
-
-    @property
-    def line(self) -> str:
-        """A row of markdown."""
-        verdict = {None: "", True: "pass", False: "**FAIL**"}[self.cleared]
-        return f"| {self.layout} | {self.what} | {self.value} | {self.interval} | {self.bar} | {verdict} |"
-
-
-def share(
-    layout: str, what: str, hits: Sequence[bool], at_least: float | None = None, at_most: float | None = None
-) -> Figure:
-    """A share of cases; cleared by the figure itself, not by an end of its interval."""
-    count, of = sum(hits), len(hits)
-    low, high = wilson(count, of)
-    bars = [f"at least {100 * at_least:g} %"] if at_least is not None else []
-    bars += [f"at most {100 * at_most:g} %"] if at_most is not None else []
-    if at_least is not None and at_most is not None:
-        bars = [f"{100 * at_least:g} to {100 * at_most:g} %"]
-    cleared = None
-    if bars and of:
-        value = count / of
-        cleared = (at_least is None or value >= at_least) and (at_most is None or value <= at_most)
-    figure = f"{100 * count / of:.1f} % ({count} of {of})" if of else "no cases"
-    return Figure(layout, what, figure, f"{100 * low:.1f} to {100 * high:.1f} %", bars[0] if bars else "", cleared)
-
-
-def mean(layout: str, what: str, values: Sequence[float], at_most: float | None = None) -> Figure:
-    """A mean with its normal 95 % interval."""
-    if not values:
-        return Figure(layout, what, "no cases", "", "" if at_most is None else f"at most {at_most:g}", None)
-    middle = fmean(values)
-    reach = NORMAL_95 * stdev(values) / math.sqrt(len(values)) if len(values) > 1 else math.inf
-    bar = "" if at_most is None else f"at most {at_most:g}"
-    cleared = None if at_most is None else middle <= at_most
-    return Figure(layout, what, f"{middle:.2f}", f"{middle - reach:.2f} to {middle + reach:.2f}", bar, cleared)
-
-
-def middle_of(layout: str, what: str, values: Sequence[float], at_most: float | None = None, unit: str = "") -> Figure:
-    """A median with the 95 % interval between order statistics (normal approximation of the sign test)."""
-    if not values:
-        return Figure(layout, what, "no cases", "", "" if at_most is None else f"at most {at_most:g}", None)
-    ordered, n = sorted(values), len(values)
-    reach = NORMAL_95 * math.sqrt(n) / 2.0
-    low, high = max(math.floor(n / 2 - reach), 0), min(math.ceil(n / 2 + reach), n - 1)
-    value = median(ordered)
-    bar = "" if at_most is None else f"at most {at_most:g}{unit}"
-    cleared = None if at_most is None else value <= at_most
-    return Figure(layout, what, f"{value:.2f}{unit}", f"{ordered[low]:.2f} to {ordered[high]:.2f}{unit}", bar, cleared)
-
-
-# -- of one record -----------------------------------------------------------------------------------------------------
-
-
-def truth_of(record: Record) -> str:
-    """The one hidden effect."""
-    return str(record["truth"][0])
-
-
-def holds_truth(record: Record) -> bool:
-    """Whether all that was hidden is in `plausible`; `none` where nothing was."""
-    return set(record["truth"] or ["none"]) <= set(record["plausible"])
-
-
-def named(record: Record) -> bool:
-    """`identified`, and exactly what was hidden."""
-    return record["verdict"] == "identified" and set(record["plausible"]) == set(record["truth"])
-
-
-def misnamed(record: Record) -> bool:
-    """`identified`, and not exactly what was hidden: also where a second effect is named beside the right one."""
-    return record["verdict"] == "identified" and not named(record)
 
 
 def floor_ratio(record: Record) -> float:
     """Held-out mean error of the right effect over what scatter alone leaves."""
     held = record.get("held_out_percent")
     return math.inf if held is None else held / FLOOR_PERCENT
-
-
-# -- bars --------------------------------------------------------------------------------------------------------------
 
 
 def figures(records: Sequence[Record]) -> list[Figure]:

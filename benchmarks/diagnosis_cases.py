@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
-import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -13,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.bars import Record
+from benchmarks.case_loop import record_of
 from toolpath_stiff.diagnosis.diagnose import Diagnosis, diagnose
 from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.documents import Document
@@ -85,11 +85,8 @@ def make_jobs(
 
 def run(job: Job) -> dict[str, Any]:
     """The record of a case; with `error`, the traceback, where it failed."""
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            return _planned(job, Path(folder)) if job.plan else _diagnosed(job, Path(folder))
-    except Exception:  # a case that breaks must be counted, not end the run
-        return _heading(job) | {"error": traceback.format_exc()}
+    work = _planned if job.plan else _diagnosed
+    return record_of(_heading(job), lambda folder: work(job, folder))
 
 
 @cache
@@ -108,7 +105,7 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     rows, truth = case_module.make_case(job.seed, job.layout, hidden=job.hidden)
     if job.factor != 1.0:
         rows["sd_N_per_mm"] = rows["sd_N_per_mm"] * job.factor
-    return _heading(job) | judged(rows, truth, folder)[0]
+    return judged(rows, truth, folder)[0]
 
 
 def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: Any) -> tuple[dict[str, Any], Document]:
@@ -174,9 +171,6 @@ def interval_checks(fitted: dict[str, Any], true: dict[str, Any]) -> list[dict[s
     return checks
 
 
-# -- planned poses -----------------------------------------------------------------------------------------------------
-
-
 def _planned(job: Job, folder: Path) -> dict[str, Any]:
     """An ambiguous case: plan, measure the same hidden machine, diagnose all data; the same with random poses."""
     case = case_module.draw_case(job.seed, job.layout, hidden=job.hidden)
@@ -184,7 +178,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
     file.write_text(exercise.csv_text(case.rows), encoding="utf-8")
     before = diagnose(machine(), read_measurements(file, machine()), plan_next=False)
     truth = case.truth["hidden"][0]
-    record = _heading(job) | {"truth": [truth], "effects": case.truth["effects"], "plausible": list(before.plausible)}
+    record: Record = {"truth": [truth], "effects": case.truth["effects"], "plausible": list(before.plausible)}
     plans = {n: _plan(before, n) for n in POSES}
     plan = plans[POSES[-1]]
     if plan is None:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.pages import write_page
+from benchmarks.pages import bar, write_page
 from benchmarks.processes import describe_machine, whole_command
 from toolpath_stiff.rig import case, exercise
 
@@ -71,7 +71,7 @@ def row(one: Run, first: Run) -> tuple[str, bool]:
         (one.megabytes <= MEGABYTES.get(one.readings, math.inf), f"{MEGABYTES.get(one.readings, math.inf):g} MB"),
         (one is first or exponent <= EXPONENT, f"n^{EXPONENT:g}"),
     ]
-    said = [f"{text}{'' if cleared else ': NOT CLEARED'}" for cleared, text in checks if not text.startswith("inf")]
+    said = [bar(cleared, text) for cleared, text in checks if not text.startswith("inf")]
     growth = "" if one is first else f"{exponent:.2f}"
     figures = f"{one.seconds:.1f} | {ratio:.1f} | {growth} | {one.megabytes:.0f}"
     line = f"| {one.command} | {one.readings:,} | {figures} | {', '.join(said)} |"

@@ -3,39 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
-from benchmarks.diagnosis_bars import (
-    Figure,
-    Record,
-    holds_truth,
-    mean,
-    misnamed,
-    named,
-    share,
-    truth_of,
-    wilson,
-)
+from benchmarks.bars import Record, bars_table, holds_truth, mean, misnamed, named, share, truth_of, wilson
+from benchmarks.pages import table
 
 VERDICTS = ("adequate", "identified", "described", "ambiguous", "unexplained")
 PROBABILITIES = (0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98, 1.0 + 1e-9)
 DETECTABILITIES = (0.0, 4.5, 6.0, 9.0, 15.0, 30.0, float("inf"))
-BAR_HEADING = ["| layout | figure | value | 95 % interval | bar | |", "| --- | --- | --- | --- | --- | --- |"]
-
-
-def bars_table(found: Sequence[Figure]) -> list[str]:
-    """The table of figures with their bars."""
-    return [*BAR_HEADING, *(figure.line for figure in found)]
-
-
-def summary(found: Sequence[Figure]) -> str:
-    """What fails, in a sentence."""
-    failed = [f"{figure.layout}: {figure.what}, {figure.value}" for figure in found if figure.cleared is False]
-    count = sum(figure.cleared is not None for figure in found)
-    if not failed:
-        return f"All {count} bars are cleared."
-    return f"{len(failed)} of {count} bars are not cleared. " + "; ".join(failed) + "."
 
 
 def _ratio(count: int, of: int) -> str:
@@ -45,61 +21,53 @@ def _ratio(count: int, of: int) -> str:
 
 def verdicts_table(records: Sequence[Record]) -> list[str]:
     """Verdicts by what was hidden."""
-    lines = ["| layout | hidden | cases | " + " | ".join(VERDICTS) + " |"]
-    lines.append("| --- | --- " + "| ---: " * (1 + len(VERDICTS)) + "|")
+    rows = []
     for layout in ("tilted", "paper"):
         for group in ("none", "one", "two", "outside"):
             mine = [r["verdict"] for r in records if (r["layout"], r["group"]) == (layout, group)]
             if mine:
-                counts = " | ".join(str(Counter(mine)[verdict]) for verdict in VERDICTS)
-                lines.append(f"| {layout} | {group} | {len(mine)} | {counts} |")
-    return lines
+                rows.append((layout, group, len(mine), *(Counter(mine)[verdict] for verdict in VERDICTS)))
+    return table(f"layout | hidden | cases: | {' | '.join(f'{verdict}:' for verdict in VERDICTS)}", rows)
 
 
 def effects_table(records: Sequence[Record], layout: str) -> list[str]:
     """How each effect of the catalogue fares."""
-    lines = [
-        "| effect | cases | in `plausible` | mean size | first | identified, right | identified, wrong | unexplained | "
-        "parameters in their intervals |",
-        "| --- " + "| ---: " * 8 + "|",
-    ]
+    rows = []
     one = [r for r in records if r["layout"] == layout and r["group"] == "one"]
     for name in dict.fromkeys(truth_of(r) for r in one):
         mine = [r for r in one if truth_of(r) == name]
         checks = [c["holds"] for r in mine if r.get("choice_right") for c in r["parameters"]]
         size = sum(len(r["plausible"]) for r in mine) / len(mine)
-        cells = [
-            sum(map(holds_truth, mine)), f"{size:.1f}", sum(r["first"] == name for r in mine), sum(map(named, mine)),
-            sum(map(misnamed, mine)), sum(r["verdict"] == "unexplained" for r in mine),
+        rows.append((
+            name, len(mine), sum(map(holds_truth, mine)), f"{size:.1f}", sum(r["first"] == name for r in mine),
+            sum(map(named, mine)), sum(map(misnamed, mine)), sum(r["verdict"] == "unexplained" for r in mine),
             f"{sum(checks)} of {len(checks)}",
-        ]  # fmt: skip
-        lines.append(f"| {name} | {len(mine)} | " + " | ".join(map(str, cells)) + " |")
-    return lines
+        ))  # fmt: skip
+    return table(
+        "effect | cases: | in `plausible`: | mean size: | first: | identified, right: | identified, wrong: | "
+        "unexplained: | parameters in their intervals:",
+        rows,
+    )
 
 
 def power_table(records: Sequence[Record]) -> list[str]:
     """Single effects by how strongly they show."""
-    lines = [
-        "| layout | detectability | cases | not `adequate` | truth in `plausible` | identified, right |",
-        "| --- | --- | ---: | --- | --- | --- |",
-    ]
+    rows = []
     for layout in ("tilted", "paper"):
         one = [r for r in records if r["layout"] == layout and r["group"] == "one"]
         for low, high in pairwise(DETECTABILITIES):
             mine = [r for r in one if low <= r["effects"][0]["detectability"] < high]
             if mine:
                 seen = sum(r["verdict"] != "adequate" for r in mine)
-                cells = (seen, sum(map(holds_truth, mine)), sum(map(named, mine)))
+                counts = (seen, sum(map(holds_truth, mine)), sum(map(named, mine)))
                 label = f"{low:g} to {high:g}" if high < 1e9 else f"from {low:g}"
-                lines.append(
-                    f"| {layout} | {label} | {len(mine)} | {' | '.join(_ratio(c, len(mine)) for c in cells)} |"
-                )
-    return lines
+                rows.append((layout, label, len(mine), *(_ratio(count, len(mine)) for count in counts)))
+    return table("layout | detectability | cases: | not `adequate` | truth in `plausible` | identified, right", rows)
 
 
 def calibration_table(records: Sequence[Record]) -> list[str]:
     """Stated probabilities of `none`, single effects and pairs against how often they are the truth."""
-    lines = ["| layout | stated | hypotheses | mean stated | true |", "| --- | --- | ---: | ---: | --- |"]
+    rows = []
     for layout in ("tilted", "paper"):
         mine = [r for r in records if r["layout"] == layout and r["group"] in ("one", "none")]
         claims = [
@@ -108,17 +76,21 @@ def calibration_table(records: Sequence[Record]) -> list[str]:
             if r["verdict"] != "unexplained"
             for name, weight in r["probability"].items()
         ]
-        for low, high in pairwise(PROBABILITIES):
-            inside = [claim for claim in claims if low <= claim[0] < high]
-            if inside:
-                stated = sum(weight for weight, _ in inside) / len(inside)
-                hits = sum(true for _, true in inside)
-                label = f"{100 * low:g} to {100 * min(high, 1.0):g} %"
-                lines.append(
-                    f"| {layout} | {label} | {len(inside)} | {100 * stated:.1f} % | "
-                    f"{100 * hits / len(inside):.1f} %, {_ratio(hits, len(inside))} |"
-                )
-    return lines
+        for label, inside in by_probability(claims, PROBABILITIES):
+            stated, hits = (sum(column) for column in zip(*inside, strict=True))
+            share_true = f"{100 * hits / len(inside):.1f} %, {_ratio(int(hits), len(inside))}"
+            rows.append((layout, label, len(inside), f"{100 * stated / len(inside):.1f} %", share_true))
+    return table("layout | stated | hypotheses: | mean stated: | true", rows)
+
+
+def by_probability(
+    claims: Sequence[tuple[float, bool]], ends: Sequence[float]
+) -> Iterator[tuple[str, list[tuple[float, bool]]]]:
+    """The claims (stated probability, whether it is so) between each two ends, under a label."""
+    for low, high in pairwise(ends):
+        inside = [claim for claim in claims if low <= claim[0] < high]
+        if inside:
+            yield f"{100 * low:g} to {100 * min(high, 1.0):g} %", inside
 
 
 def two_table(records: Sequence[Record]) -> list[str]:
@@ -160,23 +132,20 @@ def misstated_table(records: Sequence[Record]) -> list[str]:
 
 def planned_table(records: Sequence[Record]) -> list[str]:
     """Every ambiguous case and what further poses made of it."""
-    lines = [
-        "| seed | hidden | rivals | settleable | forecast | planned 2, 4, 6 | random 2, 4, 6 | after 6 planned |",
-        "| ---: | --- | --- | --- | ---: | --- | --- | --- |",
-    ]
+    rows = []
     for r in sorted((r for r in records if r["group"] == "planned"), key=lambda r: r["seed"]):
-        settled = {
-            label: ", ".join("yes" if r[f"{label}_{n}"][2] else "no" for n in (2, 4, 6))
+        settled = [
+            ", ".join("yes" if r[f"{label}_{n}"][2] else "no" for n in (2, 4, 6)) if f"{label}_6" in r else ""
             for label in ("planned", "random")
-            if f"{label}_6" in r
-        }
+        ]
         last = f"{r['planned_6'][0]}: {', '.join(r['planned_6'][1])}" if "planned_6" in r else "no plan"
-        lines.append(
-            f"| {r['seed']} | {truth_of(r)} | {', '.join(r['rivals'])} | {'yes' if r['settleable'] else 'no'} | "
-            f"{100 * r.get('forecast', 0.0):.0f} % | {settled.get('planned', '')} | "
-            f"{settled.get('random', '')} | {last} |"
-        )
-    return lines
+        rows.append((
+            r["seed"], truth_of(r), ", ".join(r["rivals"]), "yes" if r["settleable"] else "no",
+            f"{100 * r.get('forecast', 0.0):.0f} %", *settled, last,
+        ))  # fmt: skip
+    return table(
+        "seed: | hidden | rivals | settleable | forecast: | planned 2, 4, 6 | random 2, 4, 6 | after 6 planned", rows
+    )
 
 
 def failures_table(records: Sequence[Record]) -> list[str]:
@@ -186,20 +155,21 @@ def failures_table(records: Sequence[Record]) -> list[str]:
         "outside": lambda r: "" if r["verdict"] == "unexplained" else "not `unexplained`",
         "one": _failure_of_one,
     }
-    lines = [
-        "| layout | seed | hidden | size, % | detectability | what | verdict | plausible | place of truth | base's p |",
-        "| --- | ---: | --- | ---: | ---: | --- | --- | --- | ---: | ---: |",
-    ]
+    rows = []
     for r in sorted(records, key=lambda r: (r["layout"] != "tilted", r["seed"])):
         what = tests[r["group"]](r) if r["group"] in tests else ""
         if what:
             effect = r["effects"][0] if r["effects"] else {"size": 0.0, "detectability": 0.0}
-            lines.append(
-                f"| {r['layout']} | {r['seed']} | {', '.join(r['truth']) or 'none'} | {100 * effect['size']:.1f} | "
-                f"{effect['detectability']:.1f} | {what} | {r['verdict']} | {', '.join(r['plausible'])} | "
-                f"{r.get('place') or ''} | {r['gate']} |"
-            )
-    return lines
+            rows.append((
+                r["layout"], r["seed"], ", ".join(r["truth"]) or "none", f"{100 * effect['size']:.1f}",
+                f"{effect['detectability']:.1f}", what, r["verdict"], ", ".join(r["plausible"]),
+                r.get("place") or "", r["gate"],
+            ))  # fmt: skip
+    return table(
+        "layout | seed: | hidden | size, %: | detectability: | what | verdict | plausible | place of truth: | "
+        "base's p:",
+        rows,
+    )
 
 
 def _failure_of_one(record: Record) -> str:
@@ -218,19 +188,15 @@ def _failure_of_one(record: Record) -> str:
 
 def missed_intervals_table(records: Sequence[Record]) -> list[str]:
     """Every parameter of the right effect whose interval misses its true value."""
-    lines = [
-        "| layout | seed | hidden | detectability | parameter | true | fitted | 95 % interval |",
-        "| --- | ---: | --- | ---: | --- | ---: | ---: | --- |",
-    ]
+    rows = []
     for r in sorted(records, key=lambda r: (r["layout"] != "tilted", r["seed"])):
-        if r["group"] != "one" or not r.get("choice_right"):
-            continue
-        for check in r["parameters"]:
+        for check in r["parameters"] if r["group"] == "one" and r.get("choice_right") else ():
             if not check["holds"]:
-                low, high = ("infinite" if end is None else f"{end:.4g}" for end in check["interval"])
-                value = "infinite" if check["value"] is None else f"{check['value']:.4g}"
-                lines.append(
-                    f"| {r['layout']} | {r['seed']} | {truth_of(r)} | {r['effects'][0]['detectability']:.1f} | "
-                    f"{check['key']} | {check['true']:.4g} | {value} | {low} to {high} |"
+                low, high, value = (
+                    "infinite" if number is None else f"{number:.4g}" for number in (*check["interval"], check["value"])
                 )
-    return lines
+                rows.append((
+                    r["layout"], r["seed"], truth_of(r), f"{r['effects'][0]['detectability']:.1f}", check["key"],
+                    f"{check['true']:.4g}", value, f"{low} to {high}",
+                ))  # fmt: skip
+    return table("layout | seed: | hidden | detectability: | parameter | true: | fitted: | 95 % interval", rows)

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
-import traceback
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.case_loop import Record, document, run_benchmark, run_cases
-from benchmarks.diagnosis_bars import Figure, share
+from benchmarks.bars import Figure, Record, share
+from benchmarks.case_loop import document, record_of, run_benchmark, run_cases, sound
 from benchmarks.diagnosis_cases import machine
-from benchmarks.diagnosis_tables import bars_table, summary
+from benchmarks.pages import table
 from toolpath_stiff.correction.draft import draft
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.inference.candidates import testable_effects
@@ -62,11 +60,7 @@ def make_jobs(first_seed: int, unknowns: int, noises: int) -> list[Job]:
 
 def run(job: Job) -> dict[str, Any]:
     """The record of a draft; with `error`, the traceback, where it failed."""
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            return asdict(job) | _drafted(job, Path(folder))
-    except Exception:  # a case that breaks must be counted, not end the run
-        return asdict(job) | {"error": traceback.format_exc()}
+    return record_of(asdict(job), lambda folder: _drafted(job, folder))
 
 
 def _drafted(job: Job, folder: Path) -> dict[str, Any]:
@@ -88,8 +82,8 @@ def _drafted(job: Job, folder: Path) -> dict[str, Any]:
     if not made.text:
         return record
     (folder / "missing.toml").write_text(made.text)
-    for what, table in tables.items():
-        mixed = {n: np.where(old, np.asarray(case.rows[n]), np.asarray(table[n])) for n in case.rows}
+    for what, readings in tables.items():
+        mixed = {n: np.where(old, np.asarray(case.rows[n]), np.asarray(readings[n])) for n in case.rows}
         file = folder / f"{what}.csv"
         file.write_text(exercise.csv_text(mixed))
         record["judged"][what] = _judged(file, str(folder / "missing.toml"), noise)
@@ -135,28 +129,20 @@ def figures(records: Sequence[Record]) -> list[Figure]:
 
 def cases_table(records: Sequence[Record]) -> list[str]:
     """Each draft."""
-    lines = [
-        "| seed | hidden | links | drafted | new readings | verdict | log probability gained |",
-        "| ---: " + "| --- " * 5 + "| ---: |",
-    ]
+    rows = []
     for r in records:
-        for what, one in r["judged"].items() or [("", {"verdict": f"no draft: {r['verdict']}", "drawn": None})]:
-            gain = one["drawn"]["gain"] if one["drawn"] else None
-            cells = (r["seed"], r["hidden"], ", ".join(r["truth"]), ", ".join(r["links"]), what, one["verdict"],
-                     "" if gain is None else f"{gain:.1f}")  # fmt: skip
-            lines.append("| " + " | ".join(map(str, cells)) + " |")
-    return lines
+        for what, judged in r["judged"].items() or [("", {"verdict": f"no draft: {r['verdict']}", "drawn": None})]:
+            gain = f"{judged['drawn']['gain']:.1f}" if judged["drawn"] else ""
+            truth, links = ", ".join(r["truth"]), ", ".join(r["links"])
+            rows.append((r["seed"], r["hidden"], truth, links, what, judged["verdict"], gain))
+    return table("seed: | hidden | links | drafted | new readings | verdict | log probability gained:", rows)
 
 
 def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
     """The document, and whether all bars are cleared."""
-    broken = [r for r in records if "error" in r]
-    good = sorted((r for r in records if "error" not in r), key=lambda r: r["seed"])
-    found = figures(good)
+    good = sound(records, lambda r: r["seed"])
     what = " ".join((__doc__ or "").split("\n\n", 1)[1].split())
-    parts = [("", [summary(found)]), ("Figures", bars_table(found)), ("Cases", cases_table(good))]
-    text = document("Are drafts confirmed?", what, parts, broken, command)
-    return text, not broken and all(figure.cleared is not False for figure in found)
+    return document("Are drafts confirmed?", what, figures(good), [("Cases", cases_table(good))], records, command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks import pages
 from benchmarks.diagnosis_size import campaign
 from benchmarks.processes import whole_command
 from benchmarks.size_programs import program
@@ -55,10 +56,11 @@ def measure_growth(full: bool) -> list[Cost]:
 
 def table(costs: list[Cost]) -> list[str]:
     """Lines of the table."""
-    lines = ["| command | size | CPU, s | peak memory, MB |", "| --- | ---: | ---: | ---: |"]
-    return lines + [
-        f"| `{one.command}` | {one.size:,} {one.unit} | {one.seconds:.2f} | {one.megabytes:.0f} |" for one in costs
+    rows = [
+        (f"`{cost.command}`", f"{cost.size:,} {cost.unit}", f"{cost.seconds:.2f}", f"{cost.megabytes:.0f}")
+        for cost in costs
     ]
+    return pages.table("command | size: | CPU, s: | peak memory, MB:", rows)
 
 
 def picture(costs: list[Cost], file: Path) -> None:

@@ -7,6 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.pages import bar, table
 from benchmarks.processes import whole_process
 
 PROGRAMS, WITH_PICTURES = 2000, 200
@@ -18,7 +19,7 @@ from pathlib import Path
 import toolpath_stiff as tps
 machine = tps.Machine.load("nist")
 for file in sorted(Path("programs").iterdir()):
-    tps.analyze(machine, tps.Program.read(file)).save(Path("alone", file.stem), plots=False)
+    tps.analyze(tps.Program.read(file), machine).save(Path("alone", file.stem), plots=False)
 """
 
 
@@ -44,12 +45,8 @@ def measure_many(rounds: int, programs: int = PROGRAMS) -> tuple[list[str], bool
             ratios.append(whole_process(command, folder)[0] / seconds[-1])
     ratio, clears = statistics.median(ratios), statistics.median(ratios) <= BAR
     name = f"`tps analyze FOLDER --jobs 1 --no-plots`, {programs:,} small programs"
-    return [
-        "| command | CPU seconds of the analyses and their reports, median | times these | bar |",
-        "| --- | ---: | ---: | --- |",
-        f"| {name} | {statistics.median(seconds):.1f} | {ratio:.2f} "
-        f"| at most {BAR:g}{'' if clears else ': NOT CLEARED'} |",
-    ], clears
+    row = (name, f"{statistics.median(seconds):.1f}", f"{ratio:.2f}", bar(clears, f"at most {BAR:g}"))
+    return table("command | CPU seconds of the analyses and their reports, median: | times these: | bar", [row]), clears
 
 
 def measure_pictures(programs: int = WITH_PICTURES) -> tuple[list[str], bool]:
@@ -62,12 +59,9 @@ def measure_pictures(programs: int = WITH_PICTURES) -> tuple[list[str], bool]:
             seconds.append(whole_process([*command, *words], folder)[0] / programs)
     without, drawn = seconds[0], seconds[1] - seconds[0]
     clears = drawn <= PICTURES_BAR
-    return [
-        "| command | CPU seconds a program without pictures | two pictures and a page | bar |",
-        "| --- | ---: | ---: | --- |",
-        f"| `tps analyze FOLDER --jobs 1`, {programs:,} small programs | {without:.3f} | {drawn:.3f} "
-        f"| at most {PICTURES_BAR:g}{'' if clears else ': NOT CLEARED'} |",
-    ], clears
+    name = f"`tps analyze FOLDER --jobs 1`, {programs:,} small programs"
+    row = (name, f"{without:.3f}", f"{drawn:.3f}", bar(clears, f"at most {PICTURES_BAR:g}"))
+    return table("command | CPU seconds a program without pictures: | two pictures and a page: | bar", [row]), clears
 
 
 def main() -> int:

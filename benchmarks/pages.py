@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -20,6 +21,19 @@ def commit() -> str:
 
 
 STARTED = datetime.now(UTC).date(), commit()  # a run takes hours, in which the checkout may move on
+
+
+def table(headings: str, rows: Iterable[Sequence[object]]) -> list[str]:
+    """Lines of a table in markdown; the column of a heading that ends in ":" is set to the right."""
+    names = headings.split(" | ")
+    ruler = " | ".join("---:" if name.endswith(":") else "---" for name in names)
+    lines = [f"| {' | '.join(name.removesuffix(':') for name in names)} |", f"| {ruler} |"]
+    return lines + [f"| {' | '.join(map(str, row))} |" for row in rows]
+
+
+def bar(clears: bool, text: str) -> str:
+    """A bar in words, marked where it is not cleared."""
+    return text if clears else f"{text}: NOT CLEARED"
 
 
 def write_page(file: str | Path, text: str, *, of_records: bool = False) -> None:

@@ -1,7 +1,5 @@
 """Does a plan settle what a diagnosis leaves open? Ambiguous blind cases, at most six further visits of any kind.
 
-    python -m benchmarks.plan_settles --cases 60 --out plan_settles.md
-
 Each case is the paper's layout on a blind machine of the rig whose diagnosis is ambiguous, or on one whose joints
 give way. A plan with indicators is made and measured on the same machine; so are as many visits drawn at random from
 the same menu. Counted are the verdicts over all readings after the plan, the minutes until one explanation has 95 %,
@@ -14,13 +12,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.pages import write_page
+from benchmarks.bars import Figure, Record, share
+from benchmarks.case_loop import document, record_of, run_benchmark, run_cases, sound
+from benchmarks.pages import table
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.planning.gaps import SETTLED, plan_minutes
@@ -34,32 +34,46 @@ from toolpath_stiff.rig.exercise import csv_text, read_plan
 
 POSES = 6
 FIRST_SEED = 70_000
+RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_plan_settles.jsonl"
 JOINTS_EVERY = 4  # each fourth case hides joint_compliance, which the tip alone never names
 MOST_DRAWS = 6  # seeds tried for one ambiguous case
 SETTLES = "identified"  # something is hidden in every case
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """A case: what was hidden, the verdict after the plan, minutes by plan and at random, what was expected.
+class Job:
+    """One ambiguous case, the first of some seeds from this one on."""
+
+    seed: int
+    hidden: str
+
+
+def make_jobs(count: int, first: int) -> list[Job]:
+    """So many cases; each fourth hides `joint_compliance`."""
+    joints = [k % JOINTS_EVERY == JOINTS_EVERY - 1 for k in range(count)]
+    return [Job(first + 100 * k, "joint_compliance" if joint else "one") for k, joint in enumerate(joints)]
+
+
+def run(job: Job) -> Record:
+    """The record of a case; with `error`, the traceback, where it failed or no draw of it is ambiguous."""
+    return record_of(asdict(job), lambda folder: _first_ambiguous(job, folder))
+
+
+def _first_ambiguous(job: Job, folder: Path) -> Record:
+    for draw in range(MOST_DRAWS):
+        (folder / str(draw)).mkdir()
+        settled = _planned(job.seed + draw, job.hidden, folder / str(draw))
+        if settled:
+            return settled
+    raise ValueError(f"the diagnosis settles each of {MOST_DRAWS} draws at once")
+
+
+def _planned(seed: int, hidden: str, folder: Path) -> Record:
+    """What was hidden, the verdict after the plan, minutes by plan and at random, what was expected; {} if settled.
 
     `expected` is the forecast that the plan prints, over all rivals; `expected_if` the same were what is hidden the
     truth, over all rivals where that is none of them.
     """
-
-    seed: int
-    hidden: str
-    verdict: str
-    right: bool
-    settled: bool
-    minutes: float
-    random_minutes: float
-    expected: float
-    expected_if: float
-
-
-def run(seed: int, hidden: str, folder: Path) -> Outcome | None:
-    """One case; None where its diagnosis is settled at once."""
     machine = load_machine("nist")
     case = draw_case(seed, "paper", hidden, 0.02)
     tip = folder / "tip.csv"
@@ -67,7 +81,7 @@ def run(seed: int, hidden: str, folder: Path) -> Outcome | None:
     data = read_measurements(str(tip), machine)
     before = diagnose(machine, data, plan_next=False)
     if before.verdict != "ambiguous" and hidden != "joint_compliance":
-        return None
+        return {}
     proposal = plan(machine, data, n=POSES, indicators=True, judgement=before.main)
     assert isinstance(proposal.choice, RivalPlan)
     (folder / TABLES).write_bytes(tables_of(proposal))
@@ -79,22 +93,17 @@ def run(seed: int, hidden: str, folder: Path) -> Outcome | None:
         needed = _needed(folder, taken)
         minutes.append(plan_minutes(visits, some[:needed], proposal.costs, proposal.menu))
     after = diagnose(machine, read_measurements([str(tip), *files], machine), plan_next=False)
-    right = set(after.plausible if after.verdict == "identified" else ()) == set(case.truth["hidden"])
     outlook = proposal.choice.after
-    rivals = [one.name for one in proposal.choice.rivals]
+    rivals = [rival.name for rival in proposal.choice.rivals]
     true = " + ".join(sorted(case.truth["hidden"]))
-    expected_if = outlook.settled_if[rivals.index(true)] if true in rivals else outlook.settled
-    return Outcome(
-        seed,
-        hidden,
-        after.verdict,
-        right,
-        after.verdict == SETTLES,
-        minutes[0],
-        minutes[1],
-        outlook.settled,
-        expected_if,
-    )
+    return {
+        "drawn": seed,
+        "verdict": after.verdict,
+        "right": set(after.plausible if after.verdict == SETTLES else ()) == set(case.truth["hidden"]),
+        "minutes": minutes,
+        "expected": outlook.settled,
+        "expected_if": outlook.settled_if[rivals.index(true)] if true in rivals else outlook.settled,
+    }
 
 
 def _needed(folder: Path, files: list[str]) -> int:
@@ -116,55 +125,45 @@ def _measured(case: Case, planned: RivalPlan, visit: int, file: Path, number: in
     return str(file)
 
 
-def cases(count: int, first: int) -> list[Outcome]:
-    """So many ambiguous cases, one after the other; progress on the terminal."""
-    found: list[Outcome] = []
-    for k in range(count):
-        hidden = "joint_compliance" if k % JOINTS_EVERY == JOINTS_EVERY - 1 else "one"
-        for draw in range(MOST_DRAWS):
-            with tempfile.TemporaryDirectory() as folder:
-                one = run(first + 100 * k + draw, hidden, Path(folder))
-            if one is not None:
-                found.append(one)
-                print(f"{len(found)}/{count} {one}", file=sys.stderr, flush=True)
-                break
-    return found
-
-
-def report(found: list[Outcome]) -> str:
-    """The figures beside their bars, as markdown."""
-    joints = [one for one in found if one.hidden == "joint_compliance"]
-    settled = 100.0 * float(np.mean([one.settled for one in found]))
-    expected, known = (
-        100.0 * float(np.mean([getattr(one, name) for one in found])) for name in ("expected", "expected_if")
-    )
-    shorter = float(np.mean([one.minutes for one in found]) / np.mean([one.random_minutes for one in found]))
-    named = 100.0 * float(np.mean([one.right for one in joints])) if joints else float("nan")
-    wrong = 100.0 * float(np.mean([one.verdict == "identified" and not one.right for one in found]))
-    rows = [
-        ("settled after the plan", f"{settled:.0f} %", "90 %"),
-        ("a wrong name", f"{wrong:.0f} %", "-"),
-        ("forecast of that, what is hidden being the truth", f"{known:.0f} %", "within 5 points"),
-        ("forecast of that, over all rivals, `none` among them", f"{expected:.0f} %", "-"),
-        ("minutes until 95 %, over those at random", f"{shorter:.2f}", "0.5"),
-        ("joint_compliance named", f"{named:.0f} %", "80 %"),
+def figures(records: Sequence[Record]) -> list[Figure]:
+    """The figures beside their bars."""
+    settled = [r["verdict"] == SETTLES for r in records]
+    joints = [r["right"] for r in records if r["hidden"] == "joint_compliance"]
+    expected, known = (float(np.mean([r[name] for r in records])) for name in ("expected", "expected_if"))
+    shorter = float(np.divide(*np.mean([r["minutes"] for r in records], axis=0)))
+    off = 100.0 * abs(known - float(np.mean(settled)))
+    forecast, overall = f"{100 * known:.0f} %", f"{100 * expected:.0f} %"
+    return [
+        share("paper", "settled after the plan", settled, at_least=0.90),
+        share("paper", "a wrong name", [s and not r["right"] for s, r in zip(settled, records, strict=True)]),
+        Figure("paper", "forecast of it, given what is hidden", forecast, "", "within 5 points", off <= 5.0),
+        Figure("paper", "forecast of it, over all rivals, `none` among them", overall, "", "", None),
+        Figure("paper", "minutes until 95 %, of those at random", f"{shorter:.2f}", "", "at most 0.5", shorter <= 0.5),
+        share("paper", "joint_compliance named", joints, at_least=0.80),
     ]
-    lines = [f"# What plans settle: {len(found)} cases", "", "| figure | found | bar |", "| --- | --- | --- |"]
-    return "\n".join([*lines, *(f"| {name} | {value} | {bar} |" for name, value, bar in rows), ""])
 
 
-def main() -> None:
-    """Run the cases and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
+    """The document, and whether all bars are cleared."""
+    good = sound(records, lambda r: r["seed"])
+    rows = [(r["drawn"], r["hidden"], r["verdict"], "yes" if r["right"] else "no", *map(round, r["minutes"]))
+            for r in good]  # fmt: skip
+    cases = table("seed: | hidden | verdict | right | minutes: | at random:", rows)
+    what = " ".join((__doc__ or "").split("\n\n", 1)[1].split())
+    return document("What plans settle", what, figures(good), [("Cases", cases)], records, command)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run and print; exit code 1 if a bar is not cleared."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.plan_settles", description=__doc__)
     parser.add_argument("--cases", type=int, default=60, metavar="N", help="ambiguous cases (default: 60)")
     parser.add_argument("--seed", type=int, default=FIRST_SEED, metavar="N", help="of the first case")
-    parser.add_argument("--out", metavar="FILE.md", help="write the table there as well")
-    args = parser.parse_args()
-    text = report(cases(args.cases, args.seed))
-    print(text)
-    if args.out:
-        write_page(args.out, text)
+
+    def make_records(args: argparse.Namespace) -> list[Record]:
+        return run_cases(args, "planned", run, make_jobs(args.cases, args.seed))
+
+    return run_benchmark(parser, arguments, make_records, report, records=RECORDS, out=None)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

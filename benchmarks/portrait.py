@@ -11,8 +11,8 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.case_loop import Record, document, run_benchmark, run_cases
-from benchmarks.diagnosis_tables import bars_table, summary
+from benchmarks.bars import Record
+from benchmarks.case_loop import document, run_benchmark, run_cases, sound
 from benchmarks.portrait_bars import calibration_table, failures_table, figures, kinds_table
 from benchmarks.portrait_cases import LAYOUTS, make_jobs, run
 from toolpath_stiff.rig.unknowns import UNKNOWNS
@@ -25,17 +25,13 @@ CASES, SOUND = 6, 100
 
 def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
     """The document, and whether all bars are cleared."""
-    broken = [r for r in records if "error" in r]
     order = list(UNKNOWNS)
-    good = sorted(
-        (r for r in records if "error" not in r),
-        key=lambda r: (r["layout"] != "tilted", order.index(r["hidden"]) if r["hidden"] in order else -1, r["seed"]),
+    good = sound(
+        records,
+        lambda r: (r["layout"] != "tilted", order.index(r["hidden"]) if r["hidden"] in order else -1, r["seed"]),
     )
-    found = figures(good)
     counts = Counter((r["layout"], "sound" if r["hidden"] == "none" else "unknown", r["verdict"]) for r in good)
     parts = [
-        ("", [summary(found)]),
-        ("Bars", bars_table(found)),
         (
             "Verdicts",
             [f"- {layout}, {what}, `{verdict}`: {n}" for (layout, what, verdict), n in sorted(counts.items())],
@@ -45,8 +41,7 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
         ("Probabilities", [_PROBABILITIES, "", *calibration_table(good)]),
         ("Cases that count against a bar", failures_table(good)),
     ]
-    text = document("Descriptions of what is in no catalogue", _WHAT, parts, broken, command)
-    return text, not broken and all(figure.cleared is not False for figure in found)
+    return document("Descriptions of what is in no catalogue", _WHAT, figures(good), parts, records, command)
 
 
 _WHAT = (

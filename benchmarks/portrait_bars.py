@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from statistics import fmean, median
 
-from benchmarks.case_loop import Record
-from benchmarks.diagnosis_bars import Figure, mean, middle_of, share
+from benchmarks.bars import Figure, Record, mean, middle_of, share
+from benchmarks.diagnosis_tables import by_probability
+from benchmarks.pages import table
 
 LARGEST_SET = {"links": 4, "variables": 3}  # a longer list says that it cannot tell
 SEEN = ("unexplained", "described")
@@ -123,11 +123,7 @@ def _of_sound(layout: str, records: Sequence[Record]) -> list[Figure]:
 
 def kinds_table(records: Sequence[Record], layout: str) -> list[str]:
     """How each kind fares."""
-    lines = [
-        "| unknown | cases | unexplained or described | identified | portrait | link right | of how many | variable "
-        "right | of how many | held-out over floor |",
-        "| --- " + "| ---: " * 9 + "|",
-    ]
+    rows = []
     mine = [r for r in records if r["layout"] == layout and r["hidden"] != "none"]
     for kind in dict.fromkeys(r["hidden"] for r in mine):
         cases = [r for r in mine if r["hidden"] == kind]
@@ -136,36 +132,31 @@ def kinds_table(records: Sequence[Record], layout: str) -> list[str]:
         for name in LARGEST_SET:
             size = f"{fmean(len(r['portrait'][name]) for r in drawn):.1f}" if drawn else ""
             cells += [sum(right_set(r, name) for r in drawn), size]
-        cells.append(f"{median(map(ratio, drawn)):.2f}" if drawn else "")
-        lines.append(f"| {kind} | " + " | ".join(map(str, cells)) + " |")
-    return lines
+        rows.append((kind, *cells, f"{median(map(ratio, drawn)):.2f}" if drawn else ""))
+    return table(
+        "unknown | cases: | unexplained or described: | identified: | portrait: | link right: | of how many: | "
+        "variable right: | of how many: | held-out over floor:",
+        rows,
+    )
 
 
 def calibration_table(records: Sequence[Record]) -> list[str]:
     """Stated probabilities of links and variables against how often they are acceptable."""
-    lines = ["| set | stated | words | mean stated | right |", "| --- | --- | ---: | ---: | ---: |"]
+    rows = []
     drawn = [r for r in records if r["hidden"] != "none" and r["portrait"] and r["layout"] == "tilted"]
     for name in LARGEST_SET:
         claims = [
             (weight, word in r["effects"][0][name]) for r in drawn for word, weight in r["portrait"][name].items()
         ]
-        for low, high in pairwise(PROBABILITIES):
-            inside = [claim for claim in claims if low <= claim[0] < high]
-            if inside:
-                stated, right = (fmean(column) for column in zip(*inside, strict=True))
-                lines.append(
-                    f"| {name} | {100 * low:g} to {100 * min(high, 1.0):g} % | {len(inside)} | {100 * stated:.0f} % | "
-                    f"{100 * right:.0f} % |"
-                )
-    return lines
+        for label, inside in by_probability(claims, PROBABILITIES):
+            means = (f"{100 * fmean(column):.0f} %" for column in zip(*inside, strict=True))
+            rows.append((name, label, len(inside), *means))
+    return table("set | stated | words: | mean stated: | right:", rows)
 
 
 def failures_table(records: Sequence[Record]) -> list[str]:
     """Every case that counts against a bar: what it is and what was said of it."""
-    lines = [
-        "| layout | seed | unknown | size, % | verdict | what | links | variables | terms |",
-        "| --- | ---: | --- | ---: | --- | --- | --- | --- | --- |",
-    ]
+    rows = []
     for r in records:
         portrait = r["portrait"] or {"links": {}, "variables": {}, "terms": []}
         if r["hidden"] == "none":
@@ -179,8 +170,8 @@ def failures_table(records: Sequence[Record]) -> list[str]:
             size = 100.0 * r["effects"][0]["size"]
         if what:
             words = (", ".join(f"{w} {100 * p:.0f} %" for w, p in portrait[name].items()) for name in LARGEST_SET)
-            lines.append(
-                f"| {r['layout']} | {r['seed']} | {r['hidden']} | {size:.1f} | {r['verdict']} | {'; '.join(what)} | "
-                f"{' | '.join(words)} | {'; '.join(portrait['terms'])} |"
-            )
-    return lines
+            rows.append((
+                r["layout"], r["seed"], r["hidden"], f"{size:.1f}", r["verdict"], "; ".join(what), *words,
+                "; ".join(portrait["terms"]),
+            ))  # fmt: skip
+    return table("layout | seed: | unknown | size, %: | verdict | what | links | variables | terms", rows)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
-import traceback
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.bars import Record
+from benchmarks.case_loop import record_of
 from benchmarks.diagnosis_cases import judged
 from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.unknowns import UNKNOWNS
@@ -64,22 +64,16 @@ def make_jobs(
 
 def run(job: Job) -> dict[str, Any]:
     """The record of a case; with `error`, the traceback, where it failed."""
-    heading = asdict(job)
-    try:
-        rows, truth = rig.make_case(job.seed, job.layout, job.hidden)
-        with tempfile.TemporaryDirectory() as folder:
-            record, document = judged(rows, truth, Path(folder))
-    except Exception:  # a case that breaks must be counted, not end the run
-        return heading | {"error": traceback.format_exc()}
+    return record_of(asdict(job), lambda folder: _diagnosed(job, folder))
+
+
+def _diagnosed(job: Job, folder: Path) -> Record:
+    record, document = judged(*rig.make_case(job.seed, job.layout, job.hidden), folder)
     same = document.get("looks_the_same")
-    return (
-        heading
-        | record
-        | {
-            "portrait": in_short(document.get("portrait")),
-            "same": same and {name: [entry[ENTRY[name]] for entry in same[name]] for name in NAMES},
-        }
-    )
+    return record | {
+        "portrait": in_short(document.get("portrait")),
+        "same": same and {name: [entry[ENTRY[name]] for entry in same[name]] for name in NAMES},
+    }
 
 
 def in_short(portrait: Mapping[str, Any] | None) -> dict[str, Any] | None:

@@ -12,9 +12,9 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.case_loop import Record, document, run_benchmark, run_cases
-from benchmarks.diagnosis_bars import JUST_SEEN, holds_truth
-from benchmarks.diagnosis_tables import bars_table, summary
+from benchmarks.bars import JUST_SEEN, Record, holds_truth
+from benchmarks.case_loop import document, run_benchmark, run_cases, sound
+from benchmarks.pages import table
 from benchmarks.several_bars import false_name, figures, named_rows, slip_found, slip_visible, strongest_right
 from benchmarks.several_cases import GROUPS, make_jobs, run
 
@@ -25,36 +25,31 @@ OUT = Path(__file__).parent / "several.md"
 
 def effects_table(records: Sequence[Record]) -> list[str]:
     """How often each effect, as one of several, is in `plausible`, and how often it is named without being there."""
-    lines = ["| effect | hidden in | in `plausible` | in `not_excluded` | shows alone | named falsely |",
-             "| --- " + "| ---: " * 5 + "|"]  # fmt: skip
+    rows = []
     mine = [r for r in records if r["group"] in ("pair", "three")]
-    names = sorted({name for r in mine for name in r["truth"]})
-    for name in names:
+    for name in sorted({name for r in mine for name in r["truth"]}):
         with_it = [r for r in mine if name in r["truth"]]
         seen = sum(e["detectability"] >= JUST_SEEN for r in with_it for e in r["effects"] if e["effect"] == name)
         false = sum(false_name(r) and name in r["plausible"] and name not in r["truth"] for r in mine)
         held, listed = (sum(name in r[key] for r in with_it) for key in ("plausible", "not_excluded"))
-        cells = (len(with_it), held, listed, seen, false)
-        lines.append(f"| {name} | " + " | ".join(map(str, cells)) + " |")
-    return lines
+        rows.append((name, len(with_it), held, listed, seen, false))
+    return table("effect | hidden in: | in `plausible`: | in `not_excluded`: | shows alone: | named falsely:", rows)
 
 
 def slips_table(records: Sequence[Record]) -> list[str]:
     """Each kind of slip."""
-    lines = ["| slip | cases | show | row named, of these | row named, of the others |", "| --- " + "| ---: " * 4 + "|"]
+    rows = []
     wrong = [r for r in records if r["group"] == "slip" and r["slip"]]
     for kind in dict.fromkeys(r["slip"] for r in wrong):
         mine = [r for r in wrong if r["slip"] == kind]
-        plain = [r for r in mine if slip_visible(r)]
-        rest = [r for r in mine if not slip_visible(r)]
-        cells = (len(mine), len(plain), sum(map(slip_found, plain)), sum(map(slip_found, rest)))
-        lines.append(f"| {kind} | " + " | ".join(map(str, cells)) + " |")
-    return lines
+        plain, faint = ([r for r in mine if slip_visible(r) == visible] for visible in (True, False))
+        rows.append((kind, len(mine), len(plain), sum(map(slip_found, plain)), sum(map(slip_found, faint))))
+    return table("slip | cases: | show: | row named, of these: | row named, of the others:", rows)
 
 
 def failures_table(records: Sequence[Record]) -> list[str]:
     """Every case that counts against a bar."""
-    lines = ["| group | seed | hidden | verdict | plausible | what |", "| --- | ---: | --- | --- | --- | --- |"]
+    rows = []
     for r in records:
         what = []
         if false_name(r):
@@ -68,11 +63,9 @@ def failures_table(records: Sequence[Record]) -> list[str]:
         if r["group"] == "slip" and not r["slip"] and named_rows(r):
             what.append("a sound row suspected")
         if what:
-            lines.append(
-                f"| {r['group']} | {r['seed']} | {', '.join(r['truth']) or 'none'} | {r['verdict']} | "
-                f"{', '.join(r['plausible'])} | {'; '.join(what)} |"
-            )
-    return lines
+            hidden, plausible = ", ".join(r["truth"]) or "none", ", ".join(r["plausible"])
+            rows.append((r["group"], r["seed"], hidden, r["verdict"], plausible, "; ".join(what)))
+    return table("group | seed: | hidden | verdict | plausible | what", rows)
 
 
 def _missed(record: Record) -> str:
@@ -84,20 +77,16 @@ def _missed(record: Record) -> str:
 
 def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
     """The document, and whether all bars are cleared."""
-    broken = [r for r in records if "error" in r]
-    good = sorted((r for r in records if "error" not in r), key=lambda r: (GROUPS.index(r["group"]), r["seed"]))
-    found = figures(good)
+    good = sound(records, lambda r: (GROUPS.index(r["group"]), r["seed"]))
     verdicts = Counter((r["group"], r["verdict"]) for r in good)
     parts = [
-        ("", [summary(found)]),
-        ("Bars", bars_table(found)),
         ("Verdicts", [f"- {group}, `{verdict}`: {count}" for (group, verdict), count in sorted(verdicts.items())]),
         ("Each effect among others", effects_table(good)),
         ("Slips", slips_table(good)),
         ("Cases that count against a bar", failures_table(good)),
     ]
-    text = document("Several effects, wild readings, wrong noise, mistyped rows", _WHAT, parts, broken, command)
-    return text, not broken and all(figure.cleared is not False for figure in found)
+    title = "Several effects, wild readings, wrong noise, mistyped rows"
+    return document(title, _WHAT, figures(good), parts, records, command)
 
 
 _WHAT = (

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from benchmarks.case_loop import Record
-from benchmarks.diagnosis_bars import JUST_SEEN, Figure, holds_truth, mean, named, share
+from benchmarks.bars import JUST_SEEN, Figure, Record, holds_truth, mean, named, share
 from benchmarks.several_cases import FACTORS, MANY_OUTLIERS, WAYS
 from toolpath_stiff.rig.slips import VISIBLE
 

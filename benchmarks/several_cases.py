@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
-import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.case_loop import record_of
 from benchmarks.diagnosis_cases import judged
 from benchmarks.several_seen import shows_beside
 from toolpath_stiff.errors import InputError, InputErrors
@@ -85,12 +84,7 @@ def make_jobs(first_seed: int, cases: int, groups: Sequence[str] = GROUPS) -> li
 
 def run(job: Job) -> dict[str, Any]:
     """The record of a case; with `error`, the traceback, where it failed."""
-    heading = asdict(job)
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            return heading | _diagnosed(job, Path(folder))
-    except Exception:  # a case that breaks must be counted, not end the run
-        return heading | {"error": traceback.format_exc()}
+    return record_of(asdict(job), lambda folder: _diagnosed(job, folder))
 
 
 def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:

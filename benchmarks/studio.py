@@ -20,6 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from benchmarks import pages
 from benchmarks.pages import write_page
 
 ANSWER_BAR, FRAME_BAR = 100.0, 50.0  # ms, medians
@@ -91,15 +92,14 @@ def many_readings(folder: Path, count: int) -> Path:
     return file
 
 
-def row(name: str, times: list[float], bar: float) -> tuple[str, bool]:
-    """A line of the table, and whether its bar is cleared."""
-    median = statistics.median(times)
-    clears = median < bar
-    mark = "" if clears else ": NOT CLEARED"
-    return f"| {name} | {median:.0f} | {max(times):.0f} | under {bar:g}{mark} |", clears
+def row(name: str, times: list[float], most: float) -> tuple[tuple[str, ...], bool]:
+    """A row of the table, and whether its bar is cleared."""
+    clears = statistics.median(times) < most
+    figures = (f"{statistics.median(times):.0f}", f"{max(times):.0f}")
+    return (name, *figures, pages.bar(clears, f"under {most:g}")), clears
 
 
-def measure(browser: Any, folder: Path) -> list[tuple[str, bool]]:
+def measure(browser: Any, folder: Path) -> list[tuple[tuple[str, ...], bool]]:
     """All rows of the table."""
     long, many = programs(folder)
     own = ("--exercise", "7", "--program", str(long))
@@ -112,7 +112,7 @@ def measure(browser: Any, folder: Path) -> list[tuple[str, bool]]:
 
 def measure_one(
     browser: Any, case: Path, words: tuple[str, ...], readings: str, program: str
-) -> list[tuple[str, bool]]:
+) -> list[tuple[tuple[str, ...], bool]]:
     """The rows of one case. The diagnosis beside the page is stopped: it is not what is measured."""
     hand = [{"do": "hand", "on": {"weak_strut": {"strut": 4, "factor": 0.7 + 0.005 * k}}} for k in range(ROUNDS)]
     on = {"do": "switch", "effect": "weak_strut", "values": {"strut": 4, "factor": 0.8}}
@@ -154,8 +154,7 @@ def main() -> int:
         browser = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
         rows = measure(browser, Path(folder))
         browser.close()
-    lines = ["| what | ms, median | ms, slowest | bar |", "| --- | ---: | ---: | --- |", *(line for line, _ in rows)]
-    text = "\n".join(lines) + "\n"
+    text = "\n".join(pages.table("what | ms, median: | ms, slowest: | bar", [cells for cells, _ in rows])) + "\n"
     print(text)
     if args.out:
         made = f"Made by `python -m benchmarks.studio --out {args.out}`."

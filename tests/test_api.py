@@ -27,8 +27,8 @@ PLACE = {"x_mm": (-60, 60), "y_mm": 0, "z_mm": (700, 800), "rotate_deg": 0, "ste
 PAIRS = {
     "analyze slot.nc --step 5 --origin 10,0,800 --load normal --require 50000 --compare genhexkins --partial": lambda: (
         tps.analyze(
-            "nist",
             "slot.nc",
+            "nist",
             step_mm=5,
             origin_mm_deg=(10, 0, 800),
             load="normal",
@@ -41,29 +41,29 @@ PAIRS = {
     "check slot.nc --machine none --dialect fanuc": lambda: tps.check(
         tps.Program.read("slot.nc", dialect="fanuc"), None
     ),
-    "pose -300 300 300 -30 0 0 --force 500": lambda: tps.pose("nist", (-300, 300, 300, -30, 0, 0), force_N=500),
+    "pose -300 300 300 -30 0 0 --force 500": lambda: tps.pose((-300, 300, 300, -30, 0, 0), "nist", force_N=500),
     "map --slices 800,1200 --points 11 --load z --tilt 5,0,0": lambda: tps.map_stiffness(
         "nist", z_mm=(800, 1200), points=11, load="z", tilt_deg=(5, 0, 0)
     ),
     "place slot.nc --x -60:60 --y 0 --z 700:800 --rotate 0 --step 10 --points 5": lambda: tps.place(
-        "nist", "slot.nc", **PLACE
+        "slot.nc", "nist", **PLACE
     ),
     "case-study": tps.case_study,
-    "compare nist-table1 --noise 5": lambda: tps.compare("nist", "nist-table1", noise_percent=5),
+    "compare nist-table1 --noise 5": lambda: tps.compare("nist-table1", "nist", noise_percent=5),
     "diagnose nist-table1 --noise 10 --seed 3 --program slot.nc --origin 0,0,800": lambda: tps.diagnose(
-        "nist", "nist-table1", noise_percent=10, seed=3, program="slot.nc", origin_mm_deg=(0, 0, 800)
+        "nist-table1", "nist", noise_percent=10, seed=3, program="slot.nc", origin_mm_deg=(0, 0, 800)
     ),
     "update nist-table1 --strut-law --noise 2,1 -o mine.toml": lambda: tps.update(
-        "nist", "nist-table1", strut_law=True, noise_percent=(2, 1), machine_file="mine.toml"
+        "nist-table1", "nist", strut_law=True, noise_percent=(2, 1), machine_file="mine.toml"
     ),
     "plan --between spindle_compliance,none --n 2 --cost pose=20": lambda: tps.plan(
-        "nist", between=("spindle_compliance", "none"), n=2, minutes={"pose": 20}
+        machine="nist", between=("spindle_compliance", "none"), n=2, minutes={"pose": 20}
     ),
     "machine recover --starts 2": lambda: tps.recover_geometry(starts=2),
     "machine check nist.toml": lambda: tps.Machine.load("nist.toml").check(),
     "effects list": tps.effects,
     "effects draft nist-table1 --noise 20 -o missing.toml": lambda: tps.draft_effect(
-        "nist", "nist-table1", "missing.toml", noise_percent=20
+        "nist-table1", "nist", "missing.toml", noise_percent=20
     ),
 }
 NO_PICTURES = ("analyze", "map", "place", "case-study", "compare", "diagnose", "update", "plan")
@@ -114,7 +114,7 @@ def test_an_effect_check_is_its_function_s_but_for_the_measured_time(here, capsy
 
 
 def test_the_next_visit_is_its_function_s(here, capsys):
-    tps.plan("nist", between=("spindle_compliance", "none"), n=2).save("plan", plots=False)
+    tps.plan(machine="nist", between=("spindle_compliance", "none"), n=2).save("plan", plots=False)
     found = tps.next_visit("plan")
     assert main(["plan", "--next", "plan", "--json"]) == 0
     assert capsys.readouterr().out == found.to_json()
@@ -123,7 +123,7 @@ def test_the_next_visit_is_its_function_s(here, capsys):
 def test_many_programs_are_their_function_s(here, capsys):
     Path("other.nc").write_text(SLOT)
     assert main(["analyze", "slot.nc", "other.nc", "--step", "20", "--jobs", "1", "--no-plots", "--json"]) == 0
-    found = tps.analyze_many("nist", ["slot.nc", "other.nc"], "reports", jobs=1, step_mm=20, plots=False)
+    found = tps.analyze_many(["slot.nc", "other.nc"], "nist", "reports", jobs=1, step_mm=20, plots=False)
     assert capsys.readouterr().out == found.to_json()
 
 
@@ -141,7 +141,7 @@ def test_path_is_its_function(here, capsys):
 
 
 def test_a_saved_folder_is_the_command_s(here):
-    found = tps.analyze("nist", "slot.nc", step_mm=5)
+    found = tps.analyze("slot.nc", "nist", step_mm=5)
     written = found.save("saved", plots=False)
     assert main(["analyze", "slot.nc", "--step", "5", "--no-plots", "--out", "made"]) == 0
     assert {file.name for file in written} == {"samples.csv", "summary.json"}
@@ -150,7 +150,7 @@ def test_a_saved_folder_is_the_command_s(here):
 
 
 def test_saving_clears_what_an_earlier_run_left_and_keeps_what_is_not_the_tool_s(here):
-    found = tps.analyze("nist", "slot.nc", step_mm=5)
+    found = tps.analyze("slot.nc", "nist", step_mm=5)
     found.save("saved")
     (here / "saved" / "notes.txt").write_text("mine")
     found.save("saved", plots=False)
@@ -166,12 +166,12 @@ def test_saving_clears_what_an_earlier_run_left_and_keeps_what_is_not_the_tool_s
 @pytest.mark.parametrize(
     "result",
     [
-        lambda: tps.analyze("nist", tps.Program.from_text(SLOT), step_mm=5),
+        lambda: tps.analyze(tps.Program.from_text(SLOT), "nist", step_mm=5),
         lambda: tps.map_stiffness("nist", points=11),
         lambda: tps.Machine.load("nist"),
         lambda: tps.Machine.load("nist").check(),
-        lambda: tps.compare("nist", "nist-table1", noise_percent=5),
-        lambda: tps.plan("nist", n=8),
+        lambda: tps.compare("nist-table1", "nist", noise_percent=5),
+        lambda: tps.plan(machine="nist", n=8),
     ],
 )
 def test_a_result_draws_itself(result):
@@ -278,38 +278,38 @@ def test_a_machine_and_readings_show_themselves_as_json_and_in_notebooks(tmp_pat
 
 def test_shop_units_at_the_door():
     slot = tps.Program.from_text(SLOT)
-    found = tps.analyze("nist", slot, step_mm=5, origin_mm_deg=(0, 0, 800)).to_frame()
+    found = tps.analyze(slot, "nist", step_mm=5, origin_mm_deg=(0, 0, 800)).to_frame()
     assert found["z_mm"].max() == pytest.approx(805.0)
     assert found["s_mm"].diff().max() <= 5.0 + 1e-9
-    turned = tps.analyze("nist", slot, step_mm=5, origin_mm_deg=(0, 0, 800, 0, 0, 90)).to_frame()
+    turned = tps.analyze(slot, "nist", step_mm=5, origin_mm_deg=(0, 0, 800, 0, 0, 90)).to_frame()
     assert turned["y_mm"].max() == pytest.approx(60.0)  # x of the program lies along y
 
 
 @pytest.mark.parametrize(
     ("ask", "told"),
     [
-        (lambda: tps.analyze("nist", tps.Program.from_text(SLOT), step_mm=0), "--step 0"),
-        (lambda: tps.analyze("nist", tps.Program.from_text(SLOT), step_mm=float("nan")), "--step nan"),
+        (lambda: tps.analyze(tps.Program.from_text(SLOT), "nist", step_mm=0), "--step 0"),
+        (lambda: tps.analyze(tps.Program.from_text(SLOT), "nist", step_mm=float("nan")), "--step nan"),
         (
-            lambda: tps.analyze("nist", tps.Program.from_text(SLOT), origin_mm_deg=(1, 2)),
+            lambda: tps.analyze(tps.Program.from_text(SLOT), "nist", origin_mm_deg=(1, 2)),
             "of 2 numbers",
         ),
-        (lambda: tps.analyze("nist", tps.Program.from_text(SLOT), load="sideways"), "sideways"),
-        (lambda: tps.analyze("nist", "nowhere.nc"), "nowhere.nc"),
+        (lambda: tps.analyze(tps.Program.from_text(SLOT), "nist", load="sideways"), "sideways"),
+        (lambda: tps.analyze("nowhere.nc", "nist"), "nowhere.nc"),
         (lambda: tps.Machine.load("nobody"), "nobody"),
         (lambda: tps.Machine.load("nist", temperature_C=1000), "--temperature 1000"),
-        (lambda: tps.pose("nist", (0, 0)), "a pose of 2 numbers"),
-        (lambda: tps.pose("nist", (0, 0, 1e9)), "1e\\+09"),
+        (lambda: tps.pose((0, 0), "nist"), "a pose of 2 numbers"),
+        (lambda: tps.pose((0, 0, 1e9), "nist"), "1e\\+09"),
         (lambda: tps.map_stiffness("nist", points=1), "points 1"),
         (lambda: tps.map_stiffness("nist", z_mm=(800, 800)), "twice"),
-        (lambda: tps.place("nist", tps.Program.from_text(SLOT), x_mm=(5, -5)), "lower bound first"),
-        (lambda: tps.place("nist", tps.Program.from_text(SLOT), decimals=3), "without --write"),
-        (lambda: tps.place("nist", tps.Program.from_text(SLOT), objective="best"), "--objective best"),
-        (lambda: tps.compare("nist", "nist-table1", noise_percent=80), "noise 80 %"),
-        (lambda: tps.compare("nist", "nist-table1", seed=-1), "seed -1"),
-        (lambda: tps.compare("nist", "nowhere.csv"), "nowhere.csv"),
-        (lambda: tps.plan("nist", minutes={"lunch": 30}), "lunch"),
-        (lambda: tps.update("nist", "nist-table1"), "nothing"),
+        (lambda: tps.place(tps.Program.from_text(SLOT), "nist", x_mm=(5, -5)), "lower bound first"),
+        (lambda: tps.place(tps.Program.from_text(SLOT), "nist", decimals=3), "without --write"),
+        (lambda: tps.place(tps.Program.from_text(SLOT), "nist", objective="best"), "--objective best"),
+        (lambda: tps.compare("nist-table1", "nist", noise_percent=80), "noise 80 %"),
+        (lambda: tps.compare("nist-table1", "nist", seed=-1), "seed -1"),
+        (lambda: tps.compare("nowhere.csv", "nist"), "nowhere.csv"),
+        (lambda: tps.plan(machine="nist", minutes={"lunch": 30}), "lunch"),
+        (lambda: tps.update("nist-table1", "nist"), "nothing"),
     ],
 )
 def test_what_is_wrong_is_one_error_that_can_be_caught(ask, told):
@@ -319,8 +319,8 @@ def test_what_is_wrong_is_one_error_that_can_be_caught(ask, told):
 
 def test_a_pose_out_of_reach_is_an_error_alone_and_empty_among_others():
     with pytest.raises(tps.UnreachableError):
-        tps.pose("nist", (0, 0, 5000))
-    found = tps.pose("nist", [(0, 0, 800), (0, 0, 5000)])
+        tps.pose((0, 0, 5000), "nist")
+    found = tps.pose([(0, 0, 800), (0, 0, 5000)], "nist")
     assert found.reachable.tolist() == [True, False]
     assert found.to_dict()["poses"][1]["kx_N_per_mm"] is None
     json.dumps(found.to_dict(), allow_nan=False)
@@ -328,21 +328,21 @@ def test_a_pose_out_of_reach_is_an_error_alone_and_empty_among_others():
 
 def test_progress_is_told_what_how_much_and_of_how_much(here):
     told = []
-    tps.analyze("nist", "slot.nc", progress=lambda *what: told.append(what))
+    tps.analyze("slot.nc", "nist", progress=lambda *what: told.append(what))
     text, done, total = told[-1]
     assert text == "slot.nc: samples"
     assert done == total > 0
 
 
 def test_an_updated_machine_goes_on(here):
-    update = tps.update("nist", "nist-table1", strut_law=True)
+    update = tps.update("nist-table1", "nist", strut_law=True)
     assert update.accepted
     better = update.machine
     file = update.save_machine("mine.toml")
     again = tps.Machine.load(file)
     at = (0, 0, 800)
-    assert tps.pose(better, at).to_dict()["kz_N_per_mm"] == pytest.approx(tps.pose(again, at).to_dict()["kz_N_per_mm"])
-    assert tps.compare(again, "nist-table1", noise_percent=5).to_dict()["machine"] == "nist"
+    assert tps.pose(at, better).to_dict()["kz_N_per_mm"] == pytest.approx(tps.pose(at, again).to_dict()["kz_N_per_mm"])
+    assert tps.compare("nist-table1", again, noise_percent=5).to_dict()["machine"] == "nist"
 
 
 def test_a_rewritten_program_cuts_where_the_placed_one_does(here):
@@ -360,17 +360,17 @@ def test_a_rewritten_program_cuts_where_the_placed_one_does(here):
 def test_a_machine_and_a_program_travel_to_another_process():
     machine = pickle.loads(pickle.dumps(tps.Machine.load("nist")))
     program = pickle.loads(pickle.dumps(tps.Program.from_text(SLOT)))
-    assert tps.analyze(machine, program, step_mm=5).complete
+    assert tps.analyze(program, machine, step_mm=5).complete
 
 
 def test_a_diagnosis_is_not_made_again_for_the_plan(monkeypatch):
     from toolpath_stiff.inference import judgement as planning
 
     data = tps.Measurements.read("nist-table1")
-    found = tps.diagnose("nist", data, noise_percent=10)
-    plain = tps.plan("nist", data, noise_percent=10, n=2)
+    found = tps.diagnose(data, "nist", noise_percent=10)
+    plain = tps.plan(data, "nist", noise_percent=10, n=2)
     monkeypatch.setattr(planning, "judge", None, raising=True)
-    assert tps.plan("nist", data, noise_percent=10, n=2, diagnosis=found).to_dict() == plain.to_dict()
+    assert tps.plan(data, "nist", noise_percent=10, n=2, diagnosis=found).to_dict() == plain.to_dict()
 
 
 def test_place_names_the_program_that_it_wrote_among_the_files(here, capsys):
@@ -378,9 +378,9 @@ def test_place_names_the_program_that_it_wrote_among_the_files(here, capsys):
     assert main(["place", "slot.nc", *options.split(), "--write", "placed.nc"]) == 0
     written = capsys.readouterr().out.split("written:\n")[1].split()
     assert written == ["out/placements.csv", "out/placement.json", "placed.nc"]
-    again = tps.place("nist", "slot.nc", **PLACE, write="placed.nc")
+    again = tps.place("slot.nc", "nist", **PLACE, write="placed.nc")
     assert Path("placed.nc").read_bytes() == again.program_bytes
 
 
 def test_a_machine_may_be_named_after_the_data():
-    assert str(tps.compare("nist-table1", machine="genhexkins")) == str(tps.compare("genhexkins", "nist-table1"))
+    assert str(tps.compare("nist-table1", machine="genhexkins")) == str(tps.compare("nist-table1", "genhexkins"))

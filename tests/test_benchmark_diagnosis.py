@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.bars import holds_truth, mean, middle_of, misnamed, named, share, wilson
 from benchmarks.diagnosis import FIRST_SEED, report
-from benchmarks.diagnosis_bars import floor_ratio, holds_truth, mean, middle_of, misnamed, named, share, wilson
+from benchmarks.diagnosis_bars import floor_ratio
 from benchmarks.diagnosis_cases import Job, choice_is_right, interval_checks, make_jobs, run, settleable
 from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.effects import at_strength, draw_shape

@@ -12,11 +12,11 @@ SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nG1 Y30\nM2\n"
 
 @pytest.fixture(scope="module")
 def hand():
-    return tps.preview("nist", "nist-table1", noise_percent=5)
+    return tps.preview("nist-table1", "nist", noise_percent=5)
 
 
 def test_without_effects_the_errors_are_those_of_compare(hand):
-    told = tps.compare("nist", "nist-table1", noise_percent=5)
+    told = tps.compare("nist-table1", "nist", noise_percent=5)
     given, refitted = hand.at(strut_law=False), hand.at()
     baseline = told.to_dict()["baseline"]
     for name in ("mean_abs_error_percent", "bias_percent", "rms_percent"):
@@ -28,7 +28,7 @@ def test_without_effects_the_errors_are_those_of_compare(hand):
 
 
 def test_with_the_sizes_of_an_update_the_error_is_that_of_the_update(hand):
-    found = tps.update("nist", "nist-table1", add="weak_strut:strut=1", noise_percent=5, force=True).to_dict()
+    found = tps.update("nist-table1", "nist", add="weak_strut:strut=1", noise_percent=5, force=True).to_dict()
     sizes = found["steps"][-1]["parameters"]["weak_strut"]
     keys = {"strut": 1, "factor": sizes["factor"]["value"]}
     there = found["steps"][-1]["mean_abs_error_percent"]
@@ -48,7 +48,7 @@ def test_the_machine_by_hand_carries_effect_and_law(hand):
     keys = {"strut": 2, "factor": 0.8}
     machine = hand.machine({"weak_strut": keys})
     assert machine.effects == ["weak_strut"]
-    told = tps.compare(machine, "nist-table1", noise_percent=5).to_dict()["baseline"]["mean_abs_error_percent"]
+    told = tps.compare("nist-table1", machine, noise_percent=5).to_dict()["baseline"]["mean_abs_error_percent"]
     assert hand.at({"weak_strut": keys})["mean_abs_error_percent"] == pytest.approx(told, rel=1e-4)
 
 
@@ -79,13 +79,13 @@ def test_from_out_of_reach_there_is_no_way():
 @pytest.mark.parametrize("origin", [(0, 0, 800, 0, 0, 0), (120, -80, 950, 0, 0, 40)])
 def test_a_placement_that_is_tried_has_the_figures_of_its_analysis(origin):
     slot = tps.Program.from_text(SLOT, name="slot.nc")
-    tried = tps.try_placement("nist", slot, step_mm=2).at(origin)
-    found = tps.analyze("nist", slot, origin_mm_deg=origin, step_mm=2)
+    tried = tps.try_placement(slot, "nist", step_mm=2).at(origin)
+    found = tps.analyze(slot, "nist", origin_mm_deg=origin, step_mm=2)
     for name in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm"):
         assert tried[name] == pytest.approx(getattr(found, name), rel=1e-6)
 
 
 def test_a_placement_out_of_reach_has_no_figures():
-    tried = tps.try_placement("nist", tps.Program.from_text(SLOT, name="slot.nc"), step_mm=10).at((3000, 0, 800))
+    tried = tps.try_placement(tps.Program.from_text(SLOT, name="slot.nc"), "nist", step_mm=10).at((3000, 0, 800))
     assert tried["mean_N_per_mm"] is None
     assert tried["margin"] < 0

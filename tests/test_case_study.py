@@ -98,14 +98,14 @@ REGIONS = {"low": (100, 0, 600, 30), "high": (100, 0, 900, 30), "beside": (-100,
 def slot(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("slot.nc").write_text(SLOT, encoding="ascii")
-    return tps.case_study("nist", "slot.nc", REGIONS, step_mm=10)
+    return tps.case_study("slot.nc", "nist", REGIONS, step_mm=10)
 
 
 def test_own_path_in_own_regions_has_the_figures_of_analyze(slot):
     rows = {row["region"]: row for row in slot.to_dict()["regions"]}
     assert list(rows) == list(REGIONS)
     for name, (x, y, z, *turn) in REGIONS.items():
-        alone = tps.analyze("nist", "slot.nc", origin_mm_deg=(x, y, z, 0, 0, *(turn or [0])), step_mm=10)
+        alone = tps.analyze("slot.nc", "nist", origin_mm_deg=(x, y, z, 0, 0, *(turn or [0])), step_mm=10)
         assert rows[name]["mean_N_per_mm"] == pytest.approx(alone.mean_N_per_mm, abs=1e-3)
         assert rows[name]["range_N_per_mm"] == pytest.approx(alone.range_N_per_mm, abs=1e-3)
 
@@ -117,7 +117,7 @@ def test_conclusions_on_own_regions_compare_what_can_be_compared(slot):
     limits, heights = slot.to_dict()["limits_of_the_conclusions"], slot.to_dict()["heights"]
     assert {600.0, limits["largest_mean_at_z_mm"]} <= {row["z_mm"] for row in heights}
     assert "slot.nc in 4 regions" in str(slot) and "Non-planar" not in str(slot)
-    one = tps.case_study("nist", "slot.nc", {"a": (0, 0, 800)}, step_mm=20)
+    one = tps.case_study("slot.nc", "nist", {"a": (0, 0, 800)}, step_mm=20)
     assert [found["holds"] for found in one.to_dict()["conclusions"]] == [None, None, None]
     assert "not tested. no two regions" in str(one) and "0 of 0" in repr(one)
 

@@ -286,7 +286,7 @@ def test_no_odd_file_in_a_folder_ends_the_others(shop):
 def test_the_command_shows_what_the_function_returns(shop, capsys):
     seen = []
     found = tps.analyze_many(
-        "nist", ["jobs"], "out", plots=False, step_mm=20, jobs=1, progress=lambda *told: seen.append(told)
+        ["jobs"], "nist", "out", plots=False, step_mm=20, jobs=1, progress=lambda *told: seen.append(told)
     )
     before = files_of(shop / "out")
     assert main(["analyze", "jobs", "--out", "out", *SHORT]) == 1
@@ -300,13 +300,13 @@ def test_the_command_shows_what_the_function_returns(shop, capsys):
 
 
 def test_the_table_of_the_function_is_the_summary(shop):
-    found = tps.analyze_many("nist", ["jobs"], "out", plots=False, step_mm=20, jobs=1, compare_with="genhexkins")
+    found = tps.analyze_many(["jobs"], "nist", "out", plots=False, step_mm=20, jobs=1, compare_with="genhexkins")
     frame = found.to_frame()
     with (shop / "out/summary.csv").open(encoding="utf-8") as stream:
         heading, *rows = csv.reader(stream)
     assert list(frame.columns) == heading and repr(found) == "<ManyAnalyses: 3 programs, 1 failed>"
     assert frame["reason"].tolist() == [row[heading.index("reason")] for row in rows]
-    found = tps.analyze_many("nist", ["jobs"], "out", plots=False, step_mm=20, jobs=1)
+    found = tps.analyze_many(["jobs"], "nist", "out", plots=False, step_mm=20, jobs=1)
     rows = rows_of(shop / "out")
     for _, one in found.to_frame().iterrows():
         row = rows[one["file"]]
@@ -319,11 +319,11 @@ def test_the_table_of_the_function_is_the_summary(shop):
 def test_programs_may_be_given_as_objects_and_read_their_own_way(shop):
     inch = tps.Program.from_text("G20 F40.\nG1 X1.\nX0\nM2", name="inch.nc", dialect="fanuc")
     read = tps.Program.read("jobs/a/part.nc")
-    found = tps.analyze_many("nist", [inch, read, Path("jobs/b")], "out", plots=False, jobs=2, step_mm=20)
+    found = tps.analyze_many([inch, read, Path("jobs/b")], "nist", "out", plots=False, jobs=2, step_mm=20)
     assert [(one.name, one.status) for one in found.outcomes] == [
         ("inch.nc", "done"), ("a/part.nc", "done"), ("b/part.nc", "done"),
     ]  # fmt: skip
-    alone = tps.analyze("nist", inch, step_mm=20)
+    alone = tps.analyze(inch, "nist", step_mm=20)
     assert found.to_dict()[0] == {**alone.to_dict(), "file": "inch.nc", "report": "out/inch/summary.json"}
 
 
@@ -343,16 +343,16 @@ def test_programs_may_be_given_as_objects_and_read_their_own_way(shop):
 )
 def test_a_wrong_argument_of_the_function_starts_nothing(shop, programs, options, words):
     with pytest.raises(tps.InputError, match=re.escape(words)):
-        tps.analyze_many("nist", programs, "out", **options)
+        tps.analyze_many(programs, "nist", "out", **options)
     assert not (shop / "out").exists()
 
 
 def test_any_executor_will_do_and_a_broken_one_fails_what_it_was_given(shop):
     with ThreadPoolExecutor(3) as threads:
-        found = tps.analyze_many("nist", ["jobs"], "out", executor=threads, plots=False, step_mm=20)
-    tps.analyze_many("nist", ["jobs"], "alone", jobs=1, plots=False, step_mm=20)
+        found = tps.analyze_many(["jobs"], "nist", "out", executor=threads, plots=False, step_mm=20)
+    tps.analyze_many(["jobs"], "nist", "alone", jobs=1, plots=False, step_mm=20)
     assert files_of(shop / "out") == files_of(shop / "alone")
-    again = tps.analyze_many("nist", ["jobs"], "out", executor=threads, plots=False)  # it is shut down
+    again = tps.analyze_many(["jobs"], "nist", "out", executor=threads, plots=False)  # it is shut down
     assert [one.status for one in again.outcomes] == ["failed"] * 3
     assert again.outcomes[0].reason.startswith("jobs/a/part.nc: no process could do it: RuntimeError: ")
     assert [one.status for one in found.outcomes] == ["done", "done", "failed"]

@@ -125,11 +125,11 @@ def test_ranges_are_read_in_order_or_refused(low, high):
 @pytest.mark.parametrize(
     ("words", "call"),
     [
-        (["analyze", "part.nc", "--step", "-1"], lambda: tps.analyze("nist", "part.nc", step_mm=-1)),
+        (["analyze", "part.nc", "--step", "-1"], lambda: tps.analyze("part.nc", "nist", step_mm=-1)),
         (["path", "part.nc", "--step", "nan"], lambda: tps.sample_path("part.nc", step_mm=float("nan"))),
         (["map", "--points", "1"], lambda: tps.map_stiffness("nist", points=1)),
-        (["place", "part.nc", "--objective", "best"], lambda: tps.place("nist", "part.nc", objective="best")),
-        (["plan", "--max-tilt", "90"], lambda: tps.plan("nist", max_tilt_deg=90)),
+        (["place", "part.nc", "--objective", "best"], lambda: tps.place("part.nc", "nist", objective="best")),
+        (["plan", "--max-tilt", "90"], lambda: tps.plan(machine="nist", max_tilt_deg=90)),
         (["path", "part.nc", "--feed", "0"], lambda: tps.Program.read("part.nc", feed_mm_per_min=0)),
     ],
 )

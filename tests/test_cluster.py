@@ -92,8 +92,8 @@ def test_the_function_takes_the_executor_of_a_client(cluster, shop):
     from distributed import Client
 
     with Client(cluster, set_as_default=False) as client:
-        done = tps.analyze_many("nist", ["jobs"], "o", executor=client.get_executor(), plots=False, step_mm=20)
-        again = tps.analyze_many("nist", ["jobs"], "o", executor=client.get_executor(), plots=False, step_mm=20)
+        done = tps.analyze_many(["jobs"], "nist", "o", executor=client.get_executor(), plots=False, step_mm=20)
+        again = tps.analyze_many(["jobs"], "nist", "o", executor=client.get_executor(), plots=False, step_mm=20)
     assert [one.status for one in done.outcomes] == ["done", "done", "failed"]
     assert done.outcomes == again.outcomes
     assert done.to_json() == json.dumps(done.to_dict(), indent=2) + "\n"

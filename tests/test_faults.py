@@ -261,7 +261,7 @@ def test_many_programs_killed_leave_no_overview_of_another_run(tmp_path):
     out, template = tmp_path / "out", tmp_path / "template"
 
     def run(folder, step):
-        tps.analyze_many("nist", programs, folder, jobs=1, plots=False, step_mm=step)
+        tps.analyze_many(programs, "nist", folder, jobs=1, plots=False, step_mm=step)
 
     run(template, 5.0)
     before = tree(template)

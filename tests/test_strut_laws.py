@@ -154,10 +154,10 @@ def test_analyze_pose_and_place_agree_with_the_linear_law(machine, linear, tmp_p
         assert len(found[0]) == len(found[1]) > 10
         return found
 
-    np.testing.assert_allclose(*both(lambda file: tps.pose(file, [50, -40, 800, 5, 3, 10]).to_dict()), rtol=1e-8)
-    np.testing.assert_allclose(*both(lambda file: tps.analyze(file, slot).to_dict()), rtol=1e-8)
+    np.testing.assert_allclose(*both(lambda file: tps.pose([50, -40, 800, 5, 3, 10], file).to_dict()), rtol=1e-8)
+    np.testing.assert_allclose(*both(lambda file: tps.analyze(slot, file).to_dict()), rtol=1e-8)
     put = [
-        tps.place(file, slot, x_mm=(-60, 60), y_mm=0, z_mm=(700, 800), rotate_deg=0, step_mm=20, points=3).to_dict()
+        tps.place(slot, file, x_mm=(-60, 60), y_mm=0, z_mm=(700, 800), rotate_deg=0, step_mm=20, points=3).to_dict()
         for file in files
     ]
     means = [one["recommended"]["mean_N_per_mm"] for one in put]
@@ -258,7 +258,7 @@ def test_update_refits_the_law_in_its_own_form(law, tmp_path):
     readings_file, mine, truth = tmp_path / "m.csv", tmp_path / "mine.toml", machine_with(law).strut_law
     readings_file.write_text(campaign(law)[0])
     mine.write_text(machine_toml(machine_with(law).with_changes(strut_law=scaled_law(truth, (0.1, 0.1)))))
-    update = tps.update(mine, readings_file, strut_law=True)
+    update = tps.update(readings_file, mine, strut_law=True)
     written = load_machine(update.save_machine(tmp_path / "new.toml"))
     found = written.strut_law
     assert (found.constant, len(found.shape)) == (truth.constant, len(truth.shape))

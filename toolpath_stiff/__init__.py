@@ -8,7 +8,7 @@ Examples
 >>> import toolpath_stiff as tps
 >>> machine = tps.Machine.load("nist")
 >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
->>> analysis = tps.analyze(machine, slot, origin_mm_deg=(0, 0, 800))
+>>> analysis = tps.analyze(slot, machine, origin_mm_deg=(0, 0, 800))
 >>> round(analysis.mean_N_per_mm)
 54353
 """

@@ -55,7 +55,7 @@ class TpsError(Exception):
     --------
     >>> import toolpath_stiff as tps
     >>> try:
-    ...     tps.pose("nist", (0, 0, 5000))
+    ...     tps.pose((0, 0, 5000), "nist")
     ... except tps.TpsError as error:
     ...     print(type(error).__name__, error.exit_code)
     UnreachableError 2
@@ -256,7 +256,7 @@ class EffectError(InputError):
     --------
     >>> import toolpath_stiff as tps
     >>> try:
-    ...     tps.preview("nist", "nist-table1").at({"weak_strut": {"strut": 7, "factor": 0.8}})
+    ...     tps.preview("nist-table1", "nist").at({"weak_strut": {"strut": 7, "factor": 0.8}})
     ... except tps.EffectError as error:
     ...     print(error)
     by hand: effect weak_strut: strut = 7; expected a whole number from 1 to 6
@@ -287,7 +287,7 @@ class UnreachableError(PoseError):
     --------
     >>> import toolpath_stiff as tps
     >>> try:
-    ...     tps.pose("nist", (0, 0, 5000))
+    ...     tps.pose((0, 0, 5000), "nist")
     ... except tps.UnreachableError as error:
     ...     print(error.found)
     the pose is out of reach on machine nist: frame joint2 angle needs 97.97 deg, limit 30.00 deg, 67.97 deg beyond

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
@@ -17,12 +16,6 @@ from toolpath_stiff.results_folder import Rules, write_folder
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
-
-
-P = ParamSpec("P")
-
-
-Found = TypeVar("Found")
 
 
 # Called with what is being done, how much of it is done, and how much there is (0: not known).
@@ -199,18 +192,6 @@ class TextResult(Result):
 
     def _short(self) -> str:
         return self._said
-
-
-def machine_by_name(function: Callable[P, Found]) -> Callable[P, Found]:
-    """The same function, which also takes `(data, machine=...)`: a machine is what many name, and data come first."""
-
-    @wraps(function)
-    def called(*args: P.args, **kwargs: P.kwargs) -> Found:
-        if len(args) == 1 and "machine" in kwargs and "data" not in kwargs:
-            return function(*(kwargs.pop("machine"), *args), **kwargs)  # type: ignore[arg-type]
-        return function(*args, **kwargs)
-
-    return called
 
 
 def notebook_text(text: str) -> str:

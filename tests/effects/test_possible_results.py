@@ -173,7 +173,7 @@ def test_the_gate_fails_where_a_cut_has_no_figure(tmp_path, monkeypatch, capsys,
     assert main(["analyze", "part.nc", "--no-plots", "--require", "1", *option]) == 3
     assert "line 3: no stiffness" in capsys.readouterr().out
     assert main(["analyze", "part.nc", "--no-plots", *option]) == (1 if option else 0)
-    found = tps.analyze("nist", "part.nc", require_N_per_mm=1.0, partial=bool(option))
+    found = tps.analyze("part.nc", "nist", require_N_per_mm=1.0, partial=bool(option))
     assert found.below_required[0][0] == 3 and "part.nc on nist" in repr(found)
 
 
@@ -207,4 +207,4 @@ def test_extreme_parameters_give_a_result_or_a_message():
 @pytest.mark.parametrize("pose", [(0, 0, "a"), [[1, 2, 3], [4]]])
 def test_a_pose_that_is_no_numbers_is_an_error_of_ours(pose):
     with pytest.raises(InputError, match="expected numbers X Y Z"):
-        tps.pose("nist", pose)
+        tps.pose(pose, "nist")

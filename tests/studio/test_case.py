@@ -121,7 +121,7 @@ def test_a_program_and_where_it_sits(case, tmp_path):
     case.add_program(tmp_path / "slot.nc")
     case.place_at((10, 0, 820))
     found = case.analyze()
-    there = tps.analyze(case.machine, tmp_path / "slot.nc", origin_mm_deg=(10, 0, 820))
+    there = tps.analyze(tmp_path / "slot.nc", case.machine, origin_mm_deg=(10, 0, 820))
     assert found.mean_N_per_mm == there.mean_N_per_mm
     assert "--origin 10,0,820" in case.history[-1].command
 
@@ -235,7 +235,7 @@ def test_what_no_effect_explains_is_drafted_and_competes(tmp_path):
 def test_a_switch_set_by_hand_has_a_command_that_gives_its_error(case, monkeypatch, capsys):
     keys = {"strut": 4, "factor": 0.83}
     case.switch("weak_strut", keys)
-    shown = tps.preview(case.machine, case.data).at({"weak_strut": keys})
+    shown = tps.preview(case.data, case.machine).at({"weak_strut": keys})
     line = case.history[-1].command
     assert "--machine machines/by-hand.toml" in line
     monkeypatch.chdir(case.folder)
@@ -319,7 +319,7 @@ def test_a_moved_case_works_without_its_code_until_this_user_agrees(from_elsewhe
     assert case.not_agreed == ("effects/my_screw.py",)
     assert "effects/my_screw.py" in repr(case)
     found = case.analyze().to_dict()
-    assert found["mean_N_per_mm"] == tps.analyze("nist", case.program).mean_N_per_mm
+    assert found["mean_N_per_mm"] == tps.analyze(case.program, "nist").mean_N_per_mm
     assert found["effects_idle"] == [
         {"effect": "my_screw", "reason": "its code is not run, as you have not agreed to it"}
     ]
@@ -436,7 +436,7 @@ def test_a_program_is_read_with_its_tools_and_so_is_its_command(tmp_path, monkey
     case.place_at((0, 0, 700))
     found = case.analyze()
     read = tps.Program.read(tmp_path / "long.nc", tools=tmp_path / "my.tbl", block_delete={2}, dialect="linuxcnc")
-    assert found.mean_N_per_mm == tps.analyze("nist", read, origin_mm_deg=(0, 0, 700)).mean_N_per_mm
+    assert found.mean_N_per_mm == tps.analyze(read, "nist", origin_mm_deg=(0, 0, 700)).mean_N_per_mm
     case.read_programs(tools=tmp_path / "my.tbl")
     assert tps.Case.open(case.folder).analyze().to_frame().equals(found.to_frame())
     monkeypatch.chdir(case.folder)

@@ -463,7 +463,7 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     state = settled(running)
     case = tps.Case.open(running.folder)
     asked = [case.path(name) for name in case.state.data]
-    command = tps.diagnose(case.path(case.state.machine), asked).to_dict()
+    command = tps.diagnose(asked, case.path(case.state.machine)).to_dict()
     tab.until("document.querySelector('#sentence small') !== null")
     assert state["verdict"]["text"] == command["text"]
     assert tab.number("#g-as_given") == pytest.approx(
@@ -496,7 +496,7 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     settled(running)
     on = tps.Case.open(running.folder).state.on
     assert on["weak_strut"]["strut"] == 4
-    hand = tps.preview(case.machine, case.data).at(on)["mean_abs_error_percent"]
+    hand = tps.preview(case.data, case.machine).at(on)["mean_abs_error_percent"]
     tab.until(f"Math.abs(parseFloat(document.querySelector('#g-now').textContent) - {hand}) < 0.006")
     settled(running)
     page.click("#fit")
@@ -529,7 +529,7 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     tab.until("Math.abs(parseFloat(document.querySelector('#o-Xn').value)) > 20")
     settled(running)
     case = tps.Case.open(running.folder)
-    there = tps.try_placement(case.machine, case.program).at(case.state.origin)
+    there = tps.try_placement(case.program, case.machine).at(case.state.origin)
     for name in ("mean", "range", "min"):
         assert tab.number(f"#pl-{name}") == pytest.approx(there[f"{name}_N_per_mm"], abs=0.5)
     assert tab.number("#pl-margin") == pytest.approx(100 * there["margin"], abs=0.05)
@@ -543,7 +543,7 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     written = page.get_attribute("#set-up-written", "href")
     status, program, _ = running.ask("GET", written)
     assert (status, running.ask("GET", page.get_attribute("#set-up-sheet", "href"))[0]) == (200, 200)
-    again = tps.analyze(case.machine, tps.Program.from_text(program.decode()))
+    again = tps.analyze(tps.Program.from_text(program.decode()), case.machine)
     assert again.mean_N_per_mm == pytest.approx(there["mean_N_per_mm"], rel=1e-6)
     # The best place; a point of the front becomes the placement.
     page.click("#best")

@@ -184,7 +184,7 @@ def test_bench_records_to_a_history_and_back(tmp_path, monkeypatch, capsys):
     (again,) = found.document["history"]["struts"][2]["changes"]
     assert again["text"] == change["text"] and change["text"] in text(found)
     with pytest.raises(InputError, match="no reading of the tip"):
-        tps.compare("nist", "bench_measurements.csv")
+        tps.compare("bench_measurements.csv", "nist")
 
 
 def test_one_sided_records_give_the_sign_of_their_force(tmp_path):

@@ -182,7 +182,7 @@ def test_measurements_are_mapped_and_hints_carry_the_mapping(write, capsys):
     assert tps.Measurements.read("a.csv", columns=mapping).to_frame()["stiffness_N_per_mm"].tolist()[0] == 40_000.0
     assert main(["compare", "a.csv", "--columns", mapping, "--noise", "5", "--no-plots"]) == 0
     assert f"--columns '{mapping}'" in capsys.readouterr().out
-    compared = tps.compare("nist", "a.csv", columns={"direction": "Richtung", "stiffness": "Steifigkeit [N/um]:N/um"})
+    compared = tps.compare("a.csv", "nist", columns={"direction": "Richtung", "stiffness": "Steifigkeit [N/um]:N/um"})
     assert compared.to_dict()["baseline"]["mean_abs_error_percent"] > 0.0
 
 

@@ -59,7 +59,7 @@ class PoseStiffness(Result):
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.pose("nist", [(0, 0, 800), (0, 0, 5000)])
+    >>> found = tps.pose([(0, 0, 800), (0, 0, 5000)], "nist")
     >>> found
     <PoseStiffness: 2 poses of nist, 1 within reach>
     >>> found.reachable.tolist(), found.warnings

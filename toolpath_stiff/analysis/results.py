@@ -59,7 +59,7 @@ class Analysis(EvaluatedPath, FolderResult):
     --------
     >>> import toolpath_stiff as tps
     >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> found = tps.analyze("nist", slot, origin_mm_deg=(0, 0, 800), require_N_per_mm=54000)
+    >>> found = tps.analyze(slot, "nist", origin_mm_deg=(0, 0, 800), require_N_per_mm=54000)
     >>> [round(one) for one in (found.mean_N_per_mm, found.min_N_per_mm, found.range_N_per_mm)]
     [54353, 53875, 948]
     >>> found.weakest["line"], found.weakest["text"]

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.api.diagnosis import Data, Noise, Question
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.results import machine_by_name
 
 if TYPE_CHECKING:
     from toolpath_stiff.inference.evidence import Fit
@@ -21,7 +20,7 @@ class Preview:
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> hand = tps.preview("nist", "nist-table1", noise_percent=5)
+    >>> hand = tps.preview("nist-table1", "nist", noise_percent=5)
     >>> sorted(hand.at({}))
     ['bias_percent', 'deviation_percent', 'mean_abs_error_percent', 'modelled_N_per_mm', 'rms_percent']
     >>> hand.machine({"weak_strut": {"strut": 4, "factor": 0.8}})
@@ -126,9 +125,12 @@ def _entries(effects: Mapping[str, Mapping[str, Any]]) -> list[EffectEntry]:
     return [EffectEntry(name, dict(keys)) for name, keys in effects.items()]
 
 
-@machine_by_name
 def preview(
-    machine: Machine | str | Path, data: Data, *, noise_percent: Noise = None, strut_spread_percent: float = 1.0
+    data: Data,
+    machine: Machine | str | Path = "nist",
+    *,
+    noise_percent: Noise = None,
+    strut_spread_percent: float = 1.0,
 ) -> Preview:
     """Set effects by hand and see the error of every reading: made once, then some milliseconds a setting.
 
@@ -137,7 +139,7 @@ def preview(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> hand = tps.preview("nist", "nist-table1", noise_percent=5)
+    >>> hand = tps.preview("nist-table1", "nist", noise_percent=5)
     >>> round(hand.at(strut_law=False)["mean_abs_error_percent"], 2)
     9.62
     >>> round(hand.at({"weak_strut": {"strut": 4, "factor": 0.8}})["mean_abs_error_percent"], 2)

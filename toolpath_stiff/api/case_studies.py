@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 @checked
 def case_study(
-    machine: Machine | str | Path = "nist",
     program: Program | str | Path | None = None,
+    machine: Machine | str | Path = "nist",
     regions: Mapping[str, Sequence[float]] | str | Path | None = None,
     *,
     step_mm: Step = 1.0,
@@ -28,10 +28,10 @@ def case_study(
 
     Parameters
     ----------
-    machine
-        A machine, its name or its file.
     program
         What runs; unless given, the packaged contour of a 200 mm square.
+    machine
+        A machine, its name or its file.
     regions
         Name -> x, y, z of program zero in mm and, if turned, the angle in degrees; or a table with the columns region,
         x_mm, y_mm, z_mm, rotation_deg. Unless given, four of the reference machine.
@@ -48,10 +48,10 @@ def case_study(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> tps.case_study("nist")
+    >>> tps.case_study(machine="nist")
     <CaseStudy: nist, 3 of 3 conclusions of the paper hold>
     >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> tps.case_study("nist", slot, {"left": (-200, 0, 800), "right": (200, 0, 800, 90)}, step_mm=10)
+    >>> tps.case_study(slot, "nist", {"left": (-200, 0, 800), "right": (200, 0, 800, 90)}, step_mm=10)
     <CaseStudy: slot.nc on nist, 1 of 1 conclusion of the paper holds>
     """
     from toolpath_stiff.placement.case_study import run_case_study

@@ -14,7 +14,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import options
 from toolpath_stiff.options import Option, checked, distinct_numbers, finite_number, names
-from toolpath_stiff.results import FolderResult, Progress, machine_by_name, one_of, teller
+from toolpath_stiff.results import FolderResult, Progress, one_of, teller
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Update(FolderResult):
     --------
     >>> import pathlib, tempfile
     >>> import toolpath_stiff as tps
-    >>> found = tps.update("nist", "nist-table1", strut_law=True, noise_percent=5)
+    >>> found = tps.update("nist-table1", "nist", strut_law=True, noise_percent=5)
     >>> found
     <Update: updated, mean error 9.62 to 9.67 %>
     >>> found.accepted, found.to_dict()["objective"]
@@ -143,11 +143,10 @@ class Update(FolderResult):
         )
 
 
-@machine_by_name
 @checked
 def update(
-    machine: Machine | str | Path,
     data: Data,
+    machine: Machine | str | Path = "nist",
     *,
     add: Annotated[str | Iterable[str], Option("--add", "EFFECT[:KEY=VALUE,..]", count="append")] = (),
     strut_law: Annotated[bool, Option("--strut-law")] = False,
@@ -166,7 +165,7 @@ def update(
 
     Parameters
     ----------
-    machine, data
+    data, machine
         The machine; measurements, or the files that hold them.
     add
         Effects to add: "weak_strut", or with what they act on, "weak_strut:strut=3".
@@ -198,7 +197,7 @@ def update(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.update("nist", "nist-table1", strut_law=True)
+    >>> found = tps.update("nist-table1", "nist", strut_law=True)
     >>> found.to_frame()["name"].tolist()
     ['as given', 'strut law refitted']
     """
@@ -223,11 +222,10 @@ def update(
     return Update(found, asked)
 
 
-@machine_by_name
 @checked
 def plan(
-    machine: Machine | str | Path,
     data: Data | None = None,
+    machine: Machine | str | Path = "nist",
     *,
     between: Annotated[Sequence[str], Option("--between", "A,B", read=names)] = (),
     n: Annotated[int | None, Option("--n")] = None,
@@ -249,7 +247,7 @@ def plan(
 
     Parameters
     ----------
-    machine, data
+    data, machine
         The machine; measurements, or the files that hold them; None before the first campaign.
     between
         Effects to tell apart, or "none"; unless given, what a diagnosis of the data leaves standing.
@@ -287,7 +285,7 @@ def plan(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.plan("nist", between=("spindle_compliance", "none"), n=2)
+    >>> found = tps.plan(machine="nist", between=("spindle_compliance", "none"), n=2)
     >>> found
     <Plan: rivals, 2 clampings>
     >>> len(found.to_dict()["visits"]), found.to_frame().columns.tolist()[:6]

@@ -15,7 +15,7 @@ from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, options
 from toolpath_stiff.options import Option, checked, numbers
-from toolpath_stiff.results import Progress, machine_by_name, teller
+from toolpath_stiff.results import Progress, teller
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -235,11 +235,10 @@ def _noise(percent: Noise) -> Noise:
     return shares[0] if len(shares) == 1 else (shares[0], shares[1])
 
 
-@machine_by_name
 @checked
 def compare(
-    machine: Machine | str | Path,
     data: Data,
+    machine: Machine | str | Path = "nist",
     *,
     columns: Mapped = None,
     noise_percent: NoisePercent = None,
@@ -251,7 +250,7 @@ def compare(
 
     Parameters
     ----------
-    machine, data
+    data, machine
         The machine; measurements, or the files that hold them.
     columns
         Which columns the files call otherwise: "stiffness=stiff_mean:N/um", or such a dict.
@@ -273,7 +272,7 @@ def compare(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> tps.compare("nist", "nist-table1", noise_percent=5)
+    >>> tps.compare("nist-table1", "nist", noise_percent=5)
     <Comparison: nist, mean error 9.62 %>
     """
     from toolpath_stiff.comparison.compare import compare as compare_readings
@@ -284,11 +283,10 @@ def compare(
     return replace(comparison, inputs=asked.inputs)
 
 
-@machine_by_name
 @checked
 def diagnose(
-    machine: Machine | str | Path,
     data: Data,
+    machine: Machine | str | Path = "nist",
     *,
     columns: Mapped = None,
     noise_percent: NoisePercent = None,
@@ -302,7 +300,7 @@ def diagnose(
 
     Parameters
     ----------
-    machine, data
+    data, machine
         The machine, whose effect files take part; measurements, or the files that hold them.
     columns
         As of `compare`.
@@ -322,7 +320,7 @@ def diagnose(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.diagnose("nist", "nist-table1", noise_percent=20)
+    >>> found = tps.diagnose("nist-table1", "nist", noise_percent=20)
     >>> found.verdict, found.plausible[:2], found.best
     ('adequate', ['none', 'joint_moment_stiffness'], 'joint_moment_stiffness')
     >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape

@@ -11,7 +11,7 @@ from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.options import checked
-from toolpath_stiff.results import Progress, Result, machine_by_name, teller
+from toolpath_stiff.results import Progress, Result, teller
 
 if TYPE_CHECKING:
     from toolpath_stiff.correction.draft import Draft
@@ -179,11 +179,10 @@ def effect_template(name: str) -> EffectFile:
     return EffectFile(name, text.replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
 
 
-@machine_by_name
 @checked
 def draft_effect(
-    machine: Machine | str | Path,
     data: Data,
+    machine: Machine | str | Path = "nist",
     file: str | Path = "missing.toml",
     *,
     noise_percent: NoisePercent = None,
@@ -195,7 +194,7 @@ def draft_effect(
 
     Parameters
     ----------
-    machine, data
+    data, machine
         The machine, whose effect files take part; measurements, or the files that hold them.
     file
         Where it will be saved: the effect is named after it. Nothing is written yet.
@@ -210,7 +209,7 @@ def draft_effect(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.draft_effect("nist", "nist-table1", noise_percent=20)
+    >>> found = tps.draft_effect("nist-table1", "nist", noise_percent=20)
     >>> found.reason
     'Nothing is missing that these data could show: there is nothing to describe.'
     >>> found.to_dict()["effect"] is None, found.text  # `found.save(FILE)` raises InputError then

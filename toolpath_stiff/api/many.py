@@ -33,6 +33,7 @@ from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.options import checked
 from toolpath_stiff.processes import ProcessPool, death
+from toolpath_stiff.report.analysis.summary import check_table
 from toolpath_stiff.report.batch.index import files, names
 from toolpath_stiff.report.batch.programs import (
     Found,
@@ -129,8 +130,8 @@ class ManyAnalyses(Result):
 
 @checked
 def analyze_many(
-    machine: Machine | str | Path,
     programs: Iterable[str | Path | Program | Found],
+    machine: Machine | str | Path,
     folder: str | Path,
     *,
     executor: Executor | None = None,
@@ -155,11 +156,11 @@ def analyze_many(
 
     Parameters
     ----------
-    machine
-        What they run on; a name or a file is loaded.
     programs
         Files, folders (every program in them and below), `Program` objects. A file that is named twice is read once,
         as its `Program` object says if there is one of the same path.
+    machine
+        What they run on; a name or a file is loaded.
     folder
         Where the reports go: a folder for each program, `index.html` and `summary.csv` beside them.
     executor
@@ -191,7 +192,7 @@ def analyze_many(
     >>> slot = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2"
     >>> parts = [tps.Program.from_text(slot, name="slot.nc"), tps.Program.from_text("G1 X10 F", name="bad.nc")]
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     found = tps.analyze_many("nist", parts, folder, jobs=1, plots=False, require_N_per_mm=60000)
+    ...     found = tps.analyze_many(parts, "nist", folder, jobs=1, plots=False, require_N_per_mm=60000)
     ...     programs = [entry["program"] for entry in found.to_dict()]
     ...     "".join(found.json_pieces()) == found.to_json()
     True
@@ -213,6 +214,7 @@ def analyze_many(
         "require_N_per_mm": require_N_per_mm,
     }  # fmt: skip
     path_options(**options)  # a mistake in them is one error
+    check_table(table)
     found, given = _found(programs)
     example = Program.from_text("", **reading)
     _check_shared(on, other, [example, *given.values()])
@@ -492,7 +494,7 @@ def analyze_task(task: Task, machines: Machines | None = None) -> Outcome:
     try:
         with _ALONE:
             on, other = machines or _unpacked(task.machines)
-            found = analyze(on, task.program, compare_with=other, **task.options)
+            found = analyze(task.program, on, compare_with=other, **task.options)
             found.save(task.folder, rules=Rules(inputs=task.inputs, replace=task.replace), **task.saving)
     except TpsError as error:
         return _failed(task, str(error))

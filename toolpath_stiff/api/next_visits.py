@@ -37,7 +37,7 @@ def next_visit(
     >>> import tempfile
     >>> import toolpath_stiff as tps
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = tps.plan("nist", between=("spindle_compliance", "none"), n=2).save(folder, plots=False)
+    ...     _ = tps.plan(machine="nist", between=("spindle_compliance", "none"), n=2).save(folder, plots=False)
     ...     found = tps.next_visit(folder)
     ...     [file.name for file in found.save()]
     ['next_1.csv']

@@ -62,8 +62,8 @@ class KeepOut:
 
 @checked
 def place(
-    machine: Machine | str | Path,
     program: Program | str | Path,
+    machine: Machine | str | Path = "nist",
     *,
     x_mm: Annotated[Range | None, Option("--x", "LO:HI", read=low_high)] = None,
     y_mm: Annotated[Range | None, Option("--y", "LO:HI", read=low_high)] = None,
@@ -95,7 +95,7 @@ def place(
 
     Parameters
     ----------
-    machine, program
+    program, machine
         What it runs on, what runs.
     x_mm, y_mm, z_mm
         Of program zero, mm: low and high, or a number to fix it; unless given, as far as the machine reaches.
@@ -144,7 +144,7 @@ def place(
     --------
     >>> import toolpath_stiff as tps
     >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> found = tps.place("nist", slot, x_mm=(-50, 50), y_mm=0, z_mm=(700, 800), rotate_deg=0, step_mm=10)
+    >>> found = tps.place(slot, "nist", x_mm=(-50, 50), y_mm=0, z_mm=(700, 800), rotate_deg=0, step_mm=10)
     >>> found.worse
     []
     """
@@ -301,7 +301,7 @@ class PlacementTrial:
     --------
     >>> import toolpath_stiff as tps
     >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> trial = tps.try_placement("nist", slot, step_mm=10)
+    >>> trial = tps.try_placement(slot, "nist", step_mm=10)
     >>> trial.samples, list(trial.at((0, 0, 800)))
     (7, ['mean_N_per_mm', 'range_N_per_mm', 'min_N_per_mm', 'margin', 'rapid_margin'])
     >>> trial.at((0, 0, 5000))["mean_N_per_mm"] is None  # out of reach
@@ -329,8 +329,8 @@ class PlacementTrial:
 
 @checked
 def try_placement(
-    machine: Machine | str | Path,
     program: Program | str | Path,
+    machine: Machine | str | Path = "nist",
     *,
     load: LoadDirection = LOAD,
     step_mm: Step = 1.0,
@@ -344,7 +344,7 @@ def try_placement(
     --------
     >>> import toolpath_stiff as tps
     >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> round(tps.try_placement("nist", slot).at((0, 0, 800))["mean_N_per_mm"])
+    >>> round(tps.try_placement(slot, "nist").at((0, 0, 800))["mean_N_per_mm"])
     54353
     """
     from toolpath_stiff.analysis.loads import parse_load

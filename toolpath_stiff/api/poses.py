@@ -91,8 +91,8 @@ def _coordinate(text: str) -> float:
 
 @checked
 def pose(
-    machine: Machine | str | Path,
     pose_mm_deg: ArrayLike,
+    machine: Machine | str | Path = "nist",
     *,
     force_N: Force = FORCE,
 ) -> PoseStiffness:
@@ -100,11 +100,11 @@ def pose(
 
     Parameters
     ----------
-    machine
-        A machine, its name or its file.
     pose_mm_deg
         (3,) or (6,): X, Y, Z of the tool tip in mm, roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); or
         (n, 3) or (n, 6) of these.
+    machine
+        A machine, its name or its file.
     force_N
         Size of the load, for effects that depend on it.
 
@@ -118,10 +118,10 @@ def pose(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.pose("nist", (-300, 300, 300, -30, 0, 0))
+    >>> found = tps.pose((-300, 300, 300, -30, 0, 0), "nist")
     >>> round(found.to_dict()["kz_N_per_mm"])
     18919
-    >>> tps.pose("nist", [(0, 0, 800), (0, 0, 5000)]).reachable.tolist()
+    >>> tps.pose([(0, 0, 800), (0, 0, 5000)], "nist").reachable.tolist()
     [True, False]
     """
     import numpy as np

@@ -61,8 +61,8 @@ ShowPlunges = Annotated[bool, SHOW_PLUNGES]
 
 @checked
 def analyze(
-    machine: Machine | str | Path,
     program: Program | str | Path,
+    machine: Machine | str | Path = "nist",
     *,
     origin_mm_deg: Origin = None,
     load: LoadDirection = LOAD,
@@ -77,7 +77,7 @@ def analyze(
 
     Parameters
     ----------
-    machine, program
+    program, machine
         What it runs on, what runs; names and files are loaded.
     origin_mm_deg
         Where program zero (G54) sits in machine coordinates: X, Y, Z or X, Y, Z, A, B, C. Unless given, where the
@@ -108,7 +108,7 @@ def analyze(
     --------
     >>> import toolpath_stiff as tps
     >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> found = tps.analyze("nist", slot, origin_mm_deg=(0, 0, 800))
+    >>> found = tps.analyze(slot, "nist", origin_mm_deg=(0, 0, 800))
     >>> found
     <Analysis: slot.nc on nist, mean 54 353 N/mm, min 53 875 N/mm>
     >>> found.to_frame()[["line", "x_mm", "stiffness_N_per_mm"]].tail(1).round(0).values.tolist()

@@ -94,7 +94,7 @@ class Contents(History):
         state = self.state
         key = (state.machine, state.effects, state.data, state.aside)
         if self._preview is None or self._preview[0] != key:
-            self._preview = (key, preview(self.machine, self.data))
+            self._preview = (key, preview(self.data, self.machine))
         return self._preview[1]
 
     def machine_with(self, on: Mapping[str, Mapping[str, Any]]) -> Machine:

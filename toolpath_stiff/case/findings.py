@@ -44,20 +44,20 @@ class Findings(Contents):
         """Where the model fails, as `tps.compare`; kept in results/."""
         from toolpath_stiff.api.diagnosis import compare
 
-        return self._kept("compare", compare(self.machine, self.data, progress=progress))
+        return self._kept("compare", compare(self.data, self.machine, progress=progress))
 
     def diagnose(self, progress: Progress | None = None) -> Diagnosis:
         """Which effect is missing, as `tps.diagnose`; kept in results/."""
         from toolpath_stiff.api.diagnosis import diagnose
 
-        return self._kept("diagnose", diagnose(self.machine, self.data, progress=progress))
+        return self._kept("diagnose", diagnose(self.data, self.machine, progress=progress))
 
     def draft_in(self, result: str, progress: Progress | None = None) -> tuple[EffectDraft, str]:
         """What `draft` finds, kept in a folder of the case without a step; and its command."""
         from toolpath_stiff.api.effects import draft_effect
 
         file = f"{result}/{self._free_effect('missing')}.toml"
-        found = draft_effect(self.machine, self.data, file, progress=progress)
+        found = draft_effect(self.data, self.machine, file, progress=progress)
         (self.folder / result).mkdir(parents=True, exist_ok=True)
         if found.text:
             found.save(self.folder / file)
@@ -79,14 +79,14 @@ class Findings(Contents):
 
         names = [add] if isinstance(add, str) else list(add)
         return self._kept(
-            "update", update(self.machine, self.data, add=names, progress=progress), repr(names), add=names
+            "update", update(self.data, self.machine, add=names, progress=progress), repr(names), add=names
         )
 
     def plan(self, n: int = 6) -> Plan:
         """What to measure next, as `tps.plan`; kept in results/, plan.csv among it."""
         from toolpath_stiff.api.correction import plan
 
-        return self._kept("plan", plan(self.machine, self.data if self.state.data else None, n=n), f"n={n}", n=n)
+        return self._kept("plan", plan(self.data if self.state.data else None, self.machine, n=n), f"n={n}", n=n)
 
     def analyze(self, machine: str = "", progress: Progress | None = None) -> Analysis:
         """The program on the machine with the effects that are switched on, as `tps.analyze`; kept in results/.
@@ -106,8 +106,8 @@ class Findings(Contents):
         state, name = self.state, machine or self.state.machine
         on = self.machine_of(machine) if machine else self.machine_with(state.on)
         found = analyze(
-            on,
             self.program,
+            on,
             origin_mm_deg=state.origin or None,
             partial=True,
             require_N_per_mm=state.require or None,
@@ -123,7 +123,7 @@ class Findings(Contents):
         """Where the work should sit, as `tps.place`; kept in results/."""
         from toolpath_stiff.api.placements import place
 
-        found = place(self.machine, self.program, origin_mm_deg=self.state.origin or None, progress=progress, **bounds)
+        found = place(self.program, self.machine, origin_mm_deg=self.state.origin or None, progress=progress, **bounds)
         words = ", ".join(f"{name}={value!r}" for name, value in bounds.items())
         return self._kept("place", found, words, program=self.state.program)
 
@@ -150,10 +150,10 @@ class Findings(Contents):
         at: dict[str, Any] = dict(zip(names, (*state.origin, 0.0, 0.0, 0.0), strict=False))
         name, reason = Path(state.program).name, ""
         try:
-            found = place(self.machine, self.program, write=name, progress=progress, **at)
+            found = place(self.program, self.machine, write=name, progress=progress, **at)
             content = found.program_bytes
         except InputError as error:
-            found, reason = place(self.machine, self.program, progress=progress, **at), str(error)
+            found, reason = place(self.program, self.machine, progress=progress, **at), str(error)
         found.save(self.folder / result)
         beside = {"not_written.txt": f"{reason}\n"} if reason else {name: content}
         write_files(self.folder / result, beside)

@@ -57,13 +57,13 @@ def pose(args: Namespace) -> int:
         )
     machine = machine_for(args)
     if args.csv is None:
-        single = poses.pose(machine, args.pose, force_N=args.force_N)
+        single = poses.pose(args.pose, machine, force_N=args.force_N)
         sys.stdout.write(single.to_json() if args.json else f"{single}\n")
         return 0
     table, notes = poses.read_poses(args.csv)
     for note in notes:
         print(f"tps: note: {note}", file=sys.stderr)
-    stiffnesses = poses.pose(machine, table, force_N=args.force_N)
+    stiffnesses = poses.pose(table, machine, force_N=args.force_N)
     sys.stdout.write(stiffnesses.to_json() if args.json else stiffnesses.csv())
     for warning in (*stiffnesses.warnings, *stiffnesses.out_of_reach(MOST_NAMED)):
         print(f"tps: warning: {warning}", file=sys.stderr)

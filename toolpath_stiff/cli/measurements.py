@@ -17,9 +17,10 @@ from toolpath_stiff.cli.progress import progress_line
 from toolpath_stiff.files import write_atomically
 
 
-def measured(args: Namespace) -> tuple[Machine, Measurements]:
-    """The machine with its effect files, and the measurements."""
-    return Machine.load(**given(args, Machine.load)), Measurements(args.data, args.columns)
+def measured(args: Namespace) -> tuple[Measurements, Machine]:
+    """The measurements, and the machine with its effect files."""
+    machine = Machine.load(**given(args, Machine.load))
+    return Measurements(args.data, args.columns), machine
 
 
 def reduce(args: Namespace) -> int:
@@ -101,12 +102,12 @@ def diagnose(args: Namespace) -> int:
     from toolpath_stiff.report.diagnose.page import names
 
     target = destination(args, "diagnose", args.data, "-diagnose").check(names(not args.no_plots))
-    machine, data = measured(args)
+    data, machine = measured(args)
     options = given(args, diagnosis.diagnose)
     with progress_line(quiet=args.json) as progress:
         if args.program:
             options["program"] = program_for(args, args.program)
-        verdict = diagnosis.diagnose(machine.under(**given(args, Machine.under)), data, progress=progress, **options)
+        verdict = diagnosis.diagnose(data, machine.under(**given(args, Machine.under)), progress=progress, **options)
         return show(args, verdict, target)
 
 
@@ -165,9 +166,9 @@ def plan(args: Namespace) -> int:
     from toolpath_stiff.report.plan import names
 
     target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
-    machine, data = measured(args)
+    data, machine = measured(args)
     options = given(args, correction.plan) | {"minutes": dict(args.minutes or ())}
-    return show(args, correction.plan(machine, data if args.data else None, **options), target)
+    return show(args, correction.plan(data if args.data else None, machine, **options), target)
 
 
 def _next(args: Namespace) -> int:

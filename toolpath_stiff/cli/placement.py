@@ -40,8 +40,8 @@ def place(args: Namespace) -> int:
         tell_incomplete([target.folder])
     with progress_line(quiet=args.json) as progress:
         placement = placements.place(
-            machine_for(args),
             program_for(args, args.program),
+            machine_for(args),
             earlier=Path(target.folder, "placement.json"),
             progress=progress,
             **given(args, placements.place),
@@ -78,7 +78,7 @@ def case_study(args: Namespace) -> int:
     source = args.program or args.machine
     target = destination(args, "case-study", [source], "-case-study").check(names(not args.no_plots))
     program = None if args.program is None else program_for(args, args.program)
-    study = case_studies.case_study(machine_for(args), program, regions or args.regions, step_mm=args.step_mm)
+    study = case_studies.case_study(program, machine_for(args), regions or args.regions, step_mm=args.step_mm)
     return show(args, study, target)
 
 

@@ -100,7 +100,7 @@ def _run_single(args: Namespace, file: str) -> int:
     target = destination(args, "analyze", [file]).check(names(not args.no_plots, args.table))
     with progress_line(quiet=args.json) as progress:
         analysis = programs.analyze(
-            machine_for(args), program_for(args, file), progress=progress, **given(args, programs.analyze)
+            program_for(args, file), machine_for(args), progress=progress, **given(args, programs.analyze)
         )
     show(args, analysis, target, table=args.table, show_plunges=args.show_plunges)
     if analysis.below_required:
@@ -122,8 +122,8 @@ def _run_many(args: Namespace, found: Sequence[Found], counts: Sequence[FolderCo
     try:
         with _executor(args) as executor:
             analyses = analyze_many(
-                machine_for(args),
                 found,
+                machine_for(args),
                 args.out or "reports",
                 executor=executor,
                 plots=not args.no_plots,

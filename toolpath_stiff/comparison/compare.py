@@ -85,7 +85,7 @@ class Comparison(FolderResult):
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> comparison = tps.compare("nist", "nist-table1", noise_percent=5)
+    >>> comparison = tps.compare("nist-table1", "nist", noise_percent=5)
     >>> round(comparison.to_dict()["baseline"]["mean_abs_error_percent"], 2)
     9.62
     >>> comparison.to_frame()[["direction", "measured_N_per_mm", "modelled_N_per_mm"]].shape

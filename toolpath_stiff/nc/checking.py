@@ -17,16 +17,18 @@ from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning, would_change
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, plain, switches_on
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
+from toolpath_stiff.nc.cutter_location.state import State as CutterLocationState
+from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
 from toolpath_stiff.nc.reader import (
     INTERPRETERS,
     feed_assumption,
     foreign_program,
-    lathe_warning,
     millimetre_warning,
     parse_program,
     refused_program,
@@ -300,28 +302,25 @@ def _on_the_part(
 def _check_cutter_location(
     lines: tuple[str, ...], name: str, origin: Iterable[float], block_delete: bool, controller: Controller
 ) -> Checked:
-    checked = cutter_location.check(lines, name, controller.tools, MOST_ERRORS, controller.feed)
-    state = checked.state
+    state = CutterLocationState(name, copy.deepcopy(controller.tools), controller.feed)
+    start, errors = cutter_location.in_force(state), cutter_location.run(state, lines, MOST_ERRORS)
     warnings = (*cutter_location.not_for(controller, controller.offsets, block_delete), *state.warnings)
+    changes = {word: "what is not known" if noted.doubtful else NO_CHANGE for word, noted in state.noted.items()}
     x, y, z, a, b, c = origin
     return Checked(
-        used=tuple(UsedCode(line, 1, word, text, NOTE, count) for word, text, line, count in checked.meanings()),
+        used=tuple(
+            UsedCode(line, 1, word, meaning_of(word), NOTE, count) for word, (line, count) in state.used_words.items()
+        ),
         unsupported=tuple(
-            Finding(
-                word.line,
-                word.column,
-                word.word,
-                f"{word.reason}; it would change {'what is not known' if word.word in state.doubtful else NO_CHANGE}",
-                NOTE,
-            )
+            Finding(word.line, word.column, word.word, f"{word.reason}; it would change {changes[word.word]}", NOTE)
             for word in cutter_location.unsupported(state)
         ),
-        findings=findings_of(checked.errors, warnings, state.assumptions),
-        start=checked.start,
-        end=checked.end,
+        findings=findings_of(errors, warnings, state.assumptions),
+        start=start,
+        end=cutter_location.in_force(state),
         moves=state.recorder.moves() if len(state.recorder) else None,
         origin=(x, y, z, a, b, c),
-        complete=not checked.errors,
+        complete=not errors,
         dialect=CUTTER_LOCATION,
         marks=tuple(state.marks),
     )

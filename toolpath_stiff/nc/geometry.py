@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.nc.moves import Arc, Moves
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -292,6 +292,13 @@ class ArcFrame:
 def arc_frame(moves: Moves, rows: IntArray) -> ArcFrame:
     """The frames of the arcs in `rows` of moves."""
     return ArcFrame(moves.arc_center[rows], moves.arc_normal[rows], moves.start[rows, :3], moves.end[rows, :3])
+
+
+def point_on_arc(arc: Arc, start: Sequence[float], end: Sequence[float], share: float) -> Vector:
+    """The point at a share of an arc's sweep, as it is sampled; mm, as `start` and `end`."""
+    points = (np.array([point[:3]], dtype=float) for point in (arc.center, arc.normal, start, end))
+    frame, row = ArcFrame(*points), np.zeros(1, dtype=np.int64)
+    return _vector(_along_arcs(frame, np.array([arc.sweep]), row, np.array([share]))[0][0])
 
 
 def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -7,23 +7,22 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.codes.points import increments_hint
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Dialect, Switches, check_plain, plain
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
-from toolpath_stiff.nc.lathes import lathe_program
+from toolpath_stiff.nc.lathes import lathe_program, lathe_warning
 from toolpath_stiff.nc.moves import RAPID, Moves, Program
 from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.place import Place
-from toolpath_stiff.nc.request import ZERO, Request
+from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
 from toolpath_stiff.nc.words import HEAD_LINES, looks_like_cutter_location, read_lines, split_lines
@@ -277,22 +276,10 @@ def _second_opinion(error: InputError, request: Request) -> Program:
 def _read_by_linuxcnc(request: Request) -> Program:
     from toolpath_stiff.nc.linuxcnc.reader import read
 
-    posted, reading = request.posted, read(request)
-    program = Program(
-        name=request.name,
-        path=request.path,
-        source=request.lines,
-        moves=reading.moves,
-        origin=pose_in_si(reading.origin),
-        origin_source=reading.source,
-        unsupported=reading.unsupported,
-        warnings=(*reading.warnings, *lathe_warning(reading.turning, reading.moves)),
-        assumptions=(*reading.assumptions, *feed_assumption(request.controller, reading.moves)),
-        tools=reading.tools,
-        interpreter="linuxcnc",
-        dialect="linuxcnc",
-    )
-    return program if posted is None else _on_the_part(program, request, posted, (), request.offsets)
+    program = read(request)
+    assumed = feed_assumption(request.controller, program.moves)
+    program = replace(program, assumptions=(*program.assumptions, *assumed))
+    return program if request.posted is None else _on_the_part(program, request, request.posted, (), request.offsets)
 
 
 def _read_built_in(request: Request) -> Program:
@@ -323,10 +310,7 @@ def _run_built_in(
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
     g54 = request.offsets.table[0].given or frames.offsets.table[0].given
     if frames.source == "option" and g54:
-        warnings.append(
-            f"the program or the offsets file sets G54; {both_names('--origin')} overrides it, other offsets keep "
-            "their distance to it"
-        )
+        warnings.append(ORIGIN_WINS)
     moves = state.recorder.moves()
     program = Program(
         name=request.name,
@@ -350,17 +334,6 @@ def _run_built_in(
     if posted is None:
         return program
     return _on_the_part(program, request, posted, state.tip_held, frames.offsets)
-
-
-def lathe_warning(signs: Mapping[str, int], moves: Moves | None) -> list[str]:
-    """What makes a program look like a lathe's (with its line), if nothing of it ever moves along Y."""
-    if moves is None or not signs or (moves.start[:, 1] != moves.end[:, 1]).any() or moves.arc_normal[:, 2].any():
-        return []
-    what, line = next(iter(signs.items()))
-    return [
-        f"line {line}: {what} and no move along Y: this looks like a lathe's program. X is read as a position; where "
-        "it is a diameter, the path is wrong"
-    ]
 
 
 _LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)

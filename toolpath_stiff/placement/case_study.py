@@ -69,7 +69,7 @@ class CaseStudy(FolderResult):
     --------
     >>> import toolpath_stiff as tps
     >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> study = tps.case_study("nist", slot, {"low": (0, 0, 500), "high": (0, 0, 900)}, step_mm=10)
+    >>> study = tps.case_study(slot, "nist", {"low": (0, 0, 500), "high": (0, 0, 900)}, step_mm=10)
     >>> study.to_frame()[["region", "z_mm"]].values.tolist()
     [['low', 500.0], ['high', 900.0]]
     >>> study.is_own

@@ -63,7 +63,7 @@ class Placement(FolderResult):
     --------
     >>> import toolpath_stiff as tps
     >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> found = tps.place("nist", slot, x_mm=0, y_mm=0, z_mm=800, rotate_deg=0, step_mm=10, points=2, write="new.nc")
+    >>> found = tps.place(slot, "nist", x_mm=0, y_mm=0, z_mm=800, rotate_deg=0, step_mm=10, points=2, write="new.nc")
     >>> found
     <Placement: slot.nc, X0 Y0 Z800 A0 B0 C0 of 1 placements>
     >>> found.origin_mm_deg, found.worse, found.warnings

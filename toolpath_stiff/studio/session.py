@@ -138,7 +138,7 @@ class Session:
         state = self.case.state
         found: tps.PlacementTrial = self.once(
             "trial", (state.machine, state.effects, self.program_key),
-            lambda: tps.try_placement(self.machine, self.case.program),
+            lambda: tps.try_placement(self.case.program, self.machine),
         )  # fmt: skip
         return found
 

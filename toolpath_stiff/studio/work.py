@@ -100,7 +100,7 @@ def diagnose(case: Any, tell: Tell, result: str) -> dict[str, Any]:
     """Which effect is missing."""
     import toolpath_stiff as tps
 
-    found = tps.diagnose(case.machine, case.data, progress=tell)
+    found = tps.diagnose(case.data, case.machine, progress=tell)
     found.save(case.folder / result, plots=False)
     return {"text": repr(found), "document": found.to_dict()}
 
@@ -109,7 +109,7 @@ def compare(case: Any, tell: Tell, result: str) -> dict[str, Any]:
     """Where the model fails, with its pictures and its page."""
     import toolpath_stiff as tps
 
-    found = tps.compare(case.machine, case.data, progress=tell)
+    found = tps.compare(case.data, case.machine, progress=tell)
     tell("drawing", 0, 0)
     found.save(case.folder / result)
     return {"text": repr(found), "document": found.to_dict()}
@@ -119,7 +119,7 @@ def update(case: Any, tell: Tell, result: str, add: list[str]) -> dict[str, Any]
     """Effects fitted and judged; the machine file is kept where the data support them."""
     import toolpath_stiff as tps
 
-    found = tps.update(case.machine, case.data, add=add, machine_file=f"{result}/machine.toml", progress=tell)
+    found = tps.update(case.data, case.machine, add=add, machine_file=f"{result}/machine.toml", progress=tell)
     found.save(case.folder / result, plots=False, machine=False)
     if found.accepted:
         found.save_machine(case.folder / result / "machine.toml")
@@ -131,7 +131,7 @@ def plan(case: Any, tell: Tell, result: str, n: int) -> dict[str, Any]:
     import toolpath_stiff as tps
 
     tell("choosing poses", 0, 0)
-    found = tps.plan(case.machine, case.data if case.state.data else None, n=n)
+    found = tps.plan(case.data if case.state.data else None, case.machine, n=n)
     found.save(case.folder / result, plots=False)
     return {"text": repr(found), "document": found.to_dict(), "rows": found.to_frame().to_dict("records")}
 
@@ -142,7 +142,7 @@ def analyze(case: Any, tell: Tell, result: str, machine: str, first: str) -> dic
 
     found, command = case.analyze_in(result, machine, tell)
     origin = case.state.origin or None
-    before = tps.analyze(case.machine_of(first), case.program, origin_mm_deg=origin, partial=True, progress=tell)
+    before = tps.analyze(case.program, case.machine_of(first), origin_mm_deg=origin, partial=True, progress=tell)
     return {"text": repr(found), "document": found.to_dict(), "command": command, "path": _columns(found, before)}
 
 
@@ -200,7 +200,7 @@ def place(case: Any, tell: Tell, result: str, **bounds: Any) -> dict[str, Any]:
 
     wanted: dict[str, Any] = {name: tuple(one) if isinstance(one, list) else one for name, one in bounds.items()}
     found = tps.place(
-        case.machine, case.program, origin_mm_deg=case.state.origin or None, progress=tell,
+        case.program, case.machine, origin_mm_deg=case.state.origin or None, progress=tell,
         **wanted,
     )  # fmt: skip
     found.save(case.folder / result, plots=False)

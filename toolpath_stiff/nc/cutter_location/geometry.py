@@ -21,6 +21,7 @@ linear interpolation departs by at most an eighth of the largest of them. Along 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.geometry import (
@@ -123,11 +124,8 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
 
 def _sweep(circle: Circle, here: Point2, there: Point2) -> float:
     angle = math.atan2(there[1], there[0])
-    if math.dist(here, there) < SAME_POINT_MM:
-        angle += math.tau * circle.turns
-        whole = True
-    else:
-        angle, whole = angle % math.tau, False
+    whole = math.dist(here, there) < SAME_POINT_MM
+    angle = angle + math.tau * circle.turns if whole else angle % math.tau
     if circle.turns > 1 and not whole:
         raise ArcError("a helix of several turns that does not end above its start", "one CIRCLE a turn")
     if circle.sweep is not None:
@@ -138,20 +136,6 @@ def _sweep(circle: Circle, here: Point2, there: Point2) -> float:
                 "an end that is that far along the circle",
             )
     return angle
-
-
-def part_of(arc: Arc, start: Vector, end: Vector, share: float) -> Vector:
-    """The point at a share of an arc's sweep, as it is sampled: climb and growth of the radius go with the angle."""
-    out = minus(start, arc.center)
-    radius = math.sqrt(dot(out, out))
-    first = (out[0] / radius, out[1] / radius, out[2] / radius)
-    second = cross(arc.normal, first)
-    climb = dot(minus(end, arc.center), arc.normal)
-    flat = along(minus(end, arc.center), arc.normal, -climb)
-    growth = math.sqrt(dot(flat, flat)) - radius
-    angle, size = share * arc.sweep, radius + share * growth
-    point = along(along(arc.center, first, size * math.cos(angle)), second, size * math.sin(angle))
-    return along(point, arc.normal, share * climb)
 
 
 def turned_as(center: Vector, axis: Vector, start: Vector, direction: Vector) -> Vector:
@@ -203,17 +187,12 @@ def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which
     return along(flat, circle.axis, rise)
 
 
-class AxisError(ArcError):
-    """What is wrong with a tool axis: found, expected."""
-
-
-def unit_axis(i: float, j: float, k: float) -> Vector:
-    """A tool axis of length 1. Raises `AxisError` if the given one is further off than `AXIS_TOLERANCE`."""
+def unit_axis(numbers: Sequence[float], what: str = "a tool axis") -> Vector:
+    """An axis of length 1. Raises `ArcError` if the given one is further off than `AXIS_TOLERANCE`."""
+    i, j, k = numbers
     length = math.sqrt(i * i + j * j + k * k)
     if abs(length - 1.0) > AXIS_TOLERANCE:
-        raise AxisError(
-            f"a tool axis {i:g},{j:g},{k:g} of length {length:.6g}", f"a unit vector, within {AXIS_TOLERANCE:g}"
-        )
+        raise ArcError(f"{what} {i:g},{j:g},{k:g} of length {length:.6g}", f"a unit vector, within {AXIS_TOLERANCE:g}")
     return (i / length, j / length, k / length)
 
 
@@ -229,18 +208,25 @@ def angles_near(axis: Vector, near: tuple[float, float]) -> tuple[float, float]:
 
 def angle_between(first: Vector, second: Vector) -> float:
     """Degrees between two unit vectors; exact for small ones too."""
-    difference = math.dist(first, second)
-    return math.degrees(2.0 * math.asin(min(1.0, difference / 2.0)))
+    return math.degrees(2.0 * math.asin(min(1.0, math.dist(first, second) / 2.0)))
+
+
+def angle_of(first: Vector, second: Vector) -> float:
+    """Degrees between two vectors of any length, nan where one has none."""
+    x, y, z = cross(first, second)
+    if min(dot(first, first), dot(second, second)) < 1e-18:
+        return math.nan
+    return math.degrees(math.atan2(math.sqrt(x * x + y * y + z * z), dot(first, second)))
 
 
 def division(first: Vector, second: Vector) -> int:
-    """Into how many equal parts a turn of the tool axis is divided. Raises `AxisError` where it turns over."""
+    """Into how many equal parts a turn of the tool axis is divided. Raises `ArcError` where it turns over."""
     chord = math.dist(first, second)
     if chord < 0.008 and abs(first[1]) < 0.9 and abs(second[1]) < 0.9:
         return 1  # half a degree and less, of a tool well away from Y: what most moves turn by
     angle = angle_between(first, second)
     if angle > TURNED_OVER:
-        raise AxisError(f"a tool axis that turns over by {angle:.1f} degrees within one move", "points in between")
+        raise ArcError(f"a tool axis that turns over by {angle:.1f} degrees within one move", "points in between")
     turn = math.radians(angle)
     steepest = math.radians(min(_steepest_roll(first, second, turn), STEEPEST))
     normal_y = abs(first[2] * second[0] - first[0] * second[2]) / math.sin(turn)

@@ -10,176 +10,110 @@ go to planes that are not in the file.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+import re
+from dataclasses import replace
 
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.cutter_location import geometry
-from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, AxisError, Circle, unit_axis
+from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle, unit_axis
 from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
-from toolpath_stiff.nc.cutter_location.state import (
-    ALL,
-    APT,
-    AUTODESK,
-    CATIA,
-    CREO,
-    DASSAULT,
-    DOUBTFUL,
-    ISO,
-    NX,
-    PTC,
-    SIEMENS,
-    Cycle,
-    State,
-    Word,
-    circular,
-    stand,
-    straight,
-)
-from toolpath_stiff.nc.cutter_location.state import drill as drill_hole
-from toolpath_stiff.nc.cutter_location.statements import Argument, Nested, Statement, is_number, nested
+from toolpath_stiff.nc.cutter_location.state import State, drill, move, stand
+from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number, number
 from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling, Vector
-from toolpath_stiff.nc.moves import FEED, RAPID
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID
 from toolpath_stiff.units import SECONDS_PER_DAY
 
-# -- cycles ------------------------------------------------------------------------------------------------------------
-
-# The first word, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip breaking), G84
-# (a tap, which feeds out to CLEAR too).
+# The first word of a cycle, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip
+# breaking), G84 (a tap, which feeds out to CLEAR too).
 KINDS = {"DRILL": "G81", "FACE": "G81", "CSINK": "G81", "DEEP": "G83", "BRKCHP": "G73", "TAP": "G84"}
 PAIRS = ("DEPTH", "CLEAR", "STEP", "RETURN", "DWELL")
 ALIASES = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}
 EXPAND = "have the CAM system write the moves of the cycle"
-
-
-@dataclass
-class _Given:
-    """What a CYCLE/ says: strokes as of a G code, numbers in the file's unit by word, the unit of its feed."""
-
-    code: str
-    values: dict[str, float] = field(default_factory=dict)
-    unit: str = ""
-    fedto: bool = False
+HOME = "home is the control's: the way there is not part of the path"
+CIRCLE_AXIS = "a circle's axis"
+ROUNDING = 1e-3  # rad, of the arcs that make a whole turn
+GEOMETRY = re.compile(r"\(\s*(CIRCLE|CYLNDR|LINE)\s*/([^()]*)\)", re.IGNORECASE)
+PLANE = re.compile(r"\(\s*PLANE\s*/\s*PERPTO\s*,.*\)", re.IGNORECASE)
+POINT = re.compile(r"\(\s*POINT\s*/([^()]*)\)", re.IGNORECASE)
 
 
 def cycle(state: State, statement: Statement) -> None:
     """The cycle that the next points drill; CYCLE/OFF ends it."""
     state.no_circle("CYCLE/")
-    state.cycle = _read(state, statement)
-
-
-def drill(state: State, target: Vector, axis: Vector, cycle: Cycle) -> None:
-    """A hole of the cycle in force at a point."""
-    if state.point is not None and axis != state.axis:
-        raise state.fail(
-            "a hole with another tool axis than the move before", "a GOTO/ before the cycle that turns the tool"
-        )
-    drill_hole(state, target, axis, cycle.hole, state.feed_per_minute(cycle.feed, cycle.per_revolution))
-
-
-def _read(state: State, statement: Statement) -> Cycle | None:
-    """The cycle of a statement, None for CYCLE/OFF. Raises `InputError`."""
-    arguments = list(statement.arguments)
+    state.hole, arguments = None, list(statement.arguments)
     kind = arguments.pop(0).text.upper() if arguments else ""
     if kind in ("OFF", "NOMORE"):
-        return None
+        return
     if kind not in KINDS:
-        raise _refusal(
-            state, f"CYCLE/{kind} is not supported", ", ".join(f"CYCLE/{known}" for known in (*KINDS, "OFF"))
-        )
+        known = ", ".join(f"CYCLE/{known}" for known in (*KINDS, "OFF"))
+        raise state.fail(f"CYCLE/{kind} is not supported", known, EXPAND)
     if arguments and arguments[0].text.upper() in ("DEEP", "BRKCHP"):  # NX, CAMplete: CYCLE/DRILL,DEEP
         kind = arguments.pop(0).text.upper()
-    given = _Given(KINDS[kind])
+    values = dict[str, float]()
     for key, value in zip(arguments[::2], arguments[1::2], strict=False):
-        _take_pair(state, given, key, value)
+        name = _name_in_cycle(state, key)
+        if name in values:
+            raise state.fail(f"{key.text} twice", "one", EXPAND, key)
+        values[name] = state.number(value, f"the number of {key.text}")
+        if name == "feed":
+            factor, state.hole_per_revolution = FEED_UNITS[key.text.upper()]
+            state.hole_feed = values["feed"] * (factor or state.scale)
     if len(arguments) % 2:
-        raise _refusal(state, f"{arguments[-1].text!r} without its value", "a number", at=arguments[-1])
+        raise state.fail(f"{arguments[-1].text!r} without its value", "a number", EXPAND, arguments[-1])
     for needed in ("DEPTH", "feed", "CLEAR"):
-        if needed not in given.values:
-            raise _refusal(state, f"{statement.shown} without {needed}", "DEPTH, CLEAR and a feed as MMPM,100")
-    hole = _hole(state, given)
-    _check(state, given, hole)
-    factor, per_revolution = FEED_UNITS[given.unit]
-    return Cycle(hole, given.values["feed"] * (state.scale if factor is None else factor), per_revolution)
-
-
-def _refusal(
-    state: State, found: str, expected: str = "", hint: str = EXPAND, at: Argument | None = None
-) -> InputError:
-    return state.fail(found, expected, hint, at)
-
-
-def _take_pair(state: State, given: _Given, key: Argument, value: Argument) -> None:
-    name = key.text.upper()
-    given.fedto = given.fedto or name == "FEDTO"
-    name = ALIASES.get(name, name)
-    if is_number(name):
-        raise _refusal(
-            state,
-            "a cycle of numbers without words: their order depends on the CAM system",
-            "pairs, as DEPTH,5",
-            at=key,
-        )
-    if name in FEED_UNITS:
-        given.unit, name = name, "feed"
-    elif name not in PAIRS:
-        raise _refusal(
-            state, f"CYCLE/ with {name}, which is not supported", "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed", at=key
-        )
-    if name in given.values:
-        raise _refusal(state, f"{key.text} twice", "one", at=key)
-    given.values[name] = state.number(value, f"the number of {key.text}")
-
-
-def _hole(state: State, given: _Given) -> Drilling:
-    """The hole in mm, as the statement gives it."""
-    values, scale = given.values, state.scale
-    dwell = values.get("DWELL", 0.0)
-    return Drilling(
-        code="G82" if dwell and given.code == "G81" else given.code,
+        if needed not in values:
+            raise state.fail(f"{statement.shown} without {needed}", "DEPTH, CLEAR and a feed as MMPM,100", EXPAND)
+    _check_cycle(state, KINDS[kind], values)
+    scale, dwell = state.scale, values.get("DWELL", 0.0)
+    state.hole = Drilling(
+        code="G82" if dwell and KINDS[kind] == "G81" else KINDS[kind],
         bottom=-abs(values["DEPTH"]) * scale,
         retract=values["CLEAR"] * scale,
         clear=values.get("RETURN", values["CLEAR"]) * scale,
         peck=values.get("STEP", 0.0) * scale,
         dwell=dwell,
-        out_at_r=given.code == "G84",
+        out_at_r=kind == "TAP",
     )
 
 
-def _check(state: State, given: _Given, hole: Drilling) -> None:
-    """Refuse a hole that cannot be, or of which systems mean different things."""
-    values, shown = given.values, state.statement.shown
-    clear, back, pecks = hole.retract, hole.clear, given.code in ("G73", "G83")
-    if not hole.bottom < 0.0 or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= hole.dwell <= SECONDS_PER_DAY:
+def _name_in_cycle(state: State, key: Argument) -> str:
+    """What a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
+    name = ALIASES.get(key.text.upper(), key.text.upper())
+    if name in FEED_UNITS:
+        return "feed"
+    if is_number(name):
+        found = "a cycle of numbers without words: their order depends on the CAM system"
+        raise state.fail(found, "pairs, as DEPTH,5", EXPAND, key)
+    if name not in PAIRS:
+        expected = "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed"
+        raise state.fail(f"CYCLE/ with {name}, which is not supported", expected, EXPAND, key)
+    return name
+
+
+def _check_cycle(state: State, code: str, values: dict[str, float]) -> None:
+    """Refuse a hole that cannot be, or of which systems mean different things; lengths in the file's unit."""
+    shown, pecks = state.statement.shown, code in ("G73", "G83")
+    depth, clear, step, dwell = (values.get(name, 0.0) for name in ("DEPTH", "CLEAR", "STEP", "DWELL"))
+    back = values.get("RETURN", clear)
+    if not depth or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= dwell <= SECONDS_PER_DAY:
         raise state.fail(shown, "DEPTH and feed above 0, CLEAR and DWELL of 0 or more")
     if "RETURN" in values and not back > 0.0:
-        raise _refusal(state, "RETURN,0 goes to a plane of the CAM system's", "a height above the point")
+        raise state.fail("RETURN,0 goes to a plane of the CAM system's", "a height above the point", EXPAND)
     if back < clear:
         raise state.fail("a return below CLEAR", "a height of CLEAR or more")
-    if given.fedto and back != clear:
-        raise _refusal(
-            state, "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate", "DEPTH"
-        )
-    if hole.peck and not pecks:
+    if back != clear and "FEDTO" in state.statement.words:
+        found = "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate"
+        raise state.fail(found, "DEPTH", EXPAND)
+    if step and not pecks:
         raise state.fail("STEP without DEEP or BRKCHP", "CYCLE/DEEP or CYCLE/BRKCHP")
-    if pecks and (not hole.peck > 0.0 or (clear - hole.bottom) / hole.peck > MOST_STROKES):
+    if pecks and (not step > 0.0 or (clear + abs(depth)) / step > MOST_STROKES):
         raise state.fail(f"{shown} without its STEP, or with one too small", "STEP above 0")
-    if hole.dwell and pecks:
-        raise _refusal(state, "DWELL in a cycle with pecks", "no DWELL")
-
-
-CYCLE_WORDS = (Word("CYCLE", cycle, "drilling cycle", ALL, PTC, "/DRILL, DEEP, BRKCHP or TAP and pairs, or /OFF"),)
-
-
-HOME = "home is the control's: the way there is not part of the path"
-ROUNDING = 1e-3  # rad, of the arcs that make a whole turn
-
-
-# -- points ------------------------------------------------------------------------------------------------------------
+    if dwell and pecks:
+        raise state.fail("DWELL in a cycle with pecks", "no DWELL", EXPAND)
 
 
 def goto(state: State, statement: Statement) -> None:
     """A point; on a circle several points, too."""
-    named = next((a for a in statement.arguments if a.text[:1].isalpha() or a.text[:1] == "("), None)
+    named = next((given for given in statement.arguments if given.text[:1].isalpha() or given.text[:1] == "("), None)
     if named is not None:
         hint = "names need APT's processor: give the file of points that it writes"
         raise state.fail(f"GOTO/ to {named.text[:30]!r}", "numbers", hint, named)
@@ -207,21 +141,21 @@ def to_point(state: State, numbers: list[float]) -> None:
     target = state.scaled(numbers[:3])
     if state.circle is not None:
         _arc_through(state, [target], axis)
-    elif state.cycle is not None:
+    elif state.hole is not None:
         state.rapid, state.followed = 0, None
-        drill(state, target, axis, state.cycle)
+        drill(state, target, axis, state.hole)
     else:
         _go(state, target, axis)
 
 
 def _axis_of(state: State, numbers: list[float]) -> Vector:
     if len(numbers) == 6:
-        axis = unit_axis(*numbers[3:])
+        axis = unit_axis(numbers[3:])
         if state.multax is False and axis != VERTICAL:
             raise state.fail("a tilted tool axis after MULTAX/OFF", "MULTAX/ON before it, or x,y,z alone")
-        state.next_axis, state.axis_said = axis, True
+        state.next_axis, state.axis_known = axis, True
         return axis
-    if not state.axis_said:
+    if not state.axis_known:
         raise state.fail("a point without its tool axis after MULTAX/OFF and a tilted tool", "x,y,z,i,j,k or TLAXIS")
     return state.next_axis
 
@@ -229,7 +163,7 @@ def _axis_of(state: State, numbers: list[float]) -> Vector:
 def _go(state: State, target: Vector, axis: Vector) -> None:
     motion = RAPID if state.rapid else FEED
     state.rapid, state.followed, state.direction = 0, None, None
-    straight(state, motion, target, axis)
+    move(state, motion, target, axis)
 
 
 def godlta(state: State, statement: Statement) -> None:
@@ -237,7 +171,7 @@ def godlta(state: State, statement: Statement) -> None:
     if state.point is None:
         raise state.fail("GODLTA/ before any point", "FROM/ or GOTO/ before it")
     numbers = state.numbers(statement, 3, 6)
-    if state.circle is not None or state.cycle is not None:
+    if state.circle is not None or state.hole is not None:
         raise state.fail("GODLTA/ on a circle or in a cycle", "GOTO/")
     axis = _axis_of(state, numbers)
     x, y, z = (p + d for p, d in zip(state.point, state.scaled(numbers[:3]), strict=True))
@@ -264,7 +198,7 @@ def gohome(state: State, statement: Statement) -> None:
         return
     state.no_circle("GOHOME")
     state.rapid = 0
-    state.note(state.doubtful, HOME)
+    state.note(HOME, doubtful=True)
 
 
 def rapid(state: State, statement: Statement) -> None:
@@ -273,12 +207,9 @@ def rapid(state: State, statement: Statement) -> None:
         raise state.fail(statement.shown, "RAPID alone")
     if state.circle is not None:
         raise state.fail("RAPID before the GOTO of a circle", "an arc at a feed")
-    if state.cycle is not None:
+    if state.hole is not None:
         raise state.fail("RAPID within a drilling cycle: is the next point a hole?", "CYCLE/OFF before it")
     state.rapid = statement.line
-
-
-# -- circles -----------------------------------------------------------------------------------------------------------
 
 
 def circle(state: State, statement: Statement) -> None:
@@ -288,7 +219,7 @@ def circle(state: State, statement: Statement) -> None:
     if len(arguments) > 2 and arguments[-2].text.upper() == "TIMES":
         count = state.number(arguments[-1], "a whole number of turns")
         if count != int(count) or not 1 <= count <= 10000:
-            raise state.fail("CIRCLE/ ... TIMES", "a whole number of turns", at=arguments[-1])
+            raise state.fail("CIRCLE/ ... TIMES", "a whole number of turns", place=arguments[-1])
         times, arguments = int(count), arguments[:-2]
     numbers = [state.number(argument) for argument in arguments]
     if len(numbers) not in (4, 6, 7, 11):
@@ -301,30 +232,22 @@ def circle(state: State, statement: Statement) -> None:
         if state.direction is None:
             raise state.fail("CIRCLE/x,y,z,r, which does not say which way round", "INDIRV/ before it, or i,j,k")
     else:
-        axis, radius = _circle_axis(state, numbers[3:6]), numbers[6] if len(numbers) > 6 else math.nan
+        axis, radius = unit_axis(numbers[3:6], CIRCLE_AXIS), numbers[6] if len(numbers) > 6 else math.nan
         if len(numbers) == 11:
             axis = (-axis[0], -axis[1], -axis[2])
     _await_circle(state, Circle(center, axis, radius * state.scale, times))
 
 
-def _circle_axis(state: State, numbers: list[float]) -> Vector:
-    try:
-        return unit_axis(*numbers)
-    except AxisError as error:
-        raise state.fail(error.found.replace("a tool axis", "a circle's axis"), error.expected) from None
-
-
 def movarc(state: State, statement: Statement) -> None:
     """A circle by the right hand, and the angle that is cut."""
-    words = statement.words
-    if len(words) != 9 or words[7] != "ANGLE":
+    if len(statement.words) != 9 or statement.words[7] != "ANGLE":
         raise state.fail(statement.shown, "MOVARC/x,y,z,i,j,k,r,ANGLE,a")
-    numbers = [state.number(a) for a in (*statement.arguments[:7], statement.arguments[8])]
-    if not 0.0 < numbers[7] <= 3.6e6:
-        raise state.fail(f"an arc of {numbers[7]:g} degrees", "an angle above 0", at=statement.arguments[8])
-    axis = _circle_axis(state, numbers[3:6])
-    center = state.scaled(numbers[:3])
-    _await_circle(state, Circle(center, axis, numbers[6] * state.scale, sweep=numbers[7]))
+    *arguments, _, last = statement.arguments
+    numbers, angle = [state.number(argument) for argument in arguments], state.number(last)
+    if not 0.0 < angle <= 3.6e6:
+        raise state.fail(f"an arc of {angle:g} degrees", "an angle above 0", place=last)
+    axis = unit_axis(numbers[3:6], CIRCLE_AXIS)
+    _await_circle(state, Circle(state.scaled(numbers[:3]), axis, numbers[6] * state.scale, sweep=angle))
 
 
 def indirv(state: State, statement: Statement) -> None:
@@ -337,37 +260,24 @@ def _await_circle(state: State, circle: Circle) -> Circle:
     """The circle that the next point ends, turned as INDIRV says."""
     if state.rapid:
         raise state.fail(f"an arc after the RAPID of line {state.rapid}", "a rapid to a point, or an arc at a feed")
-    if state.cycle is not None:
+    if state.hole is not None:
         raise state.fail("an arc within a drilling cycle", "CYCLE/OFF before it")
-    if state.circle is not None:
-        raise state.fail(f"a circle while the one of line {state.circle_line} waits for its GOTO", "GOTO/")
+    state.no_circle("a circle")
     if state.point is None:
         raise state.fail("an arc before any point", "FROM/ or GOTO/ before it")
     if state.direction is not None:
         axis = geometry.turned_as(circle.center, circle.axis, state.point, state.direction)
-        circle = replace(circle, axis=axis)
-        state.direction = None
+        circle, state.direction = replace(circle, axis=axis), None
     state.circle, state.circle_line, state.swept = circle, state.statement.line, 0.0
-    _note_entry(state, circle, state.point)
-    return circle
-
-
-def _note_entry(state: State, circle: Circle, start: Vector) -> None:
-    """Count whether a straight move goes on into an arc smoothly, as it nearly always does, or would turn back."""
-    if state.heading is None:
-        return
-    tangent = geometry.cross(circle.axis, geometry.minus(start, circle.center))
-    sizes = [math.sqrt(geometry.dot(vector, vector)) for vector in (tangent, state.heading)]
-    if min(sizes) < 1e-9:
-        return
-    x, y, z = (t / sizes[0] for t in tangent)
-    u, v, w = (d / sizes[1] for d in state.heading)
-    angle = geometry.angle_between((x, y, z), (u, v, w))
+    # A straight move goes on into an arc smoothly, as it nearly always does, or would turn back.
+    tangent = geometry.cross(circle.axis, geometry.minus(state.point, circle.center))
+    angle = geometry.angle_of(tangent, state.heading) if state.heading is not None else math.nan
     if angle < geometry.SMOOTH_DEG:
         state.smooth += 1
     elif angle > 180.0 - geometry.SMOOTH_DEG:
         state.unsmooth += 1
         state.first_unsmooth = state.first_unsmooth or state.statement.line
+    return circle
 
 
 def _arc_through(state: State, targets: list[Vector], axis: Vector) -> None:
@@ -378,7 +288,10 @@ def _arc_through(state: State, targets: list[Vector], axis: Vector) -> None:
     for target in targets:
         if state.swept and circle.sweep is not None:
             raise state.fail("a second point of an arc whose ANGLE is given", "one point")
-        state.swept += circular(state, circle, target, axis)
+        assert state.point is not None
+        arc = geometry.arc_to(circle, state.point, target)
+        move(state, ARC, target, axis, arc)
+        state.swept += arc.sweep
         if circle.sweep is None and state.swept > math.tau * circle.turns + ROUNDING:
             raise state.fail(
                 "points of an arc that do not follow each other in its direction", "points in the order of the cut"
@@ -389,60 +302,50 @@ def tlon(state: State, statement: Statement) -> None:
     """CATIA's and Creo's arcs in APT's own words."""
     if state.direction is None:
         raise state.fail("TLON,GOFWD/ without its direction", "INDIRV/ before it")
-    geometries = [nested(argument.text) or argument.text.upper() for argument in statement.arguments]
-    which = 1
-    if len(geometries) == 5 and geometries[2] in ("1", "2") and geometries[3] == "INTOF":
-        which = int(str(geometries[2]))
-        geometries = [geometries[0], geometries[1], geometries[4]]
-    if (
-        len(geometries) != 3
-        or geometries[1] != "ON"
-        or isinstance(geometries[0], str)
-        or isinstance(geometries[2], str)
-    ):
+    texts, words, which = [argument.text for argument in statement.arguments], statement.words, 1
+    if len(words) == 5 and words[2] in ("1", "2") and words[3] == "INTOF":
+        texts, which = [texts[0], texts[1], texts[4]], int(words[2])
+    if len(texts) != 3 or words[1] != "ON" or not texts[0].startswith("(") or not texts[2].startswith("("):
         raise state.fail(statement.shown, "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,(LINE/x,y,z,x,y,z), or CATIA's (CYLNDR/...)")
-    circle = _tlon_circle(state, geometries[0])
-    line = _tlon_line(state, geometries[2])
-    circle = _await_circle(state, circle)
+    line = _line(state, texts[2])
+    circle = _await_circle(state, _circle(state, texts[0]))
     assert state.point is not None
     _arc_through(state, [geometry.line_meets(circle, state.point, line, which)], state.next_axis)
     state.followed = None
 
 
-def _tlon_circle(state: State, given: Nested) -> Circle:
-    numbers = [value for value in given[1] if isinstance(value, float)]
-    if given[0] == "CIRCLE" and len(given[1]) == len(numbers) == 4:
+def _circle(state: State, text: str) -> Circle:
+    """The circle of (CIRCLE/...) or (CYLNDR/...)."""
+    word, numbers = _geometry(text)
+    if word == "CIRCLE" and len(numbers) == 4:
         return Circle(state.scaled(numbers[:3]), VERTICAL, numbers[3] * state.scale)
-    if given[0] in ("CYLNDR", "CIRCLE") and len(given[1]) == len(numbers) == 7:
-        axis = _circle_axis(state, numbers[3:6])
+    if word in ("CYLNDR", "CIRCLE") and len(numbers) == 7:
+        axis = unit_axis(numbers[3:6], CIRCLE_AXIS)
         return Circle(state.scaled(numbers[:3]), axis, numbers[6] * state.scale)
-    raise state.fail(f"TLON,GOFWD/ along ({given[0]}/...)", "(CIRCLE/x,y,z,r) or (CYLNDR/x,y,z,i,j,k,r)")
+    raise state.fail(f"TLON,GOFWD/ along {_shortened(text)}", "(CIRCLE/x,y,z,r) or (CYLNDR/x,y,z,i,j,k,r)")
 
 
-def _tlon_line(state: State, given: Nested) -> tuple[Vector, Vector]:
+def _line(state: State, text: str) -> tuple[Vector, Vector]:
     """The line up to which the tool goes: two points, of CATIA's plane the two that it goes through."""
-    numbers = [value for value in given[1] if isinstance(value, float)]
-    if given[0] == "LINE" and len(given[1]) == len(numbers) == 6:
+    word, numbers = _geometry(text)
+    if PLANE.fullmatch(text):
+        word, numbers = "LINE", [value for point in POINT.findall(text)[-2:] for value in _numbers(point)]
+    if word == "LINE" and len(numbers) == 6:
         return state.scaled(numbers[:3]), state.scaled(numbers[3:])
-    points = [value for value in given[1] if isinstance(value, tuple) and value[0] == "POINT"]
-    if given[0] == "PLANE" and given[1][0] == "PERPTO" and len(given[1]) == 4 and len(points) == 2:
-        ends = [[value for value in point[1] if isinstance(value, float)] for point in points]
-        if all(len(end) == 3 for end in ends):
-            return state.scaled(ends[0]), state.scaled(ends[1])
-    raise state.fail(f"TLON,GOFWD/ up to ({given[0]}/...)", "(LINE/x,y,z,x,y,z)")
+    raise state.fail(f"TLON,GOFWD/ up to {_shortened(text)}", "(LINE/x,y,z,x,y,z)")
 
 
-_POINT = "/x,y,z[,i,j,k]"
-_FOLLOWS = "the next motion follows a circle"
-MOTION_WORDS = (
-    Word("GOTO", goto, "the tool moves to a point", ALL, ISO, _POINT),
-    Word("", more_points, "further points of the GOTO before it", CREO, PTC, "x,y,z[,i,j,k]"),
-    Word("GODLTA", godlta, "the tool moves by a distance", "", ISO, _POINT),
-    Word("FROM", from_, "the tool stands at a point", ALL, ISO, _POINT),
-    Word("RAPID", rapid, "the next motion is rapid", ALL, ISO),
-    Word("GOHOME", gohome, HOME, NX, SIEMENS, " without a point", DOUBTFUL),
-    Word("CIRCLE", circle, _FOLLOWS, f"{CREO}, {NX}, {AUTODESK}", f"{PTC}; {SIEMENS}", "/x,y,z,i,j,k[,r[,t,f,d,e]]"),
-    Word("MOVARC", movarc, _FOLLOWS, AUTODESK, ISO, "/x,y,z,i,j,k,r,ANGLE,a"),
-    Word("INDIRV", indirv, "direction in which the next circle begins", f"{CATIA}, {CREO}", APT, "/i,j,k"),
-    Word("TLON,GOFWD", tlon, "the tool moves along a circle", f"{CATIA}, {CREO}", DASSAULT, "/(...),ON,(...)"),
-)
+def _geometry(text: str) -> tuple[str, list[float]]:
+    """Word and numbers of a geometry in parentheses; none of what is no such geometry."""
+    match = GEOMETRY.fullmatch(text)
+    return (match[1].upper(), _numbers(match[2])) if match else ("", [])
+
+
+def _numbers(text: str) -> list[float]:
+    """The numbers between commas, none if one of them is none."""
+    parts = [part.strip() for part in text.split(",")]
+    return [number(part) for part in parts] if all(map(is_number, parts)) else []
+
+
+def _shortened(text: str) -> str:
+    return f"{text.partition('/')[0].replace(' ', '').upper()}/...)"

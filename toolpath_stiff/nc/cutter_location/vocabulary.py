@@ -1,251 +1,270 @@
 """The table of words of cutter-location files: word to function, meaning, who writes it, source; and how it is used.
 
-A word that acts is a row beside its function in `modes` and `motion`. Those that need no function of their
-own, because they are listed, doubted or refused, are rows here.
+Functions of words that act are in `modes` and `motion`; those of words that are listed, doubted or refused are here.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from itertools import groupby
+from typing import Any
 
-from toolpath_stiff.nc.cutter_location.modes import COMPENSATION, HEADING, MODE_WORDS, TOOL, TOOL_CENTRE
-from toolpath_stiff.nc.cutter_location.motion import CYCLE_WORDS, MOTION_WORDS
-from toolpath_stiff.nc.cutter_location.state import (
-    ALL,
-    APT,
-    CAMPLETE,
-    CATIA,
-    CREO,
-    DASSAULT,
-    DOUBTFUL,
-    ISO,
-    LISTED,
-    MANUALS,
-    NX,
-    POSTS,
-    PTC,
-    READ,
-    REFUSED,
-    SIEMENS,
-    VERICUT,
-    Act,
-    State,
-    Word,
-)
-from toolpath_stiff.nc.cutter_location.statements import Statement, is_number
+from toolpath_stiff.nc.cutter_location import modes, motion
+from toolpath_stiff.nc.cutter_location.modes import FRAMES, HEADING, TOOL
+from toolpath_stiff.nc.cutter_location.state import State
+from toolpath_stiff.nc.cutter_location.statements import Statement, is_number, number
 
-GEOMETRY = "points, tool axes and feeds alone"
-
-
-UNKNOWN = "is not known"
-
-
+# What becomes of a word.
+READ, LISTED, DOUBTFUL, REFUSED = "read", "listed", "listed, with a warning", "refused"
+# Who writes it.
+ALL, CREO, NX, CATIA, AUTODESK, CAMPLETE = "all", "Creo", "NX", "CATIA", "Autodesk", "Autodesk for CAMplete"
+CATIA_CREO, MOST = f"{CATIA}, {CREO}", f"{CATIA}, {CREO}, {AUTODESK}"
+# Where it is described.
+ISO, APT = "ISO 4343", "ISO 4342, the APT language"
+PTC, SIEMENS = 'PTC, "Supported CL Data Commands"', 'Siemens NX, "CLSF Manager"'
+DASSAULT, POSTS = "Dassault, CATIA's help on APT import", "Autodesk's APT posts"
+VERICUT, MANUALS = 'Vericut, "Supported APT-CLS NC Program Records"', "manuals of post processors"
 # An unknown word that begins like one of a motion or a feed, or that carries a point, is not passed over.
 LIKE_MOTION = ("GO", "RAP", "FED", "CIR", "ARC", "MOV", "HEL", "CYC", "TLA", "TLO", "TLL", "TLR", "UNI", "MUL", "FRO")
-
-
 NUMBERS_OF_A_POINT = 3
-
-
 LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
+GEOMETRY = "points, tool axes and feeds alone"
+UNKNOWN = "is not known"
+Act = Callable[[State, Statement], None]
 
 
-def listed(reason: str) -> Act:
-    """What a word does that changes nothing of the path."""
-    return lambda state, statement: state.note(state.noted, reason)
+@dataclass(frozen=True)
+class Word:
+    """A major word of a statement.
+
+    Attributes
+    ----------
+    name
+        Upper case; "" is a line of numbers alone.
+    act
+        Executes a statement of it.
+    meaning
+        What it is taken for, as `tps check` lists it; of a refused word what it does.
+    written_by, source
+        Which CAM systems write it, "" where that is not known; where it is described.
+    form
+        The arguments that are read, as the documentation shows them.
+    kind
+        READ, LISTED, DOUBTFUL or REFUSED: what becomes of it.
+    """
+
+    name: str
+    act: Act
+    meaning: str
+    written_by: str
+    source: str
+    form: str = ""
+    kind: str = READ
 
 
-def doubted(reason: str) -> Act:
-    """What a word does that depends on the machine: it is listed, and a warning."""
-    return lambda state, statement: state.note(state.doubtful, reason)
-
-
-def refused(what: str, hint: str) -> Act:
-    """What a word does that changes the path in a way that is not supported."""
+def listed(meaning: str, written_by: str, source: str, names: str, kind: str = LISTED) -> list[Word]:
+    """Words that change nothing of the path, or (DOUBTFUL) what the machine makes of them."""
 
     def act(state: State, statement: Statement) -> None:
-        raise state.fail(f"{statement.shown} {what}, which is not supported", GEOMETRY, hint)
+        state.note(meaning, doubtful=kind == DOUBTFUL)
 
-    return act
+    return [Word(name, act, meaning, written_by, source, kind=kind) for name in names.split()]
 
 
+def refused(
+    meaning: str,
+    hint: str,
+    source: str,
+    names: str,
+    form: str = "",
+    *,
+    harmless: Callable[[Statement], bool] | None = None,
+    reason: str = "",
+    expected: str = GEOMETRY,
+) -> list[Word]:
+    """Words that change the path in a way that is not supported; a `harmless` statement is listed with its reason."""
+
+    def act(state: State, statement: Statement) -> None:
+        if harmless is None or not harmless(statement):
+            raise state.fail(f"{statement.shown} {meaning}, which is not supported", expected, hint)
+        state.note(reason)
+
+    return [Word(name, act, meaning, "", source, form, REFUSED) for name in names.split()]
+
+
+def no_shift(statement: Statement) -> bool:
+    """Whether a statement shifts by nothing."""
+    return len(statement.words) == 3 and all(is_number(word) and not number(word) for word in statement.words)
+
+
+def no_turn(statement: Statement) -> bool:
+    """Whether a rotary axis turns by nothing, or goes to 0."""
+    angles = [number(word) for word in statement.words if is_number(word)]
+    return bool(angles) and not any(angles)
+
+
+_POINT_FORM, _SHIFT_FORM, _TURN_FORM = "/x,y,z[,i,j,k]", "/x,y,z other than 0,0,0", "/angle other than 0"
+_CIRCLE, _DIRECTION = "the next motion follows a circle", "direction in which the next circle begins"
+_CYCLE_FORM = "/DRILL, DEEP, BRKCHP or TAP and pairs, or /OFF"
+_PAUSE_FORM = "/seconds or revolutions,REV"
+_COMPENSATION = "cutter compensation"
+_TOOL_CENTRE = "have the CAM system write the path of the tool centre"
 _TOLERANCE = "a tolerance of the CAM system: the points are taken as they stand"
-
-
 _STOP = "a stop: the path goes on"
-
-
 _SCREEN = "for the CAM system's screen"
-
-
 _OUTPUT = "about the output of the post processor"
-
-
-# Meaning, who writes them, source, words.
-_LISTED = (
-    (HEADING, ALL, ISO, "PARTNO PPRINT REMARK LETTER"),
-    (HEADING, "", APT, "TITLES TITLE"),
-    (HEADING, CATIA, DASSAULT, "TPRINT"),
-    (HEADING, CREO, PTC, "MFGNO"),
-    (HEADING, NX, SIEMENS, "END-OF-PATH"),
-    (_TOLERANCE, ALL, VERICUT, "INTOL OUTTOL TOLER LINTOL THICK MCHTOL"),
-    (_TOLERANCE, "", APT, "OUTOL MAXDP NUMPTS"),
-    (_STOP, ALL, ISO, "STOP OPSTOP END BREAK"),
-    (_SCREEN, NX, SIEMENS, "PAINT"),
-    (_SCREEN, "", VERICUT, "DISPLY PLOT VERIFY CLPRNT"),
-    (TOOL, NX, SIEMENS, "SELECT"),
-    (TOOL, "", VERICUT, "SELCTL SELECTL TLCHG OFSTNO"),
-    (TOOL, "", MANUALS, "TOOL HEAD SWITCH"),
-    (_OUTPUT, ALL, ISO, "MACHIN SEQNO LEADER TMARK REWIND"),
-    (_OUTPUT, "", MANUALS, "CHANNEL NOPOST CLDATA PROGRM"),
-    ("for CAMplete", CAMPLETE, POSTS, "CSI_PROGRAM_COMMENT CSI_SET_PATH_PARAM CSI_PATH_TOLERANCE"),
-    (TOOL, CAMPLETE, POSTS, "CSI_SET_FLUTE_LENGTH"),
-    ("coolant", ALL, ISO, "COOLNT FLUSH"),
-    ("a plane to retract to, of which nothing is made without RETRCT", "", ISO, "CLEARP CLRSRF"),
-    ("the part surface; the points have its height already", CATIA, DASSAULT, "AUTOPS PSIS"),
-    ("clamps of machine axes", "", ISO, "CLAMP UNCLMP"),
-)
-
-
+_RETRACT = "a plane to retract to, of which nothing is made without RETRCT"
 _BLOCK = "a block for the control as it stands: what it does is not known"
-
-
-_DOUBTFUL = (
-    ("an M code of one control: what it does is not known", "", ISO, "AUXFUN"),
-    ("a G code of one control: what it does is not known", "", ISO, "PREFUN"),
-    (_BLOCK, "", ISO, "INSERT"),
-    (_BLOCK, CAMPLETE, POSTS, "CSI_INSERT_CUSTOM_GCODE"),
-    ("statements that the operator may leave out: they are read", "", ISO, "OPSKIP"),
-)
-
-
+_M_CODE, _G_CODE = (f"{kind} of one control: what it does is not known" for kind in ("an M code", "a G code"))
 _WHERE_CUT = "have the CAM system write the points where they are cut"
-
-
+_ONE_SYSTEM = "have the CAM system write points and tool axes in one system"
+_TURNS, _ZERO_TURN = "turns the work or the head of one machine", "a rotary axis that stays at 0"
+_REPEATS, _OUT = "repeats or calls a part of the file", "have the CAM system write the points out"
+_DRIVE, _PROCESSOR = "is driven along surfaces", "give the file of points that APT's processor writes"
 _POINT, _POINTS = "have the CAM system write the point", "have the CAM system write points"
 
 
-_ONE_SYSTEM = "have the CAM system write points and tool axes in one system"
-
-
-_OUT = "have the CAM system write the points out"
-
-
-_DRIVE, _PROCESSOR = "is driven along surfaces", "give the file of points that APT's processor writes"
-
-
-# What they do, what to do, source, words.
-_REFUSED = (
-    ("changes where all that follows lies", _WHERE_CUT, APT, "TRACUT MIRROR SCALE"),
-    ("turns the work or the head of one machine", _ONE_SYSTEM, ISO, "PIVOTZ"),
-    ("repeats or calls a part of the file", _OUT, APT, "COPY CALL CALSUB DEFSUB ENDSUB MACRO TERMAC LOOPST JUMPTO"),
-    ("repeats or calls a part of the file", _OUT, MANUALS, "CALLSUB"),
-    (_DRIVE, _PROCESSOR, APT, "TLLFT TLRGT TLON TLONPS TLOFPS TLNDON"),
-    (_DRIVE, _PROCESSOR, APT, "GO GOFWD GOBACK GOLFT GORGT GOUP GODOWN OFFSET POCKET SCURV"),
-    (f"is {COMPENSATION}", TOOL_CENTRE, MANUALS, "TLCOMP"),
-    ("feeds the tool to where a post processor knows", _POINT, MANUALS, "PLUNGE"),
-    ("retracts the tool to a plane of the post processor's", _POINT, ISO, "RETRCT"),
-    ("cuts a thread", "leave threading out", ISO, "THREAD"),
-    ("is an arc of one post processor", "have the CAM system write CIRCLE/ or points", VERICUT, "ARC"),
-    ("is a NURBS curve", _POINTS, SIEMENS, "NURBS"),
-    ("is a spline", _POINTS, MANUALS, "SPLINE"),
-    ("is a polynomial", _POINTS, MANUALS, "POLYNO"),
-)
-
-
-TURNS = "turns the work or the head of one machine"
-
-
-def turn(state: State, statement: Statement) -> None:
-    """A rotary axis: listed where it turns by nothing, or goes to 0; refused otherwise."""
-    numbers = [argument for argument in statement.arguments if is_number(argument.text)]
-    if not numbers or any(state.number(number) for number in numbers):
-        raise state.fail(f"{statement.shown} {TURNS}, which is not supported", GEOMETRY, _ONE_SYSTEM)
-    state.note(state.noted, "a rotary axis that stays at 0")
-
-
-TURN_WORDS = tuple(
-    Word(name, turn, TURNS, "", source, "/angle other than 0", REFUSED)
-    for names, source in (("ROTABL ROTHED", ISO), ("ROTATE TABLE INDEX TILT", MANUALS))
-    for name in names.split()
-)
-
-
-LISTED_WORDS = tuple(
-    Word(name, listed(meaning), meaning, by, source, kind=LISTED)
-    for meaning, by, source, names in _LISTED
-    for name in names.split()
-)
-
-
-DOUBTFUL_WORDS = tuple(
-    Word(name, doubted(meaning), meaning, by, source, kind=DOUBTFUL)
-    for meaning, by, source, names in _DOUBTFUL
-    for name in names.split()
-)
-
-
-REFUSED_WORDS = tuple(
-    Word(name, refused(what, hint), what, "", source, kind=REFUSED)
-    for what, hint, source, names in _REFUSED
-    for name in names.split()
-)
+def cutcom(state: State, statement: Statement) -> None:
+    """Refused unless it is off."""
+    if statement.words != ["OFF"]:
+        raise state.fail(f"{statement.shown} is {_COMPENSATION}, which is not supported", "", _TOOL_CENTRE)
+    state.note("cutter compensation is off")
 
 
 def table(words: Iterable[Word]) -> dict[str, Word]:
     """Name to word. Raises `ValueError` for a name that is there twice."""
-    found: dict[str, Word] = {}
+    by_name: dict[str, Word] = {}
     for word in words:
-        if word.name in found:
+        if word.name in by_name:
             raise ValueError(f"{word.name} is in the table twice")
-        found[word.name] = word
-    return found
+        by_name[word.name] = word
+    return by_name
 
 
-WORDS = table((*MOTION_WORDS, *CYCLE_WORDS, *MODE_WORDS, *TURN_WORDS, *LISTED_WORDS, *DOUBTFUL_WORDS, *REFUSED_WORDS))
-
-
-REFUSED_HEADS = table(REFUSED_WORDS)
+_ACTING = (
+    Word("GOTO", motion.goto, "the tool moves to a point", ALL, ISO, _POINT_FORM),
+    Word("", motion.more_points, "further points of the GOTO before it", CREO, PTC, "x,y,z[,i,j,k]"),
+    Word("GODLTA", motion.godlta, "the tool moves by a distance", "", ISO, _POINT_FORM),
+    Word("FROM", motion.from_, "the tool stands at a point", ALL, ISO, _POINT_FORM),
+    Word("RAPID", motion.rapid, "the next motion is rapid", ALL, ISO),
+    Word("GOHOME", motion.gohome, motion.HOME, NX, SIEMENS, " without a point", DOUBTFUL),
+    Word(
+        "CIRCLE", motion.circle, _CIRCLE, f"{CREO}, {NX}, {AUTODESK}", f"{PTC}; {SIEMENS}", "/x,y,z,i,j,k[,r[,t,f,d,e]]"
+    ),
+    Word("MOVARC", motion.movarc, _CIRCLE, AUTODESK, ISO, "/x,y,z,i,j,k,r,ANGLE,a"),
+    Word("INDIRV", motion.indirv, _DIRECTION, CATIA_CREO, APT, "/i,j,k"),
+    Word("TLON,GOFWD", motion.tlon, "the tool moves along a circle", CATIA_CREO, DASSAULT, "/(...),ON,(...)"),
+    Word("CYCLE", motion.cycle, "drilling cycle", ALL, PTC, _CYCLE_FORM),
+    Word("FEDRAT", modes.fedrat, "feed", ALL, ISO, "/number[,unit] or unit,number"),
+    Word("SPINDL", modes.spindl, "spindle speed", ALL, ISO),
+    Word("UNITS", modes.units, "length unit", f"{CREO}, {AUTODESK}", ISO, "/MM or INCHES"),
+    Word("UNIT", modes.units, "length unit", "", ISO, "/MM or INCHES"),
+    Word("MULTAX", modes.multax, "whether points carry a tool axis", MOST, ISO, "[/ON or OFF]"),
+    Word("TLAXIS", modes.tlaxis, "tool axis", "", ISO, "/i,j,k"),
+    Word("LOADTL", modes.loadtl, "tool change", MOST, PTC, "/n[,LENGTH,l]"),
+    Word("LOAD", modes.loadtl, "tool change", NX, SIEMENS, "/TOOL,n"),
+    Word("CUTTER", modes.cutter, "tool diameter", MOST, ISO, "/d"),
+    Word("TLDATA", modes.cutter, "tool diameter", NX, SIEMENS, "/kind,d"),
+    Word("DELAY", modes.delay, "pause", ALL, ISO, _PAUSE_FORM),
+    Word("DWELL", modes.delay, "pause", "", ISO, _PAUSE_FORM),
+    Word("MODE", modes.mode, "milling; turning is read alike", AUTODESK, POSTS, "/MILL or TURN"),
+    Word("CUTCOM", cutcom, _COMPENSATION, CATIA_CREO, ISO, "/OFF"),
+    Word("FINI", modes.fini, "end of the file", MOST, ISO),
+    Word("TOOL PATH", modes.heading, HEADING, NX, SIEMENS, "/name,TOOL,tool", LISTED),
+    Word("CSI_TOOL_PATH", modes.heading, HEADING, CAMPLETE, POSTS, "/name", LISTED),
+    Word("TOOLNO", modes.toolno, TOOL, CATIA, ISO, kind=LISTED),
+    Word("MSYS", modes.frame_word, FRAMES["MSYS"], NX, SIEMENS, kind=LISTED),
+    Word("MCS", modes.frame_word, FRAMES["MCS"], AUTODESK, POSTS, kind=LISTED),
+    Word("CSYS", modes.frame_word, FRAMES["CSYS"], "", VERICUT, kind=LISTED),
+    Word("ZERO", modes.frame_word, FRAMES["ZERO"], AUTODESK, POSTS, kind=LISTED),
+)
+_SHIFT: dict[str, Any] = {"harmless": no_shift, "reason": "a shift of zero", "expected": "0,0,0"}
+_TURN: dict[str, Any] = {"harmless": no_turn, "reason": "a rotary axis that stays at 0"}
+WORDS = table(
+    (
+        *_ACTING,
+        *refused("shifts all that follows", _WHERE_CUT, ISO, "TRANS ORIGIN", _SHIFT_FORM, **_SHIFT),
+        *refused(_TURNS, _ONE_SYSTEM, ISO, "ROTABL ROTHED", _TURN_FORM, **_TURN),
+        *refused(_TURNS, _ONE_SYSTEM, MANUALS, "ROTATE TABLE INDEX TILT", _TURN_FORM, **_TURN),
+        *listed(HEADING, ALL, ISO, "PARTNO PPRINT REMARK LETTER"),
+        *listed(HEADING, "", APT, "TITLES TITLE"),
+        *listed(HEADING, CATIA, DASSAULT, "TPRINT"),
+        *listed(HEADING, CREO, PTC, "MFGNO"),
+        *listed(HEADING, NX, SIEMENS, "END-OF-PATH"),
+        *listed(_TOLERANCE, ALL, VERICUT, "INTOL OUTTOL TOLER LINTOL THICK MCHTOL"),
+        *listed(_TOLERANCE, "", APT, "OUTOL MAXDP NUMPTS"),
+        *listed(_STOP, ALL, ISO, "STOP OPSTOP END BREAK"),
+        *listed(_SCREEN, NX, SIEMENS, "PAINT"),
+        *listed(_SCREEN, "", VERICUT, "DISPLY PLOT VERIFY CLPRNT"),
+        *listed(TOOL, NX, SIEMENS, "SELECT"),
+        *listed(TOOL, "", VERICUT, "SELCTL SELECTL TLCHG OFSTNO"),
+        *listed(TOOL, "", MANUALS, "TOOL HEAD SWITCH"),
+        *listed(_OUTPUT, ALL, ISO, "MACHIN SEQNO LEADER TMARK REWIND"),
+        *listed(_OUTPUT, "", MANUALS, "CHANNEL NOPOST CLDATA PROGRM"),
+        *listed("for CAMplete", CAMPLETE, POSTS, "CSI_PROGRAM_COMMENT CSI_SET_PATH_PARAM CSI_PATH_TOLERANCE"),
+        *listed(TOOL, CAMPLETE, POSTS, "CSI_SET_FLUTE_LENGTH"),
+        *listed("coolant", ALL, ISO, "COOLNT FLUSH"),
+        *listed(_RETRACT, "", ISO, "CLEARP CLRSRF"),
+        *listed("the part surface; the points have its height already", CATIA, DASSAULT, "AUTOPS PSIS"),
+        *listed("clamps of machine axes", "", ISO, "CLAMP UNCLMP"),
+        *listed(_M_CODE, "", ISO, "AUXFUN", DOUBTFUL),
+        *listed(_G_CODE, "", ISO, "PREFUN", DOUBTFUL),
+        *listed(_BLOCK, "", ISO, "INSERT", DOUBTFUL),
+        *listed(_BLOCK, CAMPLETE, POSTS, "CSI_INSERT_CUSTOM_GCODE", DOUBTFUL),
+        *listed("statements that the operator may leave out: they are read", "", ISO, "OPSKIP", DOUBTFUL),
+        *refused("changes where all that follows lies", _WHERE_CUT, APT, "TRACUT MIRROR SCALE"),
+        *refused(_TURNS, _ONE_SYSTEM, ISO, "PIVOTZ"),
+        *refused(_REPEATS, _OUT, APT, "COPY CALL CALSUB DEFSUB ENDSUB MACRO TERMAC LOOPST JUMPTO"),
+        *refused(_REPEATS, _OUT, MANUALS, "CALLSUB"),
+        *refused(_DRIVE, _PROCESSOR, APT, "TLLFT TLRGT TLON TLONPS TLOFPS TLNDON"),
+        *refused(_DRIVE, _PROCESSOR, APT, "GO GOFWD GOBACK GOLFT GORGT GOUP GODOWN OFFSET POCKET SCURV"),
+        *refused(f"is {_COMPENSATION}", _TOOL_CENTRE, MANUALS, "TLCOMP"),
+        *refused("feeds the tool to where a post processor knows", _POINT, MANUALS, "PLUNGE"),
+        *refused("retracts the tool to a plane of the post processor's", _POINT, ISO, "RETRCT"),
+        *refused("cuts a thread", "leave threading out", ISO, "THREAD"),
+        *refused("is an arc of one post processor", "have the CAM system write CIRCLE/ or points", VERICUT, "ARC"),
+        *refused("is a NURBS curve", _POINTS, SIEMENS, "NURBS"),
+        *refused("is a spline", _POINTS, MANUALS, "SPLINE"),
+        *refused("is a polynomial", _POINTS, MANUALS, "POLYNO"),
+    )
+)
 
 
 def look_up(name: str) -> Word | None:
     """The entry of a word; a refused one is refused with whatever follows its comma, as in `TLRGT,GORGT`."""
-    return WORDS.get(name) or REFUSED_HEADS.get(name.partition(",")[0])
+    head = WORDS.get(name.partition(",")[0])
+    return WORDS.get(name) or (head if head is not None and head.kind == REFUSED else None)
 
 
 def meaning_of(name: str) -> str:
     """What a word is taken for, for a list of the words used."""
-    found = look_up(name)
-    if found is None:
+    word = look_up(name)
+    if word is None:
         return UNKNOWN
-    return f"{found.meaning}, not supported" if found.kind == REFUSED else found.meaning
+    return f"{word.meaning}, not supported" if word.kind == REFUSED else word.meaning
 
 
 def execute(state: State, statement: Statement) -> None:
-    """Execute a statement. Raises `InputError`, `ArcError` and `AxisError`."""
-    found = look_up(statement.word)
-    if found is None:
-        _unknown(state, statement)
-    else:
-        found.act(state, statement)
+    """Execute a statement. Raises `InputError` and `ArcError`.
 
-
-def _unknown(state: State, statement: Statement) -> None:
-    """Listed with a warning, and refused where the word may move the tool or belong to another language."""
-    name = statement.word
-    if LIKE_G_CODE.match(name) or (not statement.arguments and " " in name):
+    A word that is not known is listed with a warning, and refused where it may move the tool or belong to another
+    language.
+    """
+    name, count = statement.word, len(statement.arguments)
+    word = look_up(name)
+    if word is not None:
+        word.act(state, statement)
+        return
+    if LIKE_G_CODE.match(name) or (not count and " " in name):
         raise state.fail(f"{statement.shown!r} is not a statement of a cutter-location file", "a word of APT's")
-    numbers = sum(is_number(argument.text) for argument in statement.arguments)
-    carries_point = numbers == len(statement.arguments) >= NUMBERS_OF_A_POINT
+    carries_point = count >= NUMBERS_OF_A_POINT and all(map(is_number, statement.words))
     if name.startswith(LIKE_MOTION) or carries_point:
         raise state.fail(
-            f"{statement.shown}: {name} {UNKNOWN}, and may move the tool",
-            GEOMETRY,
-            "take the line out if it does not",
+            f"{statement.shown}: {name} {UNKNOWN}, and may move the tool", GEOMETRY, "take the line out if it does not"
         )
-    state.note(state.doubtful, f"{name} {UNKNOWN}, and not acted upon")
+    state.note(f"{name} {UNKNOWN}, and not acted upon", doubtful=True)
 
 
 def words_table() -> str:
