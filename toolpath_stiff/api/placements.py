@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 from toolpath_stiff.api.inputs import FARTHEST_MM, Force, Linearised, LoadDirection, Origin, Step, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
@@ -15,7 +15,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, low_high, numbers
-from toolpath_stiff.results import Progress, Result, counter
+from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.placement.result import Placement
     from toolpath_stiff.placement.search import SearchRules
     from toolpath_stiff.placement.task import Rewriting
+    from toolpath_stiff.rewriting.program import RewrittenProgram
     from toolpath_stiff.stiffness.model import StiffnessModel
 
 FARTHEST_TURN_DEG = 720.0
@@ -350,49 +351,6 @@ def try_placement(
     return PlacementTrial(model, read, path, asked, force_N)
 
 
-class RewrittenProgram(Result):
-    r"""A program written for another placement.
-
-    Attributes
-    ----------
-    name, content, notes
-        The program's name, the new file's bytes, what the user should hear of.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> moved = tps.rewrite(slot, to_mm_deg=(10, 0, 0))
-    >>> moved.content.splitlines()[3], moved.to_dict()["notes"]
-    (b'G1 X50', [])
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     moved.save(pathlib.Path(folder, "moved.nc")).name
-    'moved.nc'
-    """
-
-    command: ClassVar[str] = "place"
-
-    def __init__(self, name: str, content: bytes, encoding: str, notes: Sequence[str]) -> None:
-        self.name, self.content, self.encoding, self.notes = name, content, encoding, list(notes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return {"program": self.name, "text": self.content.decode(self.encoding), "notes": self.notes}
-
-    def __str__(self) -> str:
-        return self.content.decode(self.encoding)
-
-    def _short(self) -> str:
-        return f"{self.name}, {len(str(self).splitlines())} lines"
-
-    def save(self, file: str | Path) -> Path:
-        """Write the program, whole or not at all."""
-        from toolpath_stiff.files import write_atomically
-
-        return write_atomically(file, self.content)
-
-
 def rewrite(
     program: Program | str | Path,
     *,
@@ -435,5 +393,4 @@ def rewrite(
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    written = rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
-    return RewrittenProgram(part.name, written.content, written.encoding, written.notes)
+    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)

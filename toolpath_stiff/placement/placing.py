@@ -24,7 +24,7 @@ from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.rows import FIGURES, PLACEMENT, PlacementRow, analyzed_row, front_rows, placement_mm_deg
 from toolpath_stiff.placement.search import search_placements
 from toolpath_stiff.placement.task import Rewriting, Task
-from toolpath_stiff.rewriting.program import Rewritten, rewrite_program
+from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.units import Pose, m_from_mm
 
 COMPARED = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "min": "min_N_per_mm"}
@@ -164,7 +164,7 @@ def _rewritten(task: Task, program: ReadProgram, best: Analysis) -> tuple[bytes 
     }
 
 
-def _written_there(task: Task, writing: Rewriting, program: ReadProgram, best: Analysis) -> Rewritten:
+def _written_there(task: Task, writing: Rewriting, program: ReadProgram, best: Analysis) -> RewrittenProgram:
     return rewrite_program(
         program,
         best.origin,
@@ -192,7 +192,7 @@ def _linearised_words(task: Task, writing: Rewriting, program: ReadProgram, best
 
 
 def rewriting_differences(
-    placed: Analysis, rewritten: Rewritten, original_origin: Pose, **reading: Any
+    placed: Analysis, rewritten: RewrittenProgram, original_origin: Pose, **reading: Any
 ) -> dict[str, float]:
     """Relative differences of mean, range and smallest stiffness: the rewritten program against the placed one.
 
