@@ -37,6 +37,14 @@ from toolpath_stiff.stiffness.contract import Effect
 
 FloatArray = NDArray[np.float64]
 
+# Seed, layout, what is hidden, its size: one of each verdict.
+VERDICTS = {
+    "adequate": (100, "paper", "none", None),
+    "identified": (7, "paper", "table_compliance", 0.1),
+    "ambiguous": (7, "paper", "spindle_compliance", 0.1),
+    "unexplained": (7, "paper", "cable_drag", 0.1),
+}
+
 OPTIONAL_COLUMNS = (
     "force_N", "sd_N_per_mm", "setup", "clamp", "repeat", "point", "time_min", "tool_extension_mm", "loop",
     "temperature_C",

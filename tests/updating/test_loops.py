@@ -13,7 +13,6 @@ from toolpath_stiff.correction.document import document as update_document
 from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import diagnose
-from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.planning.next_visit import TABLES, Tables, Taken, conditioned, next_visit, tables_of
@@ -233,7 +232,7 @@ def test_what_the_tip_cannot_tell_an_indicator_names(joints):
     assert alone.verdict == "adequate" and "joint_compliance" in alone.plausible
     found = diagnose(nist(), read_measurements(list(joints), nist()), plan_next=False)
     assert (found.verdict, found.plausible) == ("identified", ["joint_compliance"])
-    written = document(found)
+    written = found.to_dict()
     # Errors are those of the tip's readings; the loops stand beside them.
     assert written["readings"] == 42 == len(found.before)
     assert [one["loop"] for one in written["loops"]["by_loop"]] == ["joint 1", "strut 1", "table"]
