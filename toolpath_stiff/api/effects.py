@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -223,16 +224,13 @@ def draft_effect(
     name = effect_name(file, ".toml")
     if name in known_effects(asked.on.effect_files):
         raise InputError(f"effect {name} exists already", hint="give the draft another file name")
-    found = diagnose(
-        asked.model,
-        asked.readings,
-        plan_next=False,
-        names=asked.files,
+    found = replace(
+        diagnose(
+            asked.model, asked.readings, plan_next=False, names=asked.files, progress=teller(progress), **asked.common
+        ),
         line=asked.asked.command("diagnose", *options(seed=seed or None)),
         asked=asked.asked,
         inputs=asked.inputs,
-        progress=teller(progress),
-        **asked.common,
     )
     drafted = draft(found, str(file))
     return EffectDraft(name, drafted, found, next_of_draft(asked.asked, str(file)))

@@ -8,7 +8,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions
-from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.covariances import Covariance
 from toolpath_stiff.readings.dates import day_of, short_dates
 from toolpath_stiff.readings.history import StrutHistory, history
@@ -55,12 +54,6 @@ class BesideTip:
 
     by_loop: tuple[LoopMean, ...] = ()
     readings: tuple[LoopReadingFigures, ...] = ()
-
-    @classmethod
-    def read(cls, document: Document) -> BesideTip:
-        """Of its part of a document."""
-        means, readings = document["by_loop"], document["readings"]
-        return cls(tuple(LoopMean(**entry) for entry in means), tuple(LoopReadingFigures(**one) for one in readings))
 
 
 def beside_tip(data: Measurements, log_model: FloatArray, spread: Covariance) -> BesideTip:

@@ -147,6 +147,11 @@ class Judgement:
         return tuple(dict.fromkeys(name for one in self.explanations for name in one.split(" + ")))
 
     @property
+    def likely(self) -> list[tuple[str, float]]:
+        """Hypotheses with their probabilities, the most likely first."""
+        return sorted(self.probability.items(), key=lambda item: (-item[1], item[0]))
+
+    @property
     def likeliest(self) -> Fit:
         """The fit of the likeliest hypothesis: of those left standing, else the closest."""
         for name in self.explanations:
