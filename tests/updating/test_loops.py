@@ -27,10 +27,11 @@ from toolpath_stiff.rig.loops import true_displacements
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop, measuring_loop
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.stiffness.model import build_model
 
 POSES = np.array([[0.05, -0.1, 0.6, 0.1, -0.2, 0.05], [-0.2, 0.15, 1.1, -0.3, 0.1, 0.0], [0.0, 0.0, 0.8, 0, 0, 0]])
 DIRECTIONS = np.array([[1.0, 0, 0], [0, 0.6, 0.8], [0, 0, 1.0]])

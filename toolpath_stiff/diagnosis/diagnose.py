@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolpath_stiff.comparison.loop_readings import loops_document
+from toolpath_stiff.comparison.loop_readings import beside_tip
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.diagnosis.examination import NAMING
 from toolpath_stiff.diagnosis.result import Diagnosis
@@ -142,7 +142,7 @@ def diagnose(
         tuple(names) or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=suspects,
         unexcluded=tuple(hidden for hidden in unexcluded(main) if hidden.effect.name not in plausible),
         slips=slips,
-        loops=loops_document(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
+        loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
     )  # fmt: skip
     found = replace(found, portrait=portrait_of(found, progress), alike=alike_of(found))
     if not plan_next or found.verdict not in ("ambiguous", "described"):

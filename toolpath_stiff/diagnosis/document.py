@@ -80,7 +80,7 @@ def document_of(found: Examination, rows: Rows) -> dict[str, Any]:
         "effects": found.predictor.effects_that_act,
         "data": list(found.names),
         "readings": len(found.data),
-        "loops": certain(found.loops),
+        "loops": certain(to_dict(found.loops)),
         "command": found.line,
     }
 

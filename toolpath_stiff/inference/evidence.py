@@ -21,7 +21,7 @@ from toolpath_stiff.inference.covariances import Precision
 from toolpath_stiff.inference.noise import Noise, NormalEquations, Scatter, covariance, gauss_newton, scaled_inverse
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.size_priors import Sight, SizePrior, log_comparable
-from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.stiffness.active import ActiveEffect
 
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
 

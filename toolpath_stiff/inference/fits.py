@@ -163,7 +163,7 @@ def fit_effects(
         pulled, sd = x + inverse @ every.gradient, np.sqrt(np.maximum(np.diag(inverse), 0.0))
         absent = {i - 2: (float(pulled[i]), float(sd[i])) for i in range(len(x)) if i not in unknowns}
     return Fit(
-        model.candidates, model.sizes(x), tuple(free), x[:2].copy(), residual, last.jacobian,
+        tuple(model.candidates), model.sizes(x), tuple(free), x[:2].copy(), residual, last.jacobian,
         scaled_inverse(last.information), scatter, law_free, absent,
     )  # fmt: skip
 

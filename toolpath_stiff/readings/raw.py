@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.column_names import Mapped
+from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError, TableError
 from toolpath_stiff.files import Content, read_bytes, write_atomically
 from toolpath_stiff.readings.dates import day_of
-from toolpath_stiff.readings.history import HistoryDocument
+from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.loop_figures import NO_FIGURES, LoopFigures, in_tension, reduce_loops
 from toolpath_stiff.readings.mapping import DATE, mapped_table
 from toolpath_stiff.readings.raw_history import remarks, standstills, struts_over_dates
@@ -84,7 +85,7 @@ class Reduction(Result):
     figures: tuple[LoopFigures, ...]
     notes: list[str]
     read_as: tuple[str, ...]
-    history: HistoryDocument
+    history: StrutHistory
 
     @property
     def recorded(self) -> list[tuple[Loop, LoopFigures]]:
@@ -100,7 +101,7 @@ class Reduction(Result):
     def to_dict(self) -> dict[str, Any]:
         """One entry a loop, under "loops"; struts measured alone over their dates, under "history"."""
         pairs = zip(self.loops, self.figures, strict=True)
-        return {"loops": [loop_entry(loop, figures) for loop, figures in pairs], "history": dict(self.history)}
+        return {"loops": [loop_entry(loop, figures) for loop, figures in pairs], "history": to_dict(self.history)}
 
     def to_frame(self) -> pd.DataFrame:
         """One row a loop."""

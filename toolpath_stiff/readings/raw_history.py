@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from toolpath_stiff.readings.dates import day_of, short_dates
-from toolpath_stiff.readings.history import SURE, HistoryDocument, Readings, history
+from toolpath_stiff.readings.history import StrutHistory, StrutOverTime, history
 from toolpath_stiff.readings.loop_figures import LoopFigures, side_of, stuck_at
 from toolpath_stiff.readings.mapping import DATE
 from toolpath_stiff.readings.raw_records import Loop
+from toolpath_stiff.readings.strut_series import SURE, StrutReadings
 from toolpath_stiff.units import um_from_m
 
 OTHER_SIDE = 1.05  # ratio of two slopes of a loop from which one side counts as softer; assumed, twice the scatter
@@ -22,18 +24,18 @@ SECANT, IN_TENSION, IN_COMPRESSION = "secant", "slope in tension", "slope in com
 OF_ONE_SIDE = ", which its lost motion blurs in records of one side alone"
 
 
-def struts_over_dates(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDocument:
+def struts_over_dates(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> StrutHistory:
     """Struts measured alone over their dates; those of several lengths by length, as a strut's stiffness varies."""
     rows = [(loop, one) for loop, one in zip(loops, figures, strict=True) if loop.jog is None]
     lengths: dict[str, set[str]] = {}
     for loop, _ in rows:
         lengths.setdefault(loop.place["loop"], set()).add(loop.place.get("length_mm", ""))
 
-    def readings(chosen: list[tuple[Loop, float, float]]) -> Readings:
+    def readings(chosen: list[tuple[Loop, float, float]]) -> StrutReadings:
         names = [loop.place["loop"] for loop, _, _ in chosen]
         some = [loop.place.get("length_mm", "") for loop, _, _ in chosen]
         shown = [f"{n}, {mm} mm" if len(lengths[n]) > 1 and mm else n for n, mm in zip(names, some, strict=True)]
-        return Readings(
+        return StrutReadings(
             np.array(shown, dtype=str),
             np.array([day_of(loop.place.get(DATE, "")) for loop, _, _ in chosen]),
             np.log([stiffness for _, stiffness, _ in chosen]),
@@ -46,12 +48,16 @@ def struts_over_dates(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> 
     seen = [(loop, *_seen(loop, one, judged[loop.place["loop"]])) for loop, one in rows]
     slopes = [(loop, k, s) for loop, one in rows for k, s in ((one.tension, 1.0), (one.compression, -1.0))]
     slopes = [one for one in slopes if math.isfinite(one[1])]
-    found = history(readings(seen), readings(slopes or seen))
-    for strut in found["struts"]:
-        strut["judged_on"] = judged[strut["strut"].split(" alone")[0] + " alone"]
-        if strut["judged_on"] not in ("", SECANT):
-            strut["text"] = "; ".join(filter(None, [strut["text"], f"judged on the {strut['judged_on']}"]))
-    return found
+    over_time = history(readings(seen), readings(slopes or seen))
+    return replace(over_time, struts=[_with_figure(one, judged) for one in over_time.struts])
+
+
+def _with_figure(strut: StrutOverTime, judged: Mapping[str, str]) -> StrutOverTime:
+    """The same with the figure that its dates were compared by."""
+    figure = judged[strut.strut.split(" alone")[0] + " alone"]
+    said = figure not in ("", SECANT)
+    text = "; ".join(filter(None, [strut.text, f"judged on the {figure}" if said else ""]))
+    return replace(strut, judged_on=figure, text=text)
 
 
 def _judged(name: str, rows: Sequence[tuple[Loop, LoopFigures]]) -> str:
@@ -89,9 +95,9 @@ def _seen(loop: Loop, one: LoopFigures, judged: str) -> tuple[float, float]:
     return one.stiffness, side
 
 
-def remarks(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> Iterator[str]:
+def remarks(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: StrutHistory) -> Iterator[str]:
     """What stands in the measurement file in place of a secant, and which of its rows are of a strut as it was."""
-    own = {one["strut"] for one in history["struts"] if one["judged_on"] == BEYOND}
+    own = {one.strut for one in history.struts if one.judged_on == BEYOND}
     pairs = zip(loops, figures, strict=True)
     playing = [(loop.title, one) for loop, one in pairs if one.plays and loop.place["loop"] in own]
     if playing:
@@ -108,7 +114,7 @@ def remarks(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: Hist
             f"{strut}: softer in tension on {pulled}, in compression on {pushed}: does a file count compression "
             "positive? Its head may say so (compression positive)"
         )
-    changed = {one["strut"]: one["changes"][-1]["before"] for one in history["struts"] if one["changes"]}
+    changed = {one.strut: one.changes[-1].before for one in history.struts if one.changes}
     for strut, since in changed.items():
         yield f"{strut} changed: leave out its rows before {since} for diagnose and update, which take all dates as one"
 
@@ -138,8 +144,8 @@ def standstills(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> list[s
     ]
 
 
-def sided(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> set[str]:
+def sided(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: StrutHistory) -> set[str]:
     """Struts that differ in tension and compression and whose loops all say so: rows of both would not be alike."""
     lacking = {loop.place.get("loop") for loop, one in zip(loops, figures, strict=True) if math.isnan(one.tension)}
-    struts = (one for one in history["struts"] if one["sides"] is not None and one["sides"]["p"] < SURE)
-    return {one["strut"] for one in struts} - lacking
+    struts = (one for one in history.struts if one.sides is not None and one.sides.p < SURE)
+    return {one.strut for one in struts} - lacking

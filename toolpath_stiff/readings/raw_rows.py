@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.readings.history import HistoryDocument
+from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.loop_figures import LoopFigures
 from toolpath_stiff.readings.raw_history import BEYOND, sided
 from toolpath_stiff.readings.raw_records import CONDITIONS, PLACE, Loop
@@ -56,11 +56,11 @@ def shop_figures(figures: LoopFigures) -> dict[str, float]:
 
 
 def _rows_of(
-    loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument
+    loops: Sequence[Loop], figures: Sequence[LoopFigures], history: StrutHistory
 ) -> list[tuple[Loop, LoopFigures]]:
     """Loops as they stand in a measurement file: struts with their own stiffness, two rows where the sides differ."""
     both_sides = sided(loops, figures, history)
-    mixed = {one["strut"] for one in history["struts"] if one["judged_on"] != BEYOND}
+    mixed = {one.strut for one in history.struts if one.judged_on != BEYOND}
     found = []
     for loop, one in zip(loops, figures, strict=True):
         if loop.place.get("loop") in both_sides:
@@ -73,7 +73,7 @@ def _rows_of(
     return found
 
 
-def measurement_csv(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> str:
+def measurement_csv(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: StrutHistory) -> str:
     """A measurement file, one row a loop; of a strut that differs in tension and compression a row of each.
 
     A figure that some loop lacks is left out as a column.

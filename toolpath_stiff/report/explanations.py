@@ -151,7 +151,7 @@ def text(found: Diagnosis) -> str:
         *_listed("plausible", [plausible_text(found.explanations)]),
         *_listed("beside it", [beside_text(found.unexcluded)]),
         *_listed("noise", ["; ".join(by_noise)] if len(by_noise) > 1 else []),
-        *_listed("beside the tip", [loop["text"] for loop in found.loops["by_loop"]]),
+        *_listed("beside the tip", [loop.text for loop in found.loops.by_loop]),
         *_listed("cannot test", ["; ".join(cannot)]),
         *_listed("would show", [_would_show(found)]),
         *_listed("path", [path_text(found.path)]),

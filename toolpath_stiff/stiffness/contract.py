@@ -32,6 +32,8 @@ Values = Mapping[str, Any]  # name of a parameter -> SI value, or what is chosen
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
 
 
+HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading")
+
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
 
@@ -386,6 +388,11 @@ class Effect:
             value = p[one.name] if one.discrete else f"{float(f'{p[one.name]:.3g}'):g} {one.unit}".rstrip()
             sizes.append(f"{one.name.replace('_', ' ')} {value}")
         return f"{self.title}, {', '.join(sizes)}"
+
+    @property
+    def hooks(self) -> list[str]:
+        """Which of `HOOKS` it implements."""
+        return [hook for hook in HOOKS if getattr(type(self), hook) is not getattr(Effect, hook)]
 
     @property
     def is_instrument(self) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 
 from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.contract import Effect, Parameter
-from toolpath_stiff.stiffness.guard import NAME, wrong_in
+from toolpath_stiff.stiffness.declarations import NAME, wrong_in
 from toolpath_stiff.stiffness.term_effect import ASSUMED, TermEffect, kind_of, size_parameter
 from toolpath_stiff.stiffness.terms import (
     ALONG,
