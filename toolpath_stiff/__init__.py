@@ -48,9 +48,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
     from toolpath_stiff.api.next_visits import next_visit as next_visit
-    from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
-    from toolpath_stiff.api.placements import RewrittenProgram as RewrittenProgram
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
     from toolpath_stiff.api.placements import try_placement as try_placement
@@ -78,11 +76,13 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import UnreachableError as UnreachableError
     from toolpath_stiff.nc.program import Program as Program
     from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
+    from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
     from toolpath_stiff.placement.result import Placement as Placement
     from toolpath_stiff.planning.next_visit import NextVisit as NextVisit
     from toolpath_stiff.planning.result import Plan as Plan
     from toolpath_stiff.readings.raw import Reduction as Reduction
     from toolpath_stiff.readings.raw import reduce as reduce
+    from toolpath_stiff.rewriting.program import RewrittenProgram as RewrittenProgram
     from toolpath_stiff.stiffness.catalogue import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.stiffness.contract import Effect as Effect
     from toolpath_stiff.stiffness.contract import Parameter as Parameter
@@ -105,7 +105,7 @@ _PUBLIC = {
     "api.machines": ("Machine", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.next_visits": ("next_visit",),
-    "api.placements": ("KeepOut", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement"),
+    "api.placements": ("PlacementTrial", "place", "rewrite", "try_placement"),
     "api.poses": ("map_stiffness", "pose", "read_poses"),
     "api.programs": ("SampledPath", "analyze", "check", "sample_path"),
     "case.case": ("Case",),
@@ -117,10 +117,12 @@ _PUBLIC = {
     ),
     "nc.program": ("Program",),
     "placement.case_study": ("CaseStudy",),
+    "placement.keep_out": ("KeepOut",),
     "placement.result": ("Placement",),
     "planning.next_visit": ("NextVisit",),
     "planning.result": ("Plan",),
     "readings.raw": ("Reduction", "reduce"),
+    "rewriting.program": ("RewrittenProgram",),
     "stiffness.catalogue": ("EffectCatalogue",),
     "stiffness.contract": ("Effect", "Parameter"),
     "stiffness.trial": ("EffectCheck",),

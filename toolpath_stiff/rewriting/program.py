@@ -16,10 +16,13 @@ import copy
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
 from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
@@ -28,6 +31,7 @@ from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, Offsets, ToolEntry
 from toolpath_stiff.nc.words import CORNERS, Block, read_block, read_text, split_lines
+from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
 from toolpath_stiff.rewriting.turn import Turn
@@ -45,26 +49,55 @@ PLAIN_DIALECTS = ("generic", "linuxcnc")
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
 
-@dataclass(frozen=True)
-class Rewritten:
-    """A rewritten program.
+@dataclass(frozen=True, repr=False)
+class RewrittenProgram(Result):
+    r"""A program written for another placement.
 
     Attributes
     ----------
+    name, content, notes
+        The program's name, the new file's bytes, what the user should hear of, one sentence each.
     text, encoding
         The program with its line ends, and how the original was encoded.
-    notes
-        What the user should know, one sentence each.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> moved = tps.rewrite(slot, to_mm_deg=(10, 0, 0))
+    >>> moved.content.splitlines()[3], moved.to_dict()["notes"]
+    (b'G1 X50', [])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     moved.save(pathlib.Path(folder, "moved.nc")).name
+    'moved.nc'
     """
 
+    command: ClassVar[str] = "place"
+
+    name: str
     text: str
     encoding: str
-    notes: tuple[str, ...]
+    notes: list[str]
 
     @property
     def content(self) -> bytes:
         """The file's bytes."""
         return self.text.encode(self.encoding)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return {"program": self.name, "text": self.text, "notes": self.notes}
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _short(self) -> str:
+        return f"{self.name}, {len(self.text.splitlines())} lines"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the program, whole or not at all."""
+        return write_atomically(file, self.content)
 
 
 def rewrite_program(
@@ -77,7 +110,7 @@ def rewrite_program(
     offsets: Offsets | None = None,
     tools: dict[int, ToolEntry] | None = None,
     block_delete: Switches = False,
-) -> Rewritten:
+) -> RewrittenProgram:
     r"""Write a program so that at the original origin it does what it does, untouched, at a placement.
 
     Parameters
@@ -121,7 +154,7 @@ def rewrite_program(
     tolerance = None if linearise is None else mm_from_m(linearise)
     controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
     pieces = list(_rewritten_lines(controls, text, program.name, switches_on(block_delete, UNKNOWN_CONTROL)))
-    return Rewritten("".join(pieces), encoding, tuple(controls.notes))
+    return RewrittenProgram(program.name, "".join(pieces), encoding, list(controls.notes))
 
 
 def _state(name: str, origin: ShopPose, offsets: Offsets | None, tools: dict[int, ToolEntry] | None) -> State:
