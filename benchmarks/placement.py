@@ -25,13 +25,14 @@ from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.controller import read_controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program, read_program
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
+from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.fronts import apart
+from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.placing import place_program
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.rows import FIGURES
-from toolpath_stiff.placement.search import SearchRules
 from toolpath_stiff.placement.task import Task
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import closed_form
@@ -170,7 +171,7 @@ def against_grid(name: str) -> tuple[str, bool]:
     final = whole.figures(np.vstack([grid[nearest], BOUNDS.placements(np.array(polished))]))
     allowed = rules.violation(final) == 0.0
     by = float(np.where(allowed, dominance(final.objectives, ours), 0.0).max())
-    poses = found.search["pose_evaluations"]
+    poses = found.search.pose_evaluations
     times = cpu / (poses * kernel_seconds(bool(path.abc.any())))
     passed = by <= DOMINATED and times <= TIMES_KERNEL
     if name == "pocket.nc":

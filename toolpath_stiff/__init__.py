@@ -48,7 +48,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
     from toolpath_stiff.api.next_visits import next_visit as next_visit
-    from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
@@ -77,6 +76,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.nc.program import Program as Program
     from toolpath_stiff.path import SampledPath as SampledPath
     from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
+    from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
     from toolpath_stiff.placement.result import Placement as Placement
     from toolpath_stiff.planning.next_visit import NextVisit as NextVisit
     from toolpath_stiff.planning.result import Plan as Plan
@@ -105,7 +105,7 @@ _PUBLIC = {
     "api.machines": ("Machine", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.next_visits": ("next_visit",),
-    "api.placements": ("KeepOut", "PlacementTrial", "place", "rewrite", "try_placement"),
+    "api.placements": ("PlacementTrial", "place", "rewrite", "try_placement"),
     "api.poses": ("map_stiffness", "pose", "read_poses"),
     "api.programs": ("analyze", "check", "sample_path"),
     "case.case": ("Case",),
@@ -118,6 +118,7 @@ _PUBLIC = {
     "nc.program": ("Program",),
     "path": ("SampledPath",),
     "placement.case_study": ("CaseStudy",),
+    "placement.keep_out": ("KeepOut",),
     "placement.result": ("Placement",),
     "planning.next_visit": ("NextVisit",),
     "planning.result": ("Plan",),
