@@ -332,20 +332,9 @@ def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> 
 
 
 def _empty_samples(n: int) -> Samples:
-    return Samples(
-        move=np.empty(n, dtype=np.int64),
-        line=np.empty(n, dtype=np.int64),
-        motion=np.empty(n, dtype=np.int64),
-        tool=np.empty(n, dtype=np.int64),
-        tool_length=np.empty(n),
-        s=np.empty(n),
-        t=np.empty(n),
-        position=np.empty((n, 3)),
-        abc=np.zeros((n, 3)),
-        tangent=np.empty((n, 3)),
-        weight=np.empty(n),
-        feed=np.empty(n),
-    )
+    columns: dict[str, NDArray[Any]] = {name: np.empty(n) for name in ("tool_length", "s", "t", "weight", "feed")}
+    columns |= {name: np.empty(n, dtype=np.int64) for name in ("move", "line", "motion", "tool")}
+    return Samples(**columns, position=np.empty((n, 3)), abc=np.zeros((n, 3)), tangent=np.empty((n, 3)))
 
 
 def _sample_block(
