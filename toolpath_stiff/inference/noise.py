@@ -28,7 +28,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.inference.covariances import Covariance, Groups, Precision, Widening
+from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, copied, from_repeats
 from toolpath_stiff.readings.measurements import Measurements
@@ -365,19 +365,16 @@ class Scatter:
         Where these are the wild readings of `known`, that is the answer: nothing is worked out again. One by one, the
         most wild first, each beside those before it.
         """
-        diagonal, wild = self.precision.diagonal, list(self.wild)
-        pull, taken = self.precision.times(residual), np.zeros(len(residual))
+        precision, wild = self.precision, list(self.wild)
+        diagonal, pull, taken = precision.diagonal, precision.times(residual), np.zeros(len(residual))
         taken[wild] = -np.inf
-        widening: Widening | None = None
         for _ in range(int(self.most * len(residual)) + 1):
             own = 1.0 + self.widening * diagonal
-            gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price
-            gain += taken
+            gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price + taken
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
-            widening = widening or Widening(self.covariance)
-            column, share = widening.widen(row, float(self.widening[row]))
+            precision, column, share = precision.widened(row, float(self.widening[row]))
             pull = pull - column * (share * pull[row])
             diagonal = diagonal - column**2 * share
             wild.append(row)
