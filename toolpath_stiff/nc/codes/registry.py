@@ -11,28 +11,7 @@ import inspect
 import re
 from collections.abc import Iterable, Iterator
 
-from toolpath_stiff.nc.codes.code import (
-    DIAMETER,
-    DYNAMIC,
-    EVERYWHERE,
-    EXACT_STOP,
-    M_COOLANT,
-    M_OVERRIDES,
-    M_SPINDLE,
-    M_TAPPING,
-    MOTION,
-    ONCE,
-    PATH_CONTROL,
-    SCALING,
-    SMOOTHING,
-    Alias,
-    Code,
-    Refused,
-    code_name,
-    g_codes,
-    holds_anyway,
-    m_codes,
-)
+from toolpath_stiff.nc.codes.code import EVERYWHERE, Alias, Code, Refused, code_name, g_codes, holds_anyway, m_codes
 from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
 from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
 from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES
@@ -55,7 +34,7 @@ def path_control(state: State, block: CurrentBlock, code: str) -> None:
 
 def m_parameters(state: State, block: CurrentBlock) -> None:
     """M codes may carry P, Q, E, R, S words, M66 an L too; unless the block moves, these are theirs."""
-    moves = MOTION in block.groups or ONCE in block.groups or any(block.has(letter) for letter in POINT_WORDS)
+    moves = "motion" in block.groups or "non-modal" in block.groups or any(block.has(letter) for letter in POINT_WORDS)
     if not moves:
         waits = any(word.letter == "M" and word.value == WAIT_FOR_INPUT for word in block.block.words)
         for letter in "PQERSL" if waits else "PQERS":
@@ -67,7 +46,7 @@ def look_ahead(state: State, block: CurrentBlock, code: str) -> None:
     letters = {word.letter for word in block.block.words} - {"G", "M", "F", "S", "T"}
     taken = PLANNING[code]
     if code in SPLINES and (letters - set(taken) or not letters):
-        raise block.fail(block.codes[code], "is a spline, which is not supported", hint=_LINES_AND_ARCS)
+        raise block.fail(code, "is a spline, which is not supported", hint=_LINES_AND_ARCS)
     for letter in taken:
         if block.take(letter) is not None and code == "G8":  # alone it is a mode of lathes that holds anyway
             state.note(block.line, block.codes[code], _PLANNING)
@@ -78,7 +57,7 @@ def scaling_off(state: State, block: CurrentBlock, code: str) -> None:
     letter = next((letter for letter in "SXYZUVW" if letter in block.values), None)
     if letter is not None:
         raise block.fail(
-            block.codes[code],
+            code,
             f"with {letter} is a lathe's code (the limit of its speed, or a shift), and a lathe's X is a diameter",
             hint=LATHE_HINT,
         )
@@ -126,54 +105,54 @@ _COOLANT = m_codes("M7 M8 M9")
 
 PASSIVE_CODES = (
     Code(
-        "G8", DIAMETER, look_ahead, "lathe radius mode; with P: look-ahead",
-        "LinuxCNC, G-Codes, G8; Fanuc, operator's manuals, Advanced preview control (G08)", label=DIAMETER,
+        "G8", "lathe diameter", look_ahead, "lathe radius mode; with P: look-ahead",
+        "LinuxCNC, G-Codes, G8; Fanuc, operator's manuals, Advanced preview control (G08)", label="lathe diameter",
     ),
     Code(
-        "G5", SMOOTHING, look_ahead, "high-speed machining, with P alone",
+        "G5", "look-ahead", look_ahead, "high-speed machining, with P alone",
         "Fanuc, operator's manuals, High speed cycle machining (G05)", listed=_PLANNING,
     ),
     Code(
-        "G5.1", SMOOTHING, look_ahead, "contour control, with Q alone",
+        "G5.1", "look-ahead", look_ahead, "contour control, with Q alone",
         "Fanuc, operator's manuals, AI contour control (G05.1)", listed=_PLANNING,
     ),
     Code(
-        "G5.4", SMOOTHING, look_ahead, "high-speed control", "Fanuc, operator's manuals, HRV3 (G05.4)",
+        "G5.4", "look-ahead", look_ahead, "high-speed control", "Fanuc, operator's manuals, HRV3 (G05.4)",
         ("generic", "fanuc"), listed=_PLANNING,
     ),
-    Code("G9", EXACT_STOP, holds_anyway, "exact stop", f"{_FANUC}, Exact stop (G09)", listed=_EXACT_STOP),
-    Code("G103", SMOOTHING, look_ahead, "limit of the look-ahead", f"{_HAAS}, G103", GENERIC_HAAS, listed=_PLANNING),
-    Code("G187", SMOOTHING, look_ahead, "smoothness", f"{_HAAS}, G187", GENERIC_HAAS, listed=_PLANNING),
+    Code("G9", "exact stop", holds_anyway, "exact stop", f"{_FANUC}, Exact stop (G09)", listed=_EXACT_STOP),
+    Code("G103", "look-ahead", look_ahead, "limit of the look-ahead", f"{_HAAS}, G103", GENERIC_HAAS, listed=_PLANNING),
+    Code("G187", "look-ahead", look_ahead, "smoothness", f"{_HAAS}, G187", GENERIC_HAAS, listed=_PLANNING),
     Code(
-        "G254", DYNAMIC, dynamic_offset, "dynamic work offset", f"{_HAAS}, G254", GENERIC_HAAS,
+        "G254", "dynamic offset", dynamic_offset, "dynamic work offset", f"{_HAAS}, G254", GENERIC_HAAS,
         listed="the work offset follows the part",
     ),
     Code(
-        "G255", DYNAMIC, dynamic_offset, "no dynamic work offset", f"{_HAAS}, G255", GENERIC_HAAS,
+        "G255", "dynamic offset", dynamic_offset, "no dynamic work offset", f"{_HAAS}, G255", GENERIC_HAAS,
         listed="the work offset follows the part no longer",
     ),
     Code(
-        "M29", M_TAPPING, holds_anyway, "rigid tapping", f"{_FANUC}, Rigid tapping (M29)", ("generic", "fanuc"),
+        "M29", "M rigid tapping", holds_anyway, "rigid tapping", f"{_FANUC}, Rigid tapping (M29)", ("generic", "fanuc"),
         listed="rigid tapping",
     ),
     Code(
-        "G50", SCALING, scaling_off, "scaling off", "Fanuc, operator's manuals, Scaling (G50, G51)", label=SCALING
+        "G50", "scaling", scaling_off, "scaling off", "Fanuc, operator's manuals, Scaling (G50, G51)", label="scaling"
     ),
-    Code("G61", PATH_CONTROL, path_control, "exact path", g_codes("G61"), listed=_EXACT_STOP),
-    Code("G61.1", PATH_CONTROL, path_control, "exact stop", g_codes("G61.1"), listed=_EXACT_STOP),
+    Code("G61", "path control", path_control, "exact path", g_codes("G61"), listed=_EXACT_STOP),
+    Code("G61.1", "path control", path_control, "exact stop", g_codes("G61.1"), listed=_EXACT_STOP),
     Code(
-        "G64", PATH_CONTROL, path_control, "path blending", g_codes("G64"),
+        "G64", "path control", path_control, "path blending", g_codes("G64"),
         listed="path blending: the path is taken as programmed, corners included",
     ),
-    Code("M3", M_SPINDLE, holds_anyway, "spindle on", m_codes("M3 M4 M5")),
-    Code("M4", M_SPINDLE, holds_anyway, "spindle on, reversed", m_codes("M3 M4 M5")),
-    Code("M5", M_SPINDLE, holds_anyway, "spindle off", m_codes("M3 M4 M5")),
-    Code("M19", M_SPINDLE, holds_anyway, "spindle orientation", m_codes("M19"), listed="spindle orientation"),
-    Code("M7", M_COOLANT, holds_anyway, "mist coolant on", _COOLANT, listed="coolant"),
-    Code("M8", M_COOLANT, holds_anyway, "flood coolant on", _COOLANT, listed="coolant"),
-    Code("M9", M_COOLANT, holds_anyway, "coolant off", _COOLANT, listed="coolant"),
+    Code("M3", "M spindle", holds_anyway, "spindle on", m_codes("M3 M4 M5")),
+    Code("M4", "M spindle", holds_anyway, "spindle on, reversed", m_codes("M3 M4 M5")),
+    Code("M5", "M spindle", holds_anyway, "spindle off", m_codes("M3 M4 M5")),
+    Code("M19", "M spindle", holds_anyway, "spindle orientation", m_codes("M19"), listed="spindle orientation"),
+    Code("M7", "M coolant", holds_anyway, "mist coolant on", _COOLANT, listed="coolant"),
+    Code("M8", "M coolant", holds_anyway, "flood coolant on", _COOLANT, listed="coolant"),
+    Code("M9", "M coolant", holds_anyway, "coolant off", _COOLANT, listed="coolant"),
     *(
-        Code(code, M_OVERRIDES, holds_anyway, "speed and feed overrides", m_codes("M48 - M53"), listed="overrides")
+        Code(code, "M overrides", holds_anyway, "speed and feed overrides", m_codes("M48 - M53"), listed="overrides")
         for code in ("M48", "M49", "M50", "M51", "M52", "M53")
     ),
 )  # fmt: skip
