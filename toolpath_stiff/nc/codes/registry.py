@@ -7,11 +7,10 @@ leave the path alone, and codes that are refused with the reason, have their row
 
 from __future__ import annotations
 
-import inspect
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
-from toolpath_stiff.nc.codes.code import EVERYWHERE, Alias, Code, Refused, code_name, g_codes, holds_anyway, m_codes
+from toolpath_stiff.nc.codes.code import Alias, Code, Refused, code_name, g_codes, holds_anyway, m_codes
 from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
 from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
 from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES
@@ -328,78 +327,3 @@ def would_change(text: str, listed: bool = False) -> str:
     if code[0] == "M" and code not in CODES and code not in REFUSED:
         return "what is not known: it may run anything on its control"
     return (LISTED_CHANGES if listed else BY_CODE).get(code, "")
-
-
-def codes_table() -> str:
-    r"""The codes that are understood, their other names, and those that are refused, as Markdown tables.
-
-    Examples
-    --------
-    >>> print("\n".join(codes_table().splitlines()[:3]))
-    | code | group | meaning | function in `nc/codes` | dialects | source | against LinuxCNC |
-    | --- | --- | --- | --- | --- | --- | --- |
-    | G0 | motion | rapid | `motion.straight` | all | LinuxCNC, G-Codes, G0 | same path |
-    """
-    understood = [
-        (code.name, code.group, _meaning(code), _function(code), _controls(code.controls), code.source, _witness(code))
-        for code in CODES.values()
-    ]
-    others = [
-        (a.name, f"as {a.code}", a.meaning, "", _controls(a.controls), a.source, NOT_THERE) for a in ALIASES.values()
-    ]
-    refused = [(code.name, code.what, code.hint, code.source) for code in REFUSED.values()]
-    return "\n".join(
-        [
-            *_rows(HEADING, understood + others),
-            "",
-            "Refused in every dialect, with the line and what to do instead; nothing is held against LinuxCNC:",
-            "",
-            *_rows(("code", "what it is", "instead", "source"), refused),
-            "",
-        ]
-    )
-
-
-HEADING = ("code", "group", "meaning", "function in `nc/codes`", "dialects", "source", "against LinuxCNC")
-
-
-SAME_PATH, NOT_THERE, NOT_HELD = "same path", "has none", "not held"
-
-
-# LinuxCNC's, and in no program whose path is compared with LinuxCNC's. The others are in such programs: the random ones
-# of `benchmarks/hunt.md`, or those of the tests against rs274 (`tests/nc/test_code_registry.py` looks them up).
-WITHOUT_WITNESS = ("M7", "M19", "M53", "M71")
-
-
-def _witness(code: Code) -> str:
-    """Whether what the code does is held against LinuxCNC's interpreter."""
-    if "linuxcnc" not in code.controls or "LinuxCNC" not in code.source:
-        return NOT_THERE
-    return NOT_HELD if code.name in WITHOUT_WITNESS else SAME_PATH
-
-
-def _meaning(code: Code) -> str:
-    return f"{code.meaning} (listed: {code.listed})" if code.listed else code.meaning
-
-
-def _function(code: Code) -> str:
-    if code.act is holds_anyway:
-        return ""
-    module = inspect.getmodule(code.act)
-    assert module is not None
-    return f"`{module.__name__.rsplit('.', maxsplit=1)[-1]}.{code.act.__name__}`"
-
-
-def _controls(names: tuple[str, ...]) -> str:
-    return "all" if names == EVERYWHERE else ", ".join(names)
-
-
-def _rows(heading: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Lines of a table; successive rows that differ in their code alone are one."""
-    yield f"| {' | '.join(heading)} |"
-    yield f"|{' --- |' * len(heading)}"
-    joined: dict[tuple[str, ...], list[str]] = {}
-    for name, *cells in rows:
-        joined.setdefault(tuple(cells), []).append(name)
-    for cells_, names in joined.items():
-        yield f"| {' '.join(names)} | {' | '.join(cells_)} |"
