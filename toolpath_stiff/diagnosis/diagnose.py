@@ -48,7 +48,7 @@ from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
 if TYPE_CHECKING:
-    from toolpath_stiff.nc.moves import Program
+    from toolpath_stiff.nc.moves import ReadProgram
     from toolpath_stiff.units import Pose
 
 
@@ -272,7 +272,7 @@ def next_measurements(
 
 
 def choice_on_path(
-    diagnosis: Diagnosis, program: Program, origin: Pose | None = None, given: Conditions | None = None
+    diagnosis: Diagnosis, program: ReadProgram, origin: Pose | None = None, given: Conditions | None = None
 ) -> dict[str, Any]:
     """Mean, range and minimum along a program under each plausible explanation: how much the choice matters.
 
