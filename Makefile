@@ -26,6 +26,7 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python .ci/house.py . --reached
 
 # The budgets of .ci/house.toml; `make house RUNS=--runs` counts the functions and types that runs pass as well.
 house: $(VENV)/.dev

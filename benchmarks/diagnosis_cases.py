@@ -15,7 +15,6 @@ from benchmarks.bars import Record
 from benchmarks.case_loop import record_of
 from benchmarks.random_visits import random_visits
 from toolpath_stiff.diagnosis.diagnose import Diagnosis, diagnose
-from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
@@ -115,7 +114,7 @@ def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: 
     file.write_text(exercise.csv_text(rows), encoding="utf-8")
     start = time.process_time()
     diagnosis = diagnose(machine(), read_measurements(file, machine()), plan_next=False, **stated)
-    found = document(diagnosis)
+    found = diagnosis.to_dict()
     cpu = time.process_time() - start
     record = {
         "truth": truth["hidden"],

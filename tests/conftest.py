@@ -153,7 +153,7 @@ def joint_columns_are_shared() -> Iterator[None]:
     from tests.updating.cases import joint_columns_once
     from toolpath_stiff.inference.prediction import Predictor
     from toolpath_stiff.planning import forecasts
-    from toolpath_stiff.stiffness.guard import is_foreign
+    from toolpath_stiff.stiffness.effect_source import is_foreign
 
     of_readings, of_plan = Predictor.joint_columns, forecasts.joint_columns
 

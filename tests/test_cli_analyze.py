@@ -185,6 +185,17 @@ def test_wrong_input_is_one_message_and_exit_2(part, capsys, arguments, words):
     assert sorted(part.parent.iterdir()) == before
 
 
+@pytest.mark.parametrize("programs", [["part.nc"], ["part.nc", "other.nc"]])
+def test_parquet_without_pyarrow_is_one_line_that_names_the_extra(part, capsys, monkeypatch, programs):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    (part.parent / "other.nc").write_bytes(part.read_bytes())
+    before = sorted(part.parent.iterdir())
+    assert main(["analyze", *programs, "--format", "parquet", "--no-plots"]) == 2
+    error = capsys.readouterr().err
+    assert "Parquet needs the package pyarrow" in error and "pip install 'toolpath-stiff[parquet]'" in error
+    assert error.count("\n") == 1 and sorted(part.parent.iterdir()) == before
+
+
 @pytest.mark.parametrize("value", ["-1,0,0", "-.5,0,1", "-1e-3,1,0"])
 def test_values_may_begin_with_a_minus(part, value):
     assert main(["analyze", "part.nc", "--no-plots", "--load", value]) == 0

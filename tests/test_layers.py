@@ -7,8 +7,6 @@ import builtins
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 from importlinter.cli import lint_imports
@@ -18,9 +16,6 @@ from toolpath_stiff.cli.main import COMMANDS
 
 PACKAGE = Path(toolpath_stiff.__file__).parent
 HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "pyarrow", "pygcode")
-
-
-tree = cache(ast.parse)  # each module is parsed once
 
 
 def modules() -> list[Path]:
@@ -85,27 +80,6 @@ def test_single_poses_load_no_nc_program():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
-
-
-MOST_LINES = 60  # of a function, its docstring apart
-
-
-def lines_of_functions(source: str) -> Iterator[tuple[str, int]]:
-    for node in ast.walk(tree(source)):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            first = node.body[0]
-            said = first.end_lineno - first.lineno + 1 if ast.get_docstring(node) is not None else 0
-            yield node.name, node.end_lineno - node.lineno + 1 - said
-
-
-def test_no_function_is_long():
-    long = [
-        f"{path}: {name} has {lines} lines"
-        for path in modules()
-        for name, lines in lines_of_functions((PACKAGE / path).read_text("utf-8"))
-        if lines > MOST_LINES
-    ]
-    assert long == []
 
 
 def test_array_types_stand_in_one_place():

@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.effects import draft_effect as draft_effect
     from toolpath_stiff.api.effects import effect_template as effect_template
     from toolpath_stiff.api.effects import effects as effects
-    from toolpath_stiff.api.inputs import Program as Program
     from toolpath_stiff.api.machines import Machine as Machine
     from toolpath_stiff.api.machines import MachineFile as MachineFile
     from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
@@ -75,6 +74,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import TableError as TableError
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
+    from toolpath_stiff.nc.program import Program as Program
     from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
     from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
     from toolpath_stiff.placement.result import Placement as Placement
@@ -102,7 +102,6 @@ _PUBLIC = {
     "api.correction": ("Update", "plan", "update"),
     "api.diagnosis": ("Measurements", "compare", "diagnose"),
     "api.effects": ("EffectDraft", "EffectFile", "check_effects", "draft_effect", "effect_template", "effects"),
-    "api.inputs": ("Program",),
     "api.machines": ("Machine", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.next_visits": ("next_visit",),
@@ -116,6 +115,7 @@ _PUBLIC = {
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
+    "nc.program": ("Program",),
     "placement.case_study": ("CaseStudy",),
     "placement.keep_out": ("KeepOut",),
     "placement.result": ("Placement",),

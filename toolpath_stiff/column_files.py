@@ -11,12 +11,14 @@ import csv
 import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import AnyArray, BoolArray
+from toolpath_stiff.errors import InputError
 
 Columns = Mapping[str, AnyArray]
 Decimals = Mapping[str, int | None]  # None: a whole number or a word
@@ -86,6 +88,12 @@ def csv_rows(columns: Columns, decimals: Decimals) -> str:
         values.append(column.tolist() if digits is None else (np.round(column, digits) + 0.0).tolist())
     text = "".join([template % row for row in zip(*values, strict=True)])
     return text.replace("nan", "") if "nan" in text else text
+
+
+def check_parquet() -> None:
+    """Raise `InputError` where Parquet cannot be written, for want of pyarrow; does not import it."""
+    if find_spec("pyarrow") is None:
+        raise InputError("Parquet needs the package pyarrow", hint="run `pip install 'toolpath-stiff[parquet]'`")
 
 
 def parquet_pieces(columns_of: Callable[[slice], Columns], rows: int) -> Iterator[bytes]:

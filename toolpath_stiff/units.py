@@ -8,6 +8,7 @@ costs nothing at start-up. What is written is rounded here too (`json_number`, `
 from __future__ import annotations
 
 import math
+from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
@@ -143,9 +144,11 @@ def json_number(value: float, digits: int = DIGITS) -> float | None:
 
 
 def certain(found: Any) -> Any:
-    """A document with its floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
+    """The same, its floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
     if isinstance(found, float):
         return float(f"{round(found, DECIMALS):.{CERTAIN}g}") + 0.0
     if isinstance(found, dict):
         return {key: certain(value) for key, value in found.items()}
+    if is_dataclass(found) and not isinstance(found, type):
+        return replace(found, **{field.name: certain(getattr(found, field.name)) for field in fields(found)})
     return [certain(value) for value in found] if isinstance(found, list | tuple) else found

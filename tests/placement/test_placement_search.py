@@ -31,8 +31,9 @@ from toolpath_stiff.placement.paths import placed_path, representative_path, wor
 from toolpath_stiff.placement.result import nothing_better_words
 from toolpath_stiff.placement.search import search_placements
 from toolpath_stiff.placement.task import SearchRecord
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 ROOT = Path(__file__).parent.parent.parent

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -11,12 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from tests.browser import needs_browser, painted
-from tests.report import diagnose_documents as documents
 from tests.report.factory import short
 from tests.stiffness.cases import nist
+from tests.updating.cases import VERDICTS, diagnosed
 from toolpath_stiff.analysis.grid import map_stiffness
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.comparison.compare import compare
+from toolpath_stiff.inference.confounding import Confounding
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
 from toolpath_stiff.planning.gap_map import MOST_LEVELS, group_of, height_groups
@@ -29,6 +31,7 @@ from toolpath_stiff.report.analysis.page import page
 from toolpath_stiff.report.batch.index import batch_page
 from toolpath_stiff.report.compare import pictures as compare_pictures
 from toolpath_stiff.report.diagnose import pictures as diagnose_pictures
+from toolpath_stiff.report.diagnose.ladder import ladder_png
 from toolpath_stiff.report.diagnose.page import diagnose_html
 from toolpath_stiff.report.figure import INK, page_colours
 from toolpath_stiff.report.map import map_page
@@ -142,10 +145,8 @@ def test_scatter_and_planes_use_their_width(last, compared):
 
 
 def test_the_confounding_matrix_uses_its_width(last):
-    document = documents.ambiguous()
-    names = [f"some_effect_{i}" for i in range(12)]
-    document["confounding"] = {"effects": names, "matrix": np.eye(12).tolist(), "sets": []}
-    diagnose_pictures.confounding_png(document)
+    unlike = Confounding(tuple(f"some_effect_{i}" for i in range(12)), np.eye(12), ())
+    diagnose_pictures.confounding_png(replace(diagnosed(*VERDICTS["ambiguous"]), confounding=unlike))
     figure = last[-1]
     figure.draw_without_rendering()
     matrix = figure.axes[0].get_window_extent()
@@ -202,7 +203,7 @@ def test_all_pages_have_one_style_sheet_with_a_dark_half(mapped):
         "analysis": page(analysis),
         "batch": batch_page([]),
         "map": map_page(mapped, "nist"),
-        "diagnosis": diagnose_html(documents.identified(), {}),
+        "diagnosis": diagnose_html(diagnosed(*VERDICTS["identified"]), {}),
     }
     shared = asset("page.css")
     assert "prefers-color-scheme: dark" in shared
@@ -235,7 +236,8 @@ def test_a_picture_in_a_page_takes_the_page_s_colours(compared):
     assert picture.svg.startswith("<svg viewBox=") and "--natural:1400px" in picture.svg
     assert INK not in picture.svg and "var(--ink)" in picture.svg and "var(--card)" in picture.svg
     assert "<script" not in picture.svg and "http" not in picture.svg.replace("http://www.w3.org/", "")
-    text = diagnose_html(documents.ambiguous(), {"ladder.png": diagnose_pictures.ladder_png(documents.ambiguous())})
+    ambiguous = diagnosed(*VERDICTS["ambiguous"])
+    text = diagnose_html(ambiguous, {"ladder.png": ladder_png(ambiguous)})
     assert "<img" not in text and text.count('class="picture"') == 1
 
 

@@ -246,7 +246,8 @@ def test_compiled_loops_load_where_nothing_can_be_written(tmp_path):
     (tmp_path / "home").write_text("likewise")
     hidden = ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")
     environment = {name: value for name, value in os.environ.items() if name not in hidden}
-    environment |= {"HOME": str(tmp_path / "home"), "PYTHONPATH": str(tmp_path)}
+    package = str(Path(closed_form.__file__).parents[2])
+    environment |= {"HOME": str(tmp_path / "home"), "PYTHONPATH": os.pathsep.join([str(tmp_path), package])}
     subprocess.run([sys.executable, "-c", "import compiled_loops"], env=environment, cwd=tmp_path, check=True)
 
 

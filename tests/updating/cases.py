@@ -31,11 +31,19 @@ from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.readings.measurements import Measurements, read_measurements
 from toolpath_stiff.rig import case, exercise
 from toolpath_stiff.rig import hidden as hidden_module
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect
-from toolpath_stiff.stiffness.model import ActiveEffect
 
 FloatArray = NDArray[np.float64]
+
+# Seed, layout, what is hidden, its size: one of each verdict.
+VERDICTS = {
+    "adequate": (100, "paper", "none", None),
+    "identified": (7, "paper", "table_compliance", 0.1),
+    "ambiguous": (7, "paper", "spindle_compliance", 0.1),
+    "unexplained": (7, "paper", "cable_drag", 0.1),
+}
 
 OPTIONAL_COLUMNS = (
     "force_N", "sd_N_per_mm", "setup", "clamp", "repeat", "point", "time_min", "tool_extension_mm", "loop",

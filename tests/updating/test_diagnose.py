@@ -14,7 +14,6 @@ from tests.effects.cases import CATALOGUE
 from tests.stiffness.cases import nist
 from tests.updating import cases
 from tests.updating.cases import campaign, diagnosed, examined, readings_by_hand, table_1
-from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.stiffness.catalogue import find_effect
@@ -56,7 +55,7 @@ EFFECTS = [Saddle()]
 
 
 def found(verdict: str) -> dict[str, Any]:
-    return document(replace(diagnosed(*CASES[verdict]), line="tps diagnose measurements.csv"))
+    return replace(diagnosed(*CASES[verdict]), line="tps diagnose measurements.csv").to_dict()
 
 
 @pytest.mark.parametrize("verdict", CASES)
@@ -162,9 +161,9 @@ def test_the_same_data_and_seed_give_the_same_document(monkeypatch):
     data = campaign(*CASES["ambiguous"])[0]
     found("ambiguous")
     monkeypatch.setattr(cases, "JUDGEMENTS", {})  # judged again, not remembered
-    again = document(examined(nist(), data, line="tps diagnose measurements.csv"))
+    again = replace(examined(nist(), data), line="tps diagnose measurements.csv").to_dict()
     assert json.dumps(again) == json.dumps(found("ambiguous"))
-    other = document(examined(nist(), data, seed=5, line="tps diagnose measurements.csv"))
+    other = replace(examined(nist(), data, seed=5), line="tps diagnose measurements.csv").to_dict()
     assert other["gates"]["simulated_squares"] != again["gates"]["simulated_squares"]
     assert other["verdict"] == again["verdict"]
 
@@ -212,7 +211,7 @@ def test_a_users_own_effect_takes_part(tmp_path):
     fit = after.fits["saddle"]
     hidden = truth["effects"][0]["parameters"]["size"]  # m/N at y = 0.3 m
     assert abs(fit.sizes[0][0] - hidden) < 3.3 * fit.deviation(0)
-    best = document(after)["candidates"][0]
+    best = after.to_dict()["candidates"][0]
     assert best["effect"] == "saddle" and best["adequate"]
     assert best["held_out_error_percent"] < 1.3 * 80.0 * after.noise.typical
 
@@ -238,4 +237,4 @@ def test_six_readings_are_diagnosed_without_a_name():
     six = table_1().select(np.arange(0, 42, 7))
     verdict = examined(nist(), six, noise=0.05)
     assert verdict.verdict in ("adequate", "ambiguous")
-    json.dumps(document(verdict), allow_nan=False)
+    json.dumps(verdict.to_dict(), allow_nan=False)

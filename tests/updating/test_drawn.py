@@ -16,7 +16,6 @@ from tests.updating.test_diagnose import SADDLE
 from toolpath_stiff.correction.document import document as update_document
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import common_verdict, diagnose
-from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.drawn import CONFIRMS, foretold
 from toolpath_stiff.inference.evidence import Problem
@@ -61,7 +60,7 @@ def test_the_readings_that_it_was_drawn_from_only_describe(described):
     assert (found.verdict, found.explanations) == ("described", ("saddle",))
     assert found.main.drawn.seen == len(DATA) and found.main.drawn.new == 0
     assert found.next_measurements and "between" in found.next_measurements[0]["why"]
-    back = document(found)
+    back = found.to_dict()
     assert back["draft_status"] == {
         "effects": ["saddle"], "readings_seen": len(DATA), "readings_new": 0, "gain": None, "rival": "",
         "confirmed": False,

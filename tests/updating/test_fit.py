@@ -13,14 +13,14 @@ from scipy.optimize import least_squares
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, make_problem, simple_noise
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.document import parameters
+from toolpath_stiff.diagnosis.rows import fitted_sizes
 from toolpath_stiff.inference.candidates import Candidate, candidates_of
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.model import ActiveEffect
 
 FloatArray = NDArray[np.float64]
 
@@ -213,11 +213,10 @@ def test_deviations_and_intervals_are_what_they_say():
         scattered = sizes[:, index].std()
         # A deviation from 150 values is known within 6 %; the law's prior adds certainty that these campaigns lack.
         assert np.median(stated) == pytest.approx(scattered, rel=0.25)
-        ends = np.array([list(parameters(fit).values())[index]["interval"] for fit in fits]) * 1e-9
+        ends = np.array([list(fitted_sizes(fit)["table_compliance"].values())[index].interval for fit in fits]) * 1e-9
         inside = np.mean((ends[:, 0] <= truth) & (truth <= ends[:, 1]))
         assert inside >= 0.88  # 95 % less 4 times the 1.8 % of 150 cases
         assert np.median(ends[:, 1] - ends[:, 0]) < 2.1 * NORMAL_95 * scattered * 1.25
-    first = parameters(fits[0])
-    assert [entry["unit"] for entry in first.values()][:3] == ["nm/N"] * 3
-    absent = list(first.values())[1]
-    assert absent["value"] == 0.0 and absent["interval"][0] == 0.0 < absent["interval"][1]
+    first = list(fitted_sizes(fits[0])["table_compliance"].values())
+    assert [size.unit for size in first][:3] == ["nm/N"] * 3
+    assert first[1].value == 0.0 and first[1].interval[0] == 0.0 < first[1].interval[1]

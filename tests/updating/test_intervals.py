@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from tests.conftest import seeds
 from tests.updating.cases import campaign, predictor_for
-from toolpath_stiff.diagnosis.document import parameters
+from toolpath_stiff.diagnosis.rows import fitted_sizes
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.hypotheses import averaged_interval, score_family
@@ -89,10 +89,10 @@ def test_intervals_of_several_components_hold_the_truth():
             problem = Problem.of(predictor_for(data), noise_models(data)[0])
             family = score_family(problem, effect, problem.score_base())
             assert family is not None and family.best is not None
-            found = parameters(refine(problem, family.best), family)
+            found = fitted_sizes(refine(problem, family.best), family)[name]
             for parameter in effect.parameters:
                 if not parameter.discrete:
-                    low, high = found[parameter.key]["interval"]
+                    low, high = found[parameter.key].interval
                     held.append(low <= truth["effects"][0]["parameters"][parameter.name] <= high)
     assert len(held) == 70
     assert np.mean(held) >= 0.89

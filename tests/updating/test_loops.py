@@ -13,7 +13,6 @@ from toolpath_stiff.correction.document import document as update_document
 from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import diagnose
-from toolpath_stiff.diagnosis.document import document
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.planning.menu import Menu
@@ -30,10 +29,11 @@ from toolpath_stiff.rig.loops import true_displacements
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop, measuring_loop
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.stiffness.model import build_model
 
 POSES = np.array([[0.05, -0.1, 0.6, 0.1, -0.2, 0.05], [-0.2, 0.15, 1.1, -0.3, 0.1, 0.0], [0.0, 0.0, 0.8, 0, 0, 0]])
 DIRECTIONS = np.array([[1.0, 0, 0], [0, 0.6, 0.8], [0, 0, 1.0]])
@@ -234,7 +234,7 @@ def test_what_the_tip_cannot_tell_an_indicator_names(joints):
     assert alone.verdict == "adequate" and "joint_compliance" in alone.plausible
     found = diagnose(nist(), read_measurements(list(joints), nist()), plan_next=False)
     assert (found.verdict, found.plausible) == ("identified", ["joint_compliance"])
-    written = document(found)
+    written = found.to_dict()
     # Errors are those of the tip's readings; the loops stand beside them.
     assert written["readings"] == 42 == len(found.before)
     assert [one["loop"] for one in written["loops"]["by_loop"]] == ["joint 1", "strut 1", "table"]

@@ -16,6 +16,7 @@ import pytest
 
 from tests.effects.cases import CATALOGUE
 from tests.stiffness.cases import nist
+from tests.updating.cases import VERDICTS as CASES
 from tests.updating.cases import campaign, diagnosed, examined, table_1
 from toolpath_stiff.comparison.compare import Comparison, compare
 from toolpath_stiff.correction.additions import parse_addition
@@ -24,11 +25,11 @@ from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.ladder import _Work, build_ladder
 from toolpath_stiff.correction.update import Correction
 from toolpath_stiff.diagnosis import words as verdict_words
-from toolpath_stiff.diagnosis.document import document as diagnosis_document
-from toolpath_stiff.diagnosis.words import next_steps, verdict_text, why, words
+from toolpath_stiff.diagnosis.result import Diagnosis
+from toolpath_stiff.diagnosis.rows import odds_words
+from toolpath_stiff.diagnosis.words import next_steps, verdict_text, why
 from toolpath_stiff.hints import Asked, parted
 from toolpath_stiff.inference.errors import raised_text, scatter_text
-from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.planning.rivals import errors_so_far, rivals_of
 from toolpath_stiff.readings.measurements import Measurements
@@ -38,18 +39,11 @@ from toolpath_stiff.report.compare.page import QUESTIONS as COMPARE_QUESTIONS
 from toolpath_stiff.report.compare.page import compare_html
 from toolpath_stiff.report.compare.variables import stiffness_deviation_percent
 from toolpath_stiff.report.diagnose.page import diagnose_html
-from toolpath_stiff.report.explanations import explanations, headline, is_plausible, model_rows
+from toolpath_stiff.report.explanations import headline
 from toolpath_stiff.report.update import page as update_report
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 
-# Seed, layout, what is hidden, its size: one of each verdict.
-CASES = {
-    "adequate": (100, "paper", "none", None),
-    "identified": (7, "paper", "table_compliance", 0.1),
-    "ambiguous": (7, "paper", "spindle_compliance", 0.1),
-    "unexplained": (7, "paper", "cable_drag", 0.1),
-}
 PROVENANCE = {"command": "tps update a.csv", "data_sha256": "0" * 64}
 MEAN = "mean_abs_error_percent"
 
@@ -61,7 +55,7 @@ def compared(data: Measurements) -> Comparison:
 @cache
 def told(verdict: str) -> dict[str, Any]:
     """The document of a diagnosis."""
-    return diagnosis_document(replace(diagnosed(*CASES[verdict]), line="tps diagnose a.csv"))
+    return replace(diagnosed(*CASES[verdict]), line="tps diagnose a.csv").to_dict()
 
 
 def updated(data: Measurements, *names: str, **options: Any) -> dict[str, Any]:
@@ -97,8 +91,8 @@ def test_every_text_prints_these_two_errors():
     texts = [
         (compare_report.text(comparison), ""),
         (compare_html(comparison, dict.fromkeys(COMPARE_QUESTIONS, b"")), ""),
-        (diagnose_report.text(found), last),
-        (diagnose_html(found, {}), last),
+        (diagnose_report.text(diagnosis), last),
+        (diagnose_html(diagnosis, {}), last),
         (update_report.text(update_told), last),
     ]
     for text, rest in texts:
@@ -117,7 +111,7 @@ def test_a_noise_that_is_only_guessed_says_what_it_would_hide():
     hidden = re.search(r"hide a missing effect .* less than ([\d.]+) % .* off by up to ([\d.]+) %", verdict_text(found))
     assert hidden and float(hidden[1]) > 3.9 and float(hidden[2]) > 3.9
     assert next_steps(found, Asked(()))[0].startswith("repeat a few readings")
-    printed = " ".join(diagnose_report.text(diagnosis_document(found)).split())
+    printed = " ".join(diagnose_report.text(found).split())
     assert "these data do not tell how much of it is scatter" in printed and "scatter alone leaves" not in printed
 
 
@@ -180,46 +174,48 @@ def test_pages_say_which_sign_they_have():
     found = compared(table_1())
     assert rule in compare_html(found, dict.fromkeys(COMPARE_QUESTIONS, b""))
     assert rule in compare_report.text(found)
-    assert rule in diagnose_html(told("identified"), {"before_after.png": b""})
+    assert rule in diagnose_html(diagnosed(*CASES["identified"]), {"before_after.png": b""})
 
 
 # -- verdict, table and picture ----------------------------------------------------------------------------------------
 
 
-def texts(found: dict[str, Any]) -> str:
-    return re.sub(r"\s+", " ", " ".join([headline(found), found["text"], diagnose_report.text(found)]))
+def texts(found: Diagnosis) -> str:
+    return re.sub(r"\s+", " ", " ".join([headline(found), verdict_text(found), diagnose_report.text(found)]))
 
 
 @pytest.mark.parametrize("verdict", CASES)
 def test_what_is_said_of_a_row_agrees_with_its_probability_and_the_verdict(verdict):
-    found = told(verdict)
-    rows = [*model_rows(found)[1:], *found["pairs"], *found["candidates"]]
+    found = diagnosed(*CASES[verdict])
+    rows = [found.rows.refitted, *found.rows.pairs, *found.rows.candidates]
     for row in rows:
-        if row.get("words") in ("best", "nearly indistinguishable", "somewhat disfavoured"):
-            assert row["probability"] >= 0.005
-            assert verdict != "unexplained" or row["words"] != "best"
-        if row.get("words") == "nearly indistinguishable":
+        if row.words in ("best", "nearly indistinguishable", "somewhat disfavoured"):
+            assert row.probability >= 0.005
+            assert verdict != "unexplained" or row.words != "best"
+        if row.words == "nearly indistinguishable":
             assert "no other" not in texts(found)
-    marked = {" + ".join(row.get("effects") or [row["effect"]]) for row in rows if is_plausible(row, found)}
-    assert marked == set(explanations(found))
+    assert {row.name for row in rows if row.standing} == set(found.explanations)
     if "equally well" in texts(found):
-        assert len(found["explanations"]) > 1
+        assert len(found.explanations) > 1
 
 
 def test_words_follow_the_odds():
-    assert words(0.6, 0.6) == "best"
-    assert words(0.5, 0.6) == "nearly indistinguishable"
+    assert odds_words(0.6, 0.6) == "best"
+    assert odds_words(0.5, 0.6) == "nearly indistinguishable"
     # Odds of 4 to 1 are 2 ln 4 = 2.8; of 10 to 1, 4.6.
-    assert words(0.15, 0.6) == "somewhat disfavoured"
-    assert words(0.06, 0.6) == "strongly disfavoured"
-    assert words(0.004, 0.004) == "ruled out"
+    assert odds_words(0.15, 0.6) == "somewhat disfavoured"
+    assert odds_words(0.06, 0.6) == "strongly disfavoured"
+    assert odds_words(0.004, 0.004) == "ruled out"
 
 
 def test_a_pair_is_shaded_and_its_members_are_not():
-    found = {"explanations": ["weak_strut + gauge_scale"], "plausible": ["weak_strut", "gauge_scale"]}
-    assert is_plausible({"effects": ["weak_strut", "gauge_scale"]}, found)
-    assert not is_plausible({"effect": "weak_strut"}, found)
-    assert not is_plausible({"effect": "gauge_scale"}, found)
+    found = diagnosed(9, "tilted", "two")
+    assert found.explanations == ("contact_nonlinearity + gauge_scale",)
+    assert [row.name for row in found.rows.pairs if row.standing] == ["contact_nonlinearity + gauge_scale"]
+    assert not any(row.standing for row in found.rows.candidates)
+    # Each with its own sizes and what it acts on, in the document too.
+    first = found.to_dict()["pairs"][0]["parameters"]
+    assert set(first) == {"contact_nonlinearity", "gauge_scale"} and first["gauge_scale"]["direction"]
 
 
 def ambiguous(**chances: float) -> SimpleNamespace:
@@ -258,7 +254,7 @@ def test_a_weak_strut_is_told_as_an_engineer_tells_it():
     assert find_effect("weak_strut").finding({"strut": 4, "factor": 0.8179}) == "strut 4 is about 18 % too soft"
     found = told("identified")
     assert found["text"].startswith("The table gives way by about ")
-    assert headline(found).startswith("The table gives way by about ")
+    assert headline(diagnosed(*CASES["identified"])).startswith("The table gives way by about ")
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
@@ -340,7 +336,7 @@ def test_a_real_ladder_falls_whatever_the_order():
 
 
 def test_none_is_an_explanation_too():
-    assert is_plausible({"effect": NONE}, {"explanations": [NONE]})
+    assert diagnosed(*CASES["adequate"]).rows.refitted.standing
 
 
 @pytest.mark.parametrize(

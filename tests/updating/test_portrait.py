@@ -23,7 +23,7 @@ from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
 from toolpath_stiff.portrait.words import term_words
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case, exercise
-from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.term_effect import effect_of
 from toolpath_stiff.stiffness.terms import LINKS, SHAPES, VARIABLES, Term
 

@@ -12,7 +12,6 @@ from tests.updating.cases import campaign, examined, predictor_for, table_1
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.correction.document import document
 from toolpath_stiff.correction.update import update
-from toolpath_stiff.diagnosis.document import document as diagnosis_document
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.file import load_machine
@@ -65,7 +64,7 @@ def test_the_verdict_is_unexplained_and_the_question_is_put():
     some = np.r_[0:9, 21:30]
     found = examined(nist(), SHUFFLED.select(some), noise=0.10)
     assert (found.verdict, found.plausible) == ("unexplained", [])
-    written = diagnosis_document(found)
+    written = found.to_dict()
     assert written["question"].startswith(ASKED) and written["text"].startswith(ASKED)
     assert not any("tps update" in line for line in written["next"])
     assert ASKED in compare(nist(), SHUFFLED.select(some), noise=0.10, draws=50).document["text"]

@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from toolpath_stiff.api.inputs import Origin, Program, origin_si, origin_word, program_from
+from toolpath_stiff.api.inputs import Origin, origin_si, origin_word
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, options
+from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, numbers
 from toolpath_stiff.results import Progress, teller
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.comparison.compare import Comparison
     from toolpath_stiff.diagnosis.result import Diagnosis
     from toolpath_stiff.machine.model import Machine as MachineModel
-    from toolpath_stiff.nc.moves import Program as NcProgram
     from toolpath_stiff.readings.measurements import Measurements as Readings
 
 
@@ -325,16 +325,16 @@ def diagnose(
     ('adequate', ['none', 'joint_moment_stiffness'], 'joint_moment_stiffness')
     >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape
     (12, 3)
-    >>> list(found.files(plots=False)), len(found.document["plausible"])
+    >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
     (['diagnose.json', 'residuals.csv'], 6)
     """
+    from toolpath_stiff.diagnosis.diagnose import choice_on_path
     from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
+    from toolpath_stiff.placement.case_study import case_study_program
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     part = None if program is None else program_from(program)
-    origin = origin_si(origin_mm_deg)
-    conditions = asked.on.running(part).conditions
-    default = asked.model.default_origin
+    origin, conditions = origin_si(origin_mm_deg), asked.on.running(part).conditions
     own = options(
         program=None if part is None else part.file,
         origin=None if origin is None else origin_word(origin),
@@ -342,24 +342,13 @@ def diagnose(
         temperature=asked.on.temperature_C,
         seed=seed or None,
     )
-    return diagnose_readings(
-        asked.model,
-        asked.readings,
-        program=lambda: _case_study() if part is None else part.moves(origin, default),
-        origin=origin,
-        setup=conditions.setup,
-        temperature=conditions.temperature,
-        names=asked.files,
+    found = replace(
+        diagnose_readings(asked.model, asked.readings, names=asked.files, progress=teller(progress), **asked.common),
         line=asked.asked.command("diagnose", *own, *(part.words if part else ())),
         asked=asked.asked,
         inputs=(*asked.inputs, *(part.inputs if part else ())),
-        progress=teller(progress),
-        **asked.common,
     )
-
-
-def _case_study() -> NcProgram:
-    """The packaged case study, loaded only where the choice between explanations is worked out on it."""
-    from toolpath_stiff.placement.case_study import case_study_program
-
-    return case_study_program()
+    if found.verdict != "ambiguous":
+        return found
+    moves = case_study_program() if part is None else part.moves(origin, asked.model.default_origin)
+    return replace(found, path=choice_on_path(found, moves, origin, conditions))

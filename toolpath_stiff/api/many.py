@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pebble import ProcessExpired
 
-from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Program, Step
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import (
     JOBS,
@@ -31,8 +31,10 @@ from toolpath_stiff.api.programs import (
 )
 from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import checked
 from toolpath_stiff.processes import ProcessPool, death
+from toolpath_stiff.report.analysis.summary import check_table
 from toolpath_stiff.report.batch.index import files, names
 from toolpath_stiff.report.batch.programs import (
     Found,
@@ -213,6 +215,7 @@ def analyze_many(
         "require_N_per_mm": require_N_per_mm,
     }  # fmt: skip
     path_options(**options)  # a mistake in them is one error
+    check_table(table)
     found, given = _found(programs)
     example = Program.from_text("", **reading)
     _check_shared(on, other, [example, *given.values()])

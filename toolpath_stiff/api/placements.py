@@ -7,28 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from toolpath_stiff.api.inputs import (
-    FARTHEST_MM,
-    Force,
-    Linearised,
-    LoadDirection,
-    Origin,
-    Program,
-    Step,
-    origin_si,
-    pose_si,
-    program_from,
-)
+from toolpath_stiff.api.inputs import FARTHEST_MM, Force, Linearised, LoadDirection, Origin, Step, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, low_high, numbers
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine.model import Machine as MachineModel
-    from toolpath_stiff.nc.moves import Program as ReadProgram
+    from toolpath_stiff.nc.moves import ReadProgram
     from toolpath_stiff.placement.evaluator import Evaluator
     from toolpath_stiff.placement.goals import Bounds
     from toolpath_stiff.placement.keep_out import KeepOut

@@ -8,11 +8,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Program, Step, origin_si, program_from
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
+from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked
 from toolpath_stiff.results import Progress, Result, counter
 from toolpath_stiff.units import (

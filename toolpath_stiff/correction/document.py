@@ -12,7 +12,7 @@ from toolpath_stiff.correction.ladder import NEEDED, Step, Support, Update
 from toolpath_stiff.correction.strut_law import StrutLawSearch
 from toolpath_stiff.correction.update import Correction
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.document import held_errors, interval, rounded_errors
+from toolpath_stiff.diagnosis.rows import held_errors, interval, rounded_errors
 from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent, errors_text
 from toolpath_stiff.inference.evidence import Fit

@@ -13,20 +13,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolpath_stiff.comparison.loop_readings import beside_tip
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.diagnosis.result import NAMING, Diagnosis
+from toolpath_stiff.diagnosis.examination import NAMING
+from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.confounding import confounding
 from toolpath_stiff.inference.detectable import detectable_sizes
-from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import Baseline, refine
 from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
 from toolpath_stiff.inference.left_out import held_out, of_readings
 from toolpath_stiff.inference.noise import JOINT_ERROR, noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.inference.slips import (
+    SlipSize,
+    SuspectEntry,
     alone,
     mended,
     slips_that_show,
@@ -45,8 +48,7 @@ from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
 if TYPE_CHECKING:
-    from toolpath_stiff.comparison.loop_readings import LoopsDocument
-    from toolpath_stiff.nc.moves import Program
+    from toolpath_stiff.nc.moves import ReadProgram
     from toolpath_stiff.units import Pose
 
 
@@ -63,15 +65,8 @@ def diagnose(
     effect_files: Sequence[str | Path] = (),
     seed: int = 0,
     plan_next: bool = True,
-    program: Program | Callable[[], Program] | None = None,
-    origin: Pose | None = None,
-    setup: str | None = None,
-    temperature: float | None = None,
     names: Sequence[str] = (),
-    line: str = "",
-    asked: Asked | None = None,
-    inputs: tuple[str, ...] = (),
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
     """Find out which physical effect the model lacks, if any: everything that `tps diagnose` says.
 
@@ -89,14 +84,8 @@ def diagnose(
         Of the bootstrap and of the poses of the plan.
     plan_next
         Whether to plan the next measurements where the verdict is `ambiguous`.
-    program
-        Where several explanations remain, how much the choice between them matters is worked out on this program, or
-        on what this function returns; None: not at all.
-    origin, setup, temperature
-        Placement of that program (mm, degrees), set-up and degrees C under which it runs; None: the machine file's.
-    names, line, asked, inputs
-        Names of the measurement files and the command, for the record; what the commands that go on from here carry;
-        files that were read.
+    names
+        Of the measurement files, for the record.
     progress
         Told what is being done.
 
@@ -114,137 +103,96 @@ def diagnose(
     >>> found.verdict
     'ambiguous'
     """
-    say = progress or (lambda text: None)
-    found = _examined(machine, data, noise, strut_spread, joint_error, effect_files, seed, tuple(names), say)
-    found = replace(
-        found, line=line, asked=asked, inputs=inputs, portrait=portrait_of(found, say), alike=alike_of(found)
-    )
-    if found.verdict not in ("ambiguous", "described"):
-        return found
-    if plan_next:
-        say("planning the next measurements")
-        rows, remarks = next_measurements(found, seed=seed)
-        found = replace(found, next_measurements=tuple(rows), remarks=tuple(remarks))
-    if program is not None and found.verdict == "ambiguous":
-        of_machine = found.predictor.base.conditions
-        conditions = Conditions(
-            of_machine.setup if setup is None else setup, of_machine.temperature if temperature is None else temperature
-        )
-        chosen = program() if callable(program) else program
-        found = replace(found, path=choice_on_path(found, chosen, origin, conditions))
-    return found
-
-
-def _examined(
-    machine: Machine,
-    data: Measurements,
-    noise: float | tuple[float, float] | None,
-    strut_spread: float,
-    joint_error: float,
-    effect_files: Sequence[str | Path],
-    seed: int,
-    names: tuple[str, ...],
-    say: Callable[[str], None],
-) -> Diagnosis:
-    """From readings to verdict under each noise model, then what stands behind the verdict that they share."""
-    _check_number(data)
-
-    def judged(data: Measurements) -> tuple[dict[str, Judgement], Judgement]:
-        predictor, judgements = Predictor(machine, data, effect_files), {}
-        effects = testable_effects(predictor)[0]
-        for one in noise_models(data, noise, strut_spread, joint_error):
-            say(f"searching {len(effects)} effects, noise {one.name}")
-            judgements[one.name] = judge(Problem.of(predictor, one), one, effects, seed)
-        # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
-        return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
-
-    judgements, main = judged(data)
-    looked_at = not main.question and data.beside is None
-    suspects = suspect_rows(main.problem, main.likeliest) if looked_at else ()
-    clear = [suspect for suspect in suspects if suspect.clear]
-    clear = [suspect for suspect in clear if suspect not in alone(data, clear)]
-    kept = np.ones(len(data), dtype=bool)
-    kept[[row for suspect in clear for row in suspect.rows]] = False
-    if clear and kept.sum() >= FEWEST:
-        # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
-        say("once more with the rows mended that look mistyped")
-        clear = clear if judged(mended(data, clear))[1].explained else []
-    entries = suspect_entries(suspects, data, left_out=clear)
-    if clear:
-        say("once more without the rows that look mistyped")
-        data = data.select(kept)
-        judgements, main = judged(data)
-    verdict, plausible = common_verdict(list(judgements.values()))
-    effects, cannot = testable_effects(main.problem.predictor)
-    say("final fits, errors held out by point")
-    baseline = Baseline.of(main.problem)
-    fits = _all_fits(main)
-    tested = {family.name for family in main.families}
-    cannot |= {effect.name: () for effect in effects if effect.name not in tested}
-    held = {name: held_out(fit, data.point) for name, fit in fits.items()}
-    tip = data.tip
-    return Diagnosis(
-        verdict, list(plausible), judgements, main, data.of_tip, machine, effects, cannot,
-        of_readings(baseline.as_given, tip), of_readings(baseline.refitted, tip),
-        {name: of_readings(fit, tip) for name, fit in fits.items()},
-        held_out(baseline.refitted, data.point).of_readings(tip),
-        {name: one.of_readings(tip) for name, one in held.items()},
-        confounding(main.problem, main.families),
-        tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
-        names or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries),
-        unexcluded=tuple(one for one in unexcluded(main) if one.effect.name not in plausible),
-        slips=slips_that_show(main.problem, main.likeliest) if looked_at else (), loops=_loops(main, fits),
-    )  # fmt: skip
-
-
-def _check_number(data: Measurements) -> None:
     if len(data.of_tip) < FEWEST or np.isnan(data.stiffness).any():
         raise InputError(
             f"{len(data.of_tip)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
             expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
         )
 
+    def judged(data: Measurements) -> Judged:
+        predictor, judgements = Predictor(machine, data, effect_files), {}
+        effects = testable_effects(predictor)[0]
+        for model in noise_models(data, noise, strut_spread, joint_error):
+            progress(f"searching {len(effects)} effects, noise {model.name}")
+            judgements[model.name] = judge(Problem.of(predictor, model), model, effects, seed)
+        # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
+        return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
 
-def _all_fits(main: Judgement) -> dict[str, Fit]:
-    """The fits of a judgement, and with the model itself the best of every family that it has only on tables."""
-    fits = dict(main.fits)
-    for family in main.families:
-        if family.best is not None and family.name not in fits:
-            fits[family.name] = refine(main.problem, family.best)
-    return fits
+    judgements, main, data, suspects, slips = _without_slips(judged, data, progress)
+    progress("final fits, errors held out by point")
+    effects, cannot = testable_effects(main.problem.predictor)
+    tested = {family.name for family in main.families}
+    cannot |= {effect.name: () for effect in effects if effect.name not in tested}
+    baseline = Baseline.of(main.problem)
+    # Of every family that the judgement has only on tables, the best once more with the model itself.
+    best = {family.name: family.best for family in main.families if family.best is not None}
+    fits = main.fits | {name: refine(main.problem, fit) for name, fit in best.items() if name not in main.fits}
+    held = {name: held_out(fit, data.point) for name, fit in fits.items()}
+    likeliest = fits.get(max(main.probability, key=lambda name: main.probability[name], default=NONE), main.base)
+    log_model, tip = main.problem.observed - likeliest.residual, data.tip
+    verdict, plausible = common_verdict(list(judgements.values()))
+    found = Diagnosis(
+        verdict, list(plausible), judgements, main, data.of_tip, machine, cannot,
+        of_readings(baseline.as_given, tip), of_readings(baseline.refitted, tip),
+        {name: of_readings(fit, tip) for name, fit in fits.items()},
+        held_out(baseline.refitted, data.point).of_readings(tip),
+        {name: left_out.of_readings(tip) for name, left_out in held.items()},
+        confounding(main.problem, main.families),
+        tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
+        tuple(names) or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=suspects,
+        unexcluded=tuple(hidden for hidden in unexcluded(main) if hidden.effect.name not in plausible),
+        slips=slips,
+        loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
+    )  # fmt: skip
+    found = replace(found, portrait=portrait_of(found, progress), alike=alike_of(found))
+    if not plan_next or found.verdict not in ("ambiguous", "described"):
+        return found
+    progress("planning the next measurements")
+    rows, remarks = next_measurements(found, seed=seed)
+    return replace(found, next_measurements=tuple(rows), remarks=tuple(remarks))
 
 
-def _loops(main: Judgement, fits: dict[str, Fit]) -> LoopsDocument:
-    """Readings of loops beside the tip against the likeliest explanation."""
-    problem = main.problem
-    if problem.predictor.data.beside is None:
-        return {"by_loop": [], "readings": []}
-    from toolpath_stiff.comparison.loop_readings import loops_document
+Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise model; the one that is written out
 
-    likeliest = max(main.probability, key=lambda name: main.probability[name], default=NONE)
-    fit = fits.get(likeliest)
-    residual = main.base.residual if fit is None else fit.residual
-    return loops_document(problem.predictor.data, problem.observed - residual, problem.scatter.covariance)
+
+def _without_slips(
+    judged: Callable[[Measurements], Judged], data: Measurements, progress: Callable[[str], None]
+) -> tuple[dict[str, Judgement], Judgement, Measurements, tuple[SuspectEntry, ...], tuple[SlipSize, ...]]:
+    """Judgements of the readings without rows that are clearly mistyped, these readings, suspects, slips that show."""
+    judgements, main = judged(data)
+    if main.question or data.beside is not None:
+        return judgements, main, data, (), ()
+    suspects = suspect_rows(main.problem, main.likeliest)
+    clear = [suspect for suspect in suspects if suspect.clear]
+    clear = [suspect for suspect in clear if suspect not in alone(data, clear)]
+    kept = np.ones(len(data), dtype=bool)
+    kept[[row for suspect in clear for row in suspect.rows]] = False
+    if clear and kept.sum() >= FEWEST:
+        # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
+        progress("once more with the rows mended that look mistyped")
+        clear = clear if judged(mended(data, clear))[1].explained else []
+    entries = suspect_entries(suspects, data, left_out=clear)
+    if clear:
+        progress("once more without the rows that look mistyped")
+        data = data.select(kept)
+        judgements, main = judged(data)
+    return judgements, main, data, tuple(entries), slips_that_show(main.problem, main.likeliest)
 
 
 def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:
     """The verdict that all noise models share, and names that hold the truth under any; else `ambiguous`."""
     verdicts = {judgement.verdict for judgement in judgements}
     plausible = tuple(dict.fromkeys(name for judgement in judgements for name in judgement.plausible))
+    same = len({frozenset(judgement.plausible) for judgement in judgements}) == 1
     if len(verdicts) == 1:
-        verdict = verdicts.pop()
-        return verdict if verdict not in NAMING or _same(judgements) else "ambiguous", plausible
-    if verdicts == set(NAMING) and _same(judgements):
+        (verdict,) = verdicts
+        return verdict if same or verdict not in NAMING else "ambiguous", plausible
+    if verdicts == set(NAMING) and same:
         return "described", plausible
-    return "ambiguous", plausible if plausible else (NONE,)
+    return "ambiguous", plausible or (NONE,)
 
 
-def _same(judgements: Sequence[Judgement]) -> bool:
-    """Whether all of them name the same effects."""
-    return len({frozenset(judgement.plausible) for judgement in judgements}) == 1
-
-
-def portrait_of(diagnosis: Diagnosis, say: Callable[[str], None]) -> Portrait | None:
+def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portrait | None:
     """What the missing thing looks like: of unexplained readings, and of what the best explanation leaves behind.
 
     None where nothing stands out of what is left, and where the readings do not look as if they were of this machine.
@@ -265,7 +213,7 @@ def portrait_of(diagnosis: Diagnosis, say: Callable[[str], None]) -> Portrait | 
         noise = noise.select(noise.tip)
         problem = Problem.of(Predictor(diagnosis.machine, diagnosis.data, diagnosis.predictor.effect_files), noise)
         base = problem.score_base()
-    say("describing what is missing")
+    progress("describing what is missing")
     found = draw_portrait(problem, base, noise, diagnosis.seed, main.base_gate.worst)
     return found if found.terms or verdict == "unexplained" else None
 
@@ -324,7 +272,7 @@ def next_measurements(
 
 
 def choice_on_path(
-    diagnosis: Diagnosis, program: Program, origin: Pose | None = None, given: Conditions | None = None
+    diagnosis: Diagnosis, program: ReadProgram, origin: Pose | None = None, given: Conditions | None = None
 ) -> dict[str, Any]:
     """Mean, range and minimum along a program under each plausible explanation: how much the choice matters.
 
@@ -339,7 +287,7 @@ def choice_on_path(
     if conditions.setup is None:
         effects = [active for name in names if name != NONE for active in diagnosis.fits[name].effects]
         conditions = replace(conditions, setup=next(filter(None, map(setup_of, effects)), None))
-    found: dict[str, Any] = {"program": program.name, "setup": conditions.setup, "explanations": {}}
+    shown = {}
     for name in names:
         fit = diagnosis.base if name == NONE else diagnosis.fits[name]
         machine = diagnosis.machine.with_changes(strut_law=scaled_law(diagnosis.machine.strut_law, fit.law))
@@ -350,10 +298,9 @@ def choice_on_path(
         except TpsError as error:
             return {"program": program.name, "reason": str(error)}
         figures = stiffness_figures(analysis, analysis.headline)
-        found["explanations"][name] = {
-            key: round(figures[key], 1) for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
-        }
-    means = [entry["mean_N_per_mm"] for entry in found["explanations"].values()]
-    if means:
-        found["mean_spread_percent"] = round(100.0 * (max(means) - min(means)) / float(np.mean(means)), 2)
-    return found
+        shown[name] = {key: round(figures[key], 1) for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")}
+    means = [figures["mean_N_per_mm"] for figures in shown.values()]
+    spread = (
+        {"mean_spread_percent": round(100.0 * (max(means) - min(means)) / float(np.mean(means)), 2)} if means else {}
+    )
+    return {"program": program.name, "setup": conditions.setup, "explanations": shown, **spread}

@@ -22,9 +22,9 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.splines import Spline
 from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.contract import Effect, Parameter
-from toolpath_stiff.stiffness.model import ActiveEffect
 
 SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated
 

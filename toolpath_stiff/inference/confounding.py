@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.hypotheses import Family
+from toolpath_stiff.units import json_number
 
 CONFOUNDED = 0.95  # canonical correlation above which two effects cannot be told apart by these data
 
@@ -32,6 +33,11 @@ class Confounding:
     names: tuple[str, ...]
     matrix: FloatArray
     sets: tuple[tuple[str, ...], ...]
+
+    @property
+    def rounded(self) -> list[list[float | None]]:
+        """The matrix to three digits, as documents and pictures have it."""
+        return [[json_number(value, 3) for value in row] for row in self.matrix.tolist()]
 
 
 def confounding(problem: Problem, families: Sequence[Family]) -> Confounding:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import Candidate, Component
-from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem, normal_equations
 from toolpath_stiff.inference.minima import bounded_step
 from toolpath_stiff.inference.noise import NormalEquations, Scatter, gauss_newton, scaled_inverse
 
@@ -23,9 +24,94 @@ STEPS = 8
 TOLERANCE = 1e-3  # of a standard deviation
 
 
-def refine(problem: Problem, found: Fit, law_free: bool = True) -> Fit:
+LAW_STEP = 1e-4  # of the law's logarithms, for differences
+
+
+HALVINGS = 10  # of a step that makes the fit worse
+
+
+class _Model:
+    """The model as a function of the strut law's logarithms and of all sizes, in one array x (2 + p,).
+
+    `low`, `high` (2 + p,): bounds of x. A law that is not fitted is held by its prior, and not moved.
+    """
+
+    def __init__(self, problem: Problem, candidates: tuple[Candidate, ...], law_free: bool) -> None:
+        self.problem, self.candidates, self.law_free = problem, candidates, law_free
+        self.components = [component for candidate in candidates for component in candidate.components]
+        self.prior = prior_of(law_free)
+        bounds = [(-np.inf, np.inf)] * 2 + [component.bounds for component in self.components]
+        self.low, self.high = np.array(bounds, dtype=float).T
+
+    def sizes(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """Of each candidate."""
+        ends = 2 + np.cumsum([0, *(len(candidate.components) for candidate in self.candidates)])
+        return tuple(x[start:end].copy() for start, end in pairwise(ends))
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """(n,) ln measured - ln modelled."""
+        effects = [c.active(sizes) for c, sizes in zip(self.candidates, self.sizes(x), strict=True)]
+        return np.asarray(self.problem.observed - self.problem.predictor.log_stiffness(x[:2], effects))
+
+    def equations(
+        self, x: FloatArray, residual: FloatArray, unknowns: Sequence[int], scatter: Scatter
+    ) -> NormalEquations:
+        """Of the `unknowns` among x, the law's two always the first of them."""
+        predictor = self.problem.predictor
+        columns: list[FloatArray] = []
+        if np.isfinite(residual).all() and predictor.struts_carry_all(c.effect for c in self.candidates):
+            columns = list(predictor.law_columns(self.problem.observed - residual, x[:2]).T)
+        for i in unknowns[len(columns) :]:
+            moved, step = x.copy(), LAW_STEP
+            if i > 1:
+                component = self.components[i - 2]
+                step = 1e-4 * max(abs(x[i]), 1e-2 * max(component.typical()[0], 1e-30))
+                # Towards zero where a step outwards would leave the bounds.
+                step = -step if x[i] > 0.0 and x[i] + step > component.bounds[1] else step
+            moved[i] += step
+            columns.append((residual - self.residual(moved)) / step)
+        jacobian = np.nan_to_num(np.stack(columns, axis=1))
+        return normal_equations(jacobian, residual, x[:2], scatter.precision, self.prior)
+
+    def newton_step(self, x: FloatArray, unknowns: Sequence[int], equations: NormalEquations) -> FloatArray:
+        """Step of the unknowns to the least quadratic model within the bounds.
+
+        By bounded-variable least squares where the plain step would leave them: cutting that off leads uphill where
+        sizes trade off against each other.
+        """
+        step = np.asarray(scaled_inverse(equations.information) @ equations.gradient)
+        low, high = (limit[unknowns] - x[unknowns] for limit in (self.low, self.high))
+        within = ((step >= low) & (step <= high)).all()
+        return step if within else bounded_step(equations.information, equations.gradient, low, high)
+
+    def moved(
+        self, x: FloatArray, residual: FloatArray, unknowns: Sequence[int], step: FloatArray, scatter: Scatter
+    ) -> tuple[FloatArray, FloatArray] | None:
+        """Unknowns and residual after the step, halved until the fit gets no worse; None where nothing helps."""
+
+        def misfit(x: FloatArray, residual: FloatArray) -> float:
+            return float(scatter.precision.squares(residual) + (x[:2] @ x[:2]) / LAW_PRIOR**2)
+
+        before, first = misfit(x, residual), 0 if self.law_free else 2
+        for _ in range(HALVINGS):
+            further = x.copy()
+            further[unknowns[first:]] += step[first:]
+            further = np.clip(further, self.low, self.high)
+            left = self.residual(further)
+            if np.isfinite(left).all() and misfit(further, left) <= before + 1e-9:
+                return further, left
+            step = 0.5 * step
+        return None
+
+
+def prior_of(law_free: bool) -> float:
+    """Information about each logarithm of the strut law; of one that is not fitted, that it does not change."""
+    return LAW_PRIOR**-2 if law_free else 1e12
+
+
+def refine(problem: Problem, fit: Fit, law_free: bool = True) -> Fit:
     """Gauss-Newton with the model itself from the searches' result, within the bounds."""
-    return fit_effects(problem, found.candidates, found.sizes, found.free, found.law, found.scatter, law_free)
+    return fit_effects(problem, fit.candidates, fit.sizes, fit.free, fit.law, fit.scatter, law_free)
 
 
 def fit_effects(
@@ -54,147 +140,32 @@ def fit_effects(
     law_free
         Whether the strut law is refitted along.
     """
-    search = _Search(problem, tuple(candidates), tuple(free), law_free)
-    law = np.array(law, dtype=float) if law_free else np.zeros(2)
-    flat = np.concatenate([np.asarray(s, dtype=float) for s in sizes]) if candidates else np.zeros(0)
-    flat = search.bounded(flat)
-    residual = search.residual(law, flat)
-    if scatter is None:
-        scatter = problem.scatter.with_wild(residual)
-    Point = tuple[FloatArray, FloatArray, FloatArray]  # law, all sizes, residual
+    model, unknowns = _Model(problem, tuple(candidates), law_free), [0, 1, *(2 + index for index in free)]
+    x = np.clip(np.concatenate([law if law_free else np.zeros(2), *sizes]).astype(float), model.low, model.high)
+    residual = model.residual(x)
+    scatter = problem.scatter.with_wild(residual) if scatter is None else scatter
+    Point = tuple[FloatArray, FloatArray]  # x, residual
 
-    def equations(at: Point) -> NormalEquations:
-        return _normal_equations(search.jacobian(*at), at[2], at[0], scatter, law_free)
+    def equations(point: Point) -> NormalEquations:
+        return model.equations(*point, unknowns, scatter)
 
-    def move(at: Point, here: NormalEquations) -> tuple[Point, FloatArray] | None:
-        step = search.newton_step(at[1], here.information, here.gradient)
-        law, flat, residual = search.step(*at, step, scatter)
-        return None if residual is None else ((law, flat, residual), step)
+    def move(point: Point, here: NormalEquations) -> tuple[Point, FloatArray] | None:
+        step = model.newton_step(point[0], unknowns, here)
+        moved = model.moved(*point, unknowns, step, scatter)
+        return None if moved is None else (moved, step)
 
-    (law, flat, residual), _ = gauss_newton((law, flat, residual), equations, move, STEPS, TOLERANCE)
-    last = equations((law, flat, residual))
+    (x, residual), _ = gauss_newton((x, residual), equations, move, STEPS, TOLERANCE)
+    last = equations((x, residual))
+    absent = {}
+    if len(unknowns) < len(x):  # where the data would pull the others, were all sizes free
+        every = model.equations(x, residual, range(len(x)), scatter)
+        inverse = scaled_inverse(every.information)
+        pulled, sd = x + inverse @ every.gradient, np.sqrt(np.maximum(np.diag(inverse), 0.0))
+        absent = {i - 2: (float(pulled[i]), float(sd[i])) for i in range(len(x)) if i not in unknowns}
     return Fit(
-        tuple(candidates),
-        tuple(search.split(flat)),
-        tuple(free),
-        law,
-        residual,
-        last.jacobian,
-        scaled_inverse(last.information),
-        scatter,
-        law_free,
-        _pulls_on_absent(replace(search, free=tuple(range(len(flat)))), law, flat, residual, scatter, tuple(free)),
-    )
-
-
-def _pulls_on_absent(
-    search: _Search, law: FloatArray, flat: FloatArray, residual: FloatArray, scatter: Scatter, free: tuple[int, ...]
-) -> dict[int, tuple[float, float]]:
-    """See `Fit.absent`. `search` has all sizes free."""
-    absent = [index for index in range(len(flat)) if index not in free]
-    if not absent:
-        return {}
-    jacobian = search.jacobian(law, flat, residual)
-    equations = _normal_equations(jacobian, residual, law, scatter, search.law_free)
-    inverse = scaled_inverse(equations.information)
-    step = inverse @ equations.gradient
-    return {i: (float(flat[i] + step[2 + i]), float(np.sqrt(max(inverse[2 + i, 2 + i], 0.0)))) for i in absent}
-
-
-def _normal_equations(
-    jacobian: FloatArray, residual: FloatArray, law: FloatArray, scatter: Scatter, law_free: bool
-) -> NormalEquations:
-    weighted = scatter.precision.times(jacobian.T)
-    information, gradient = weighted @ jacobian, weighted @ residual
-    prior = 1.0 / LAW_PRIOR**2 if law_free else 1e12
-    information[:2, :2] += prior * np.eye(2)
-    gradient[:2] -= prior * law
-    return NormalEquations(jacobian, information, gradient)
-
-
-@dataclass(frozen=True)
-class _Search:
-    """The model as a function of law and all sizes in one flat array."""
-
-    problem: Problem
-    candidates: tuple[Candidate, ...]
-    free: tuple[int, ...]
-    law_free: bool
-
-    def split(self, flat: FloatArray) -> list[FloatArray]:
-        counts = np.cumsum([len(c.components) for c in self.candidates])[:-1]
-        return [np.array(part) for part in np.split(flat, counts)] if self.candidates else []
-
-    def residual(self, law: FloatArray, flat: FloatArray) -> FloatArray:
-        effects = [c.active(s) for c, s in zip(self.candidates, self.split(flat), strict=True)]
-        return np.asarray(self.problem.observed - self.problem.predictor.log_stiffness(law, effects))
-
-    def limits(self) -> tuple[FloatArray, FloatArray]:
-        """Smallest and largest of all sizes."""
-        bounds = [component.bounds for c in self.candidates for component in c.components]
-        low, high = np.array(bounds, dtype=float).reshape(-1, 2).T
-        return low, high
-
-    def bounded(self, flat: FloatArray) -> FloatArray:
-        return np.asarray(np.clip(flat, *self.limits()))
-
-    def newton_step(self, flat: FloatArray, information: FloatArray, gradient: FloatArray) -> FloatArray:
-        """Step (2 + free,) of law and free sizes to the least quadratic model within the bounds.
-
-        By bounded-variable least squares where the plain step would leave them: cutting that off leads uphill where
-        sizes trade off against each other.
-        """
-        step = np.asarray(scaled_inverse(information) @ gradient)
-        low, high = (limit[list(self.free)] - flat[list(self.free)] for limit in self.limits())
-        if ((step[2:] >= low) & (step[2:] <= high)).all():
-            return step
-        free_law = np.full(2, np.inf)
-        return bounded_step(information, gradient, np.concatenate([-free_law, low]), np.concatenate([free_law, high]))
-
-    def jacobian(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> FloatArray:
-        columns = self._law_columns(law, flat, residual)
-        components = [component for c in self.candidates for component in c.components]
-        for index in self.free:
-            size = flat[index]
-            step = 1e-4 * max(abs(size), 1e-2 * max(components[index].typical()[0], 1e-30))
-            # Towards zero where a step outwards would leave the bounds.
-            step = -step if size > 0.0 and size + step > components[index].bounds[1] else step
-            moved = flat.copy()
-            moved[index] += step
-            columns.append((residual - self.residual(law, moved)) / step)
-        return np.nan_to_num(np.stack(columns, axis=1))
-
-    def _law_columns(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> list[FloatArray]:
-        """Two (n,) d ln k / d law: in closed form where the struts carry what equilibrium says."""
-        predictor = self.problem.predictor
-        if np.isfinite(residual).all() and predictor.struts_carry_all(c.effect for c in self.candidates):
-            return list(predictor.law_columns(self.problem.observed - residual, law).T)
-        columns = []
-        for j in range(2):
-            moved = law.copy()
-            moved[j] += 1e-4
-            columns.append((residual - self.residual(moved, flat)) / 1e-4)
-        return columns
-
-    def step(
-        self, law: FloatArray, flat: FloatArray, residual: FloatArray, step: FloatArray, scatter: Scatter
-    ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-        """The step, halved until the fit gets no worse; None for the residual where nothing helps."""
-
-        def misfit(at: FloatArray, logs: FloatArray) -> float:
-            return float(scatter.precision.squares(at) + (logs @ logs) / LAW_PRIOR**2)
-
-        before = misfit(residual, law)
-        for _ in range(10):
-            new_law = law + step[:2] if self.law_free else law
-            moved = flat.copy()
-            moved[list(self.free)] += step[2:]
-            moved = self.bounded(moved)
-            new = self.residual(new_law, moved)
-            if np.isfinite(new).all() and misfit(new, new_law) <= before + 1e-9:
-                return new_law, moved, new
-            step = 0.5 * step
-        return law, flat, None
+        tuple(model.candidates), model.sizes(x), tuple(free), x[:2].copy(), residual, last.jacobian,
+        scaled_inverse(last.information), scatter, law_free, absent,
+    )  # fmt: skip
 
 
 # Shares of the largest usual size to start from: at zero itself some effects have no slope to follow, and from far
@@ -207,7 +178,7 @@ ROUNDS = 5  # searches for wild readings
 
 def base_fit(problem: Problem, law_free: bool) -> Fit:
     """The model without any further effect."""
-    return _settled(problem, fit_effects(problem, (), (), (), np.zeros(2), problem.scatter, law_free))
+    return _settled(problem, fit_effects(problem, (), (), (), np.zeros(2), problem.scatter, law_free))[0]
 
 
 def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], law_free: bool) -> Fit:
@@ -225,8 +196,8 @@ def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], l
         Whether the strut law is fitted along.
     """
     tried = [fit for candidate in candidates for fit in _from_starts(problem, before, candidate, law_free)]
-    best, settled = max(tried, key=lambda one: one[0].log_posterior)
-    return _without_zeros(best if settled else _settled(problem, best))
+    best, settled = max(tried, key=lambda pair: pair[0].log_posterior)
+    return _without_zeros(best if settled else _settled(problem, best)[0])
 
 
 def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: bool) -> Iterator[tuple[Fit, bool]]:
@@ -237,12 +208,16 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
     for share in STARTS:
         start = np.array([_start(component, share) for component in candidate.components])
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
-        place = np.concatenate([fit.law, *fit.sizes])
-        last = _normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
+        x = np.concatenate([fit.law, *fit.sizes])
+        scale = _last_equations(fit).scale
         # Two starts mostly end in one place, and go on from there alike.
-        if not any((np.abs(place - other) < TOLERANCE * (1.0 / last.scale)).all() for other in seen):
-            yield _nearly_settled(problem, fit)
-        seen.append(place)
+        if not any((np.abs(x - other) < TOLERANCE * (1.0 / scale)).all() for other in seen):
+            yield _settled(problem, fit, nearly=True)
+        seen.append(x)
+
+
+def _last_equations(fit: Fit) -> NormalEquations:
+    return normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter.precision, prior_of(fit.law_free))
 
 
 def _start(component: Component, share: float) -> float:
@@ -252,16 +227,19 @@ def _start(component: Component, share: float) -> float:
     return sign * min(share * (known if np.isfinite(known) else 1.0), reach)
 
 
-def _nearly_settled(problem: Problem, fit: Fit) -> tuple[Fit, bool]:
-    """As `_settled`, and True; or False, and the fit from which it has one step to go that would not show.
+def _settled(problem: Problem, fit: Fit, nearly: bool = False) -> tuple[Fit, bool]:
+    """The fit with the readings taken for wild that it finds wild itself, continued where it was still moving; True.
 
-    That step moves a likelihood by less than 1e-6: only the likeliest of several fits needs to make it.
+    `nearly`: or False, and the fit from which it has one step to go that would not show. That step moves a likelihood
+    by less than 1e-6: only the likeliest of several fits needs to make it.
     """
     for _ in range(ROUNDS):
         scatter = problem.scatter.with_wild(fit.residual, known=fit.scatter)
-        if scatter is fit.scatter and _gain_to_come(problem, fit) < TOLERANCE**2:
+        if nearly and scatter is fit.scatter and _gain_to_come(problem, fit) < TOLERANCE**2:
             return fit, False
-        fit, done = _again(problem, fit)
+        again = fit_effects(problem, fit.candidates, fit.sizes, fit.free, fit.law, scatter, fit.law_free)
+        done = set(scatter.wild) == set(fit.scatter.wild) and again.log_posterior < fit.log_posterior + 1e-4
+        fit = again
         if done:
             break
     return fit, True
@@ -269,57 +247,34 @@ def _nearly_settled(problem: Problem, fit: Fit) -> tuple[Fit, bool]:
 
 def _gain_to_come(problem: Problem, fit: Fit) -> float:
     """Twice what one more step adds to the log posterior; sizes that it pulls beyond their bounds stay there."""
-    last = _normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
-    gradient = last.gradient
-    search = _Search(problem, fit.candidates, fit.free, fit.law_free)
-    flat = np.concatenate([fit.law, *fit.sizes])
-    low, high = (
-        np.concatenate([np.full(2, at), limit]) for at, limit in zip((-np.inf, np.inf), search.limits(), strict=True)
+    last = _last_equations(fit)
+    model, x, gradient = (
+        _Model(problem, fit.candidates, fit.law_free),
+        np.concatenate([fit.law, *fit.sizes]),
+        last.gradient,
     )
-    kept = ~((flat <= low) & (gradient <= 0.0) | (flat >= high) & (gradient >= 0.0))
+    kept = ~((x <= model.low) & (gradient <= 0.0) | (x >= model.high) & (gradient >= 0.0))
     return float(gradient[kept] @ scaled_inverse(last.information[np.ix_(kept, kept)]) @ gradient[kept])
-
-
-def _settled(problem: Problem, fit: Fit) -> Fit:
-    """The fit with the readings taken for wild that it finds wild itself, and continued where it was still moving."""
-    for _ in range(ROUNDS):
-        fit, done = _again(problem, fit)
-        if done:
-            break
-    return fit
-
-
-def _again(problem: Problem, fit: Fit) -> tuple[Fit, bool]:
-    """The fit continued with the readings that it finds wild, and whether that changes nothing any more."""
-    scatter = problem.scatter.with_wild(fit.residual)
-    again = fit_effects(problem, fit.candidates, fit.sizes, fit.free, fit.law, scatter, fit.law_free)
-    done = set(scatter.wild) == set(fit.scatter.wild) and again.log_posterior < fit.log_posterior + 1e-4
-    return again, done
 
 
 def _without_zeros(fit: Fit) -> Fit:
     """The fit with sizes that have run into zero no longer counted as free."""
-    flat = np.concatenate(fit.sizes)
-    kept = [k for k, index in enumerate(fit.free) if flat[index] != 0.0]
+    sizes = np.concatenate(fit.sizes)
+    kept = [k for k, index in enumerate(fit.free) if sizes[index] != 0.0]
     if len(kept) == len(fit.free):
         return fit
     columns = [0, 1, *(2 + k for k in kept)]
     # Where the data would pull them, could they go below zero: what an upper limit is counted from.
     gradient = fit.scatter.precision.times(fit.jacobian.T) @ fit.residual
     gradient[:2] -= fit.law / LAW_PRIOR**2 if fit.law_free else 0.0
-    step, variance = fit.covariance @ gradient, np.diag(fit.covariance)
-    absent = {
-        index: (float(step[2 + k]), float(np.sqrt(max(variance[2 + k], 0.0))))
-        for k, index in enumerate(fit.free)
-        if k not in kept
-    }
+    step, sd = fit.covariance @ gradient, np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     information = scaled_inverse(fit.covariance)[np.ix_(columns, columns)]
     return replace(
         fit,
         free=tuple(fit.free[k] for k in kept),
         jacobian=fit.jacobian[:, columns],
         covariance=scaled_inverse(information),
-        absent=absent,
+        absent={fit.free[k]: (float(step[2 + k]), float(sd[2 + k])) for k in range(len(fit.free)) if k not in kept},
     )
 
 

@@ -22,9 +22,10 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.readings.measurements import Measurements, measured_path, mechanical_stiffness, shown_by
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import law_products
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, idle_on_readings
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model, idle_on_readings
 from toolpath_stiff.stiffness.trial import failures, own_effects
 
 NO_CHANGE = (0.0, 0.0)  # of the strut law

@@ -159,7 +159,7 @@ class ToolUse:
 
 
 @dataclass(frozen=True, repr=False)
-class Program:
+class ReadProgram:
     r"""A program that was read to its end.
 
     Attributes
@@ -225,7 +225,7 @@ class Program:
     parametric: bool = False
 
     def __repr__(self) -> str:
-        return f"<Program {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
+        return f"<ReadProgram {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
 
 
 # -- recording ---------------------------------------------------------------------------------------------------------

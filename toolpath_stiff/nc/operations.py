@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, IntArray
-from toolpath_stiff.nc.moves import RAPID, Jump, Moves, Program
+from toolpath_stiff.nc.moves import RAPID, Jump, Moves, ReadProgram
 
 NAMED, MARKED, TOOL = "named", "marked", "tool"
 
@@ -190,7 +190,7 @@ class Operations:
     of_move: IntArray
 
 
-def operations(program: Program) -> Operations:
+def operations(program: ReadProgram) -> Operations:
     r"""The operations of a program that was read, by either interpreter.
 
     Examples

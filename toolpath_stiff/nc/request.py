@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.controller import Controller, Switches, switches_on
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.units import Pose, ShopPose, pose_in_mm
 
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+ORIGIN_WINS = (
+    f"the program or the offsets file sets G54; {both_names('--origin')} overrides it, other offsets keep their "
+    "distance to it"
+)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.path import Samples, sample_moves
 from toolpath_stiff.placement.paths import placed_path
 from toolpath_stiff.rotations import rotation_matrices
@@ -55,7 +55,7 @@ class DrawnPath:
 
 def drawn_path(
     model: StiffnessModel,
-    program: Program,
+    program: ReadProgram,
     placements: FloatArray,
     load: Load,
     *,

@@ -17,7 +17,7 @@ from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load, geometric_directions
 from toolpath_stiff.arrays import BoolArray, Columns, FloatArray, IntArray, product
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Extremes, gauge_of, reach
+from toolpath_stiff.machine.limits import Extremes, reach
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
@@ -213,7 +213,7 @@ class Evaluator:
         along, determinant, lengths, good = core.compliance_along_columns(
             machine, tip, direction, rotation, tool, "closed_form"
         )
-        extremes = Extremes(gauge_of(machine), tip, lengths, determinant, rotation, tool)
+        extremes = Extremes(machine, tip, lengths, determinant, rotation, tool)
         margin, law = extremes.margin, machine.strut_law.room_of(extremes.shortest, extremes.longest)
         doubtful = np.flatnonzero(~good & ~(margin < 0.0))  # ill-conditioned for the closed form: pivot
         if len(doubtful):

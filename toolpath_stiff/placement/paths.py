@@ -15,12 +15,12 @@ import numpy as np
 from toolpath_stiff.analysis.loads import Load, headline_rows
 from toolpath_stiff.arrays import BoolArray, Columns, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
 from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import Pose
 
-Read = Callable[[Pose], Program]  # the program as it is read where its zero sits there
+Read = Callable[[Pose], ReadProgram]  # the program as it is read where its zero sits there
 SHIFT = np.array([0.011, 0.017, 0.023, 0.0, 0.0, 0.0])  # m; tells the axes of a point that follow the work from others
 _Leg = tuple[
     int, FloatArray, FloatArray, BoolArray
@@ -116,7 +116,7 @@ class WorkPath(Columns):
 
 
 def work_path(
-    program: Program, step: float, load: Load | None = None, present: Pose | None = None, read: Read | None = None
+    program: ReadProgram, step: float, load: Load | None = None, present: Pose | None = None, read: Read | None = None
 ) -> WorkPath:
     """Sample a program in the set-up frame.
 
@@ -156,7 +156,7 @@ def work_path(
     return WorkPath(**columns, headline=headline, anchored=anchored)
 
 
-def _anchored(program: Program, present: FloatArray, read: Read | None) -> Anchored:
+def _anchored(program: ReadProgram, present: FloatArray, read: Read | None) -> Anchored:
     """The anchored rapids of a program, sampled.
 
     Where there are ends in machine coordinates the program is read for two other zeros: there no such move is without

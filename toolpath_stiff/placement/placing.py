@@ -16,7 +16,7 @@ from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
 from toolpath_stiff.placement.paths import work_path
@@ -141,7 +141,7 @@ def _placed(
     )
 
 
-def _analyzed(task: Task, program: Program, origin: Pose) -> tuple[Analysis | None, str]:
+def _analyzed(task: Task, program: ReadProgram, origin: Pose) -> tuple[Analysis | None, str]:
     """The program at a placement, or None and why."""
     try:
         return analyze(task.model, program, origin=origin, load=task.load, step=task.step, force=task.force), ""
@@ -150,7 +150,7 @@ def _analyzed(task: Task, program: Program, origin: Pose) -> tuple[Analysis | No
 
 
 def _rewritten(
-    task: Task, writing: Rewriting, program: Program, best: Analysis
+    task: Task, writing: Rewriting, program: ReadProgram, best: Analysis
 ) -> tuple[bytes | None, Written | Refused]:
     """The transformed program's bytes, and how it compares; or why there is none, and what chords would bring."""
 

@@ -14,7 +14,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
@@ -118,7 +118,7 @@ class Placement(FolderResult, SearchedFront):
     present_reason: str
     best: Analysis
     before: Analysis | None
-    program: Program
+    program: ReadProgram
     rewritten: bytes | None
     written: Written | Refused | None
     inputs: tuple[str, ...] = ()

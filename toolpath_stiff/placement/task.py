@@ -14,7 +14,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_text
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.writer import machine_toml
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.paths import Read
 from toolpath_stiff.placement.rows import PlacementRow
@@ -129,7 +129,7 @@ class Task:
     """
 
     model: StiffnessModel
-    program: Program
+    program: ReadProgram
     present: Pose
     read: Read
     bounds: Bounds

@@ -18,7 +18,8 @@ from toolpath_stiff.inference.prediction import JOINT_STEP, Predictor
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
+from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.model import StiffnessModel, load_path
 
 LAW_STEP = 1e-4  # of the strut law's logarithms, for differences
 LARGEST_STEP = 0.3  # of a size, for differences: a secant over the posterior's width where that is wide

@@ -16,8 +16,8 @@ from toolpath_stiff.inference.fits import Baseline, fit_effects, refine
 from toolpath_stiff.inference.hypotheses import score_family
 from toolpath_stiff.inference.judgement import NONE, Judgement
 from toolpath_stiff.planning.forecasts import Rival
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect
-from toolpath_stiff.stiffness.model import ActiveEffect
 
 LEAST_WEIGHT = 0.02  # probability below which an explanation is no rival
 

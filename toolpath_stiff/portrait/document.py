@@ -1,120 +1,70 @@
-"""A portrait as part of diagnose.json, in shop units."""
+"""A portrait as JSON: parts of diagnose.json, in shop units."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypedDict
+from collections.abc import Sequence
 
-import numpy as np
-
+from toolpath_stiff.documents import Document
 from toolpath_stiff.portrait.alike import Alike
-from toolpath_stiff.portrait.words import SizedTermEntry, _of_term, alike_text, portrait_text, term_words
+from toolpath_stiff.portrait.portrait import Portrait, Sized
+from toolpath_stiff.portrait.words import alike_text, portrait_text, term_words
+from toolpath_stiff.stiffness.terms import Term
 from toolpath_stiff.units import json_number
 
-if TYPE_CHECKING:
-    from toolpath_stiff.portrait.portrait import Portrait, Sized
+SHARES = ("explained", "error", "held_out_rms", "noise_floor", "smooth_rms")  # of a portrait
 
 
-class LinkEntry(TypedDict):
-    """A link of the load path and its probability."""
-
-    link: str
-    probability: float | None
-
-
-class VariableEntry(TypedDict):
-    """What the missing thing varies with, and its probability."""
-
-    variable: str
-    probability: float | None
-
-
-class TermEntry(SizedTermEntry):
-    """A term of a description; `interval` holds 95 %."""
-
-    interval: list[float | None]
-    rms_percent: float | None
-    words: str
-
-
-class AlikeEntry(TermEntry):
-    """Another leading term that fits as well."""
-
-    probability: float | None
-
-
-class SameTermEntry(SizedTermEntry):
-    """A term that fits as well as a named effect, with its share among those that do."""
-
-    share: float | None
-    words: str
-
-
-class SameEntry(TypedDict):
-    """The content of `looks_the_same`."""
-
-    text: str
-    links: list[LinkEntry]
-    variables: list[VariableEntry]
-    terms: list[SameTermEntry]
-
-
-class PortraitEntry(TypedDict):
-    """The content of `portrait`."""
-
-    text: str
-    links: list[LinkEntry]
-    variables: list[VariableEntry]
-    terms: list[TermEntry]
-    indistinguishable: list[AlikeEntry]
-    explained_percent: float | None
-    error_percent: float | None
-    held_out_rms_percent: float | None
-    noise_floor_percent: float | None
-    smooth_rms_percent: float | None
-    look_elsewhere: float | None
-
-
-def portrait_entry(portrait: Portrait) -> PortraitEntry:
+def portrait_entry(portrait: Portrait) -> Document:
     """A portrait as diagnose.json has it."""
     return {
         "text": portrait_text(portrait),
-        "links": [{"link": name, "probability": json_number(weight, 3)} for name, weight in portrait.links],
-        "variables": [{"variable": name, "probability": json_number(weight, 3)} for name, weight in portrait.variables],
-        "terms": [_term(one) for one in portrait.terms],
+        "links": _shares("link", portrait.links),
+        "variables": _shares("variable", portrait.variables),
+        "terms": [_sized(sized) for sized in portrait.terms],
         "indistinguishable": [
-            {**_term(one), "probability": json_number(one.probability or 0.0, 3)} for one in portrait.alike
+            {**_sized(sized), "probability": json_number(sized.probability or 0.0, 3)} for sized in portrait.alike
         ],
-        "explained_percent": json_number(100.0 * portrait.explained, 4),
-        "error_percent": json_number(100.0 * portrait.error, 4),
-        "held_out_rms_percent": json_number(100.0 * portrait.held_out_rms, 4),
-        "noise_floor_percent": json_number(100.0 * portrait.noise_floor, 4),
-        "smooth_rms_percent": json_number(100.0 * portrait.smooth_rms, 4),
+        **{f"{name}_percent": json_number(100.0 * getattr(portrait, name), 4) for name in SHARES},
         "look_elsewhere": json_number(portrait.look_elsewhere, 3),
     }
 
 
-def alike_entry(name: str, alike: Alike) -> SameEntry:
+def alike_entry(name: str, alike: Alike) -> Document:
     """What else would look the same as a named effect, as diagnose.json has it."""
     return {
         "text": alike_text(name, alike),
-        "links": [{"link": link, "probability": json_number(share, 3)} for link, share in alike.links],
-        "variables": [{"variable": one, "probability": json_number(share, 3)} for one, share in alike.variables],
+        "links": _shares("link", alike.links),
+        "variables": _shares("variable", alike.variables),
         "terms": [
-            {
-                **_of_term(term),
-                "share": json_number(share, 3),
-                "words": term_words(term),
-            }
-            for term, share in alike.terms
+            {**_term(term), "share": json_number(share, 3), "words": term_words(term)} for term, share in alike.terms
         ],
     }
 
 
-def _term(sized: Sized) -> TermEntry:
-    term = sized.term
+def _shares(key: str, shares: Sequence[tuple[str, float]]) -> list[Document]:
+    """Names with their probabilities."""
+    return [{key: name, "probability": json_number(share, 3)} for name, share in shares]
+
+
+def _sized(sized: Sized) -> Document:
+    """A term with its interval, and the change of stiffness that it makes."""
     return {
-        **_of_term(term),
-        "interval": [json_number(float(end)) for end in np.array(sized.interval) / term.si],
+        **_term(sized.term),
+        "interval": [json_number(end / sized.term.si) for end in sized.interval],
         "rms_percent": json_number(100.0 * sized.rms, 3),
-        "words": term_words(term),
+        "words": term_words(sized.term),
+    }
+
+
+def _term(term: Term) -> Document:
+    """A term of the dictionary with its size; `where` is a strut or a vertex, `second_variable` null without one."""
+    return {
+        "link": term.link,
+        "where": term.where,
+        "direction": term.direction,
+        "variable": term.variable,
+        "second_variable": None if term.times is None else term.times.variable,
+        "shape": term.shape,
+        "size": json_number(term.size / term.si),
+        "unit": term.unit,
     }

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.stiffness.contract import joined
 from toolpath_stiff.stiffness.terms import PINS, SWINGS, Term
-from toolpath_stiff.units import RAD_PER_DEG, json_number
+from toolpath_stiff.units import RAD_PER_DEG
 
 if TYPE_CHECKING:
     from toolpath_stiff.portrait.portrait import Portrait, Sized
@@ -213,29 +213,3 @@ def variable_label(term: Term) -> tuple[str, float]:
     """Of an axis: what a term varies with and its unit, and the SI value of that unit."""
     name, si, unit = SAID.get(term.variable, (term.variable, 1.0, ""))
     return (f"{name}, {unit}" if unit else name), si
-
-
-class SizedTermEntry(TypedDict):
-    """A term of the dictionary with its size; `where` is a strut or a vertex, `second_variable` null without one."""
-
-    link: str
-    where: int | None
-    direction: str
-    variable: str
-    second_variable: str | None
-    shape: str
-    size: float | None
-    unit: str
-
-
-def _of_term(term: Term) -> SizedTermEntry:
-    return {
-        "link": term.link,
-        "where": term.where,
-        "direction": term.direction,
-        "variable": term.variable,
-        "second_variable": None if term.times is None else term.times.variable,
-        "shape": term.shape,
-        "size": json_number(term.size / term.si),
-        "unit": term.unit,
-    }

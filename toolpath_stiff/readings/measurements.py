@@ -25,9 +25,10 @@ from toolpath_stiff.readings.measured_poses import pose_warnings
 from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import loop_compliance
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
+from toolpath_stiff.stiffness.model import StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent
-from toolpath_stiff.report.explanations import AS_GIVEN, best_explanation, figure_of, name_text, percent
+from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, deviation_percent
 from toolpath_stiff.report.figure import (
     BLUE,
     GREEN,
@@ -23,7 +22,7 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain, shortened
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
@@ -56,56 +55,44 @@ MAP = 2.05  # inch
 
 @drawn
 def before_after_png(
-    document: Mapping[str, Any],
     data: Measurements,
     before: FloatArray,
-    after: FloatArray | None,
-    *,
-    names: tuple[str, str] | None = None,
+    after: FloatArray,
+    last: str,
+    held_out_percent: float | None = None,
+    refitted_percent: float | None = None,
 ) -> Figure:
     """PNG: where model and measurements differ, seen from above, before and after, and measured against modelled.
 
     Parameters
     ----------
-    document
-        Content of diagnose.json, or anything with `baseline` and the error at left-out points.
     data
         n readings.
     before, after
-        (n,) ln(measured / modelled), of the machine file as given and of the last model. Without `after` only the
-        first half is drawn.
-    names
-        What the two models are called; else taken from the document.
+        (n,) ln(measured / modelled), of the machine file as given and of the last model.
+    last, held_out_percent
+        What the last model is called; its error at left-out points.
+    refitted_percent
+        Error of the refitted strut law alone, where that is not the last model.
     """
-    halves = [np.asarray(before, dtype=float)]
-    if after is not None:
-        halves.append(np.asarray(after, dtype=float))
-    base = document.get("baseline") or {}
-    known: tuple[Mapping[str, Any], Mapping[str, Any]] = ({}, last_model(document))
-    word = "best of the catalogue:" if document.get("verdict") == "unexplained" else "with"
-    last = LAW_REFITTED if known[1] is base else f"{word} {name_text(known[1])}"
-    called = names or (AS_GIVEN, last)
+    halves = [np.asarray(before, dtype=float), np.asarray(after, dtype=float)]
     directions, levels = _directions(data), _levels(data)
     columns, rows = [d for d in DIRECTION_COLOURS if (directions == d).any()], np.unique(levels)
     limit = _limit(halves)
     block = MAP * len(columns) + 0.3
-    alone = len(halves) == 1
-    width = 14.0 if alone else max(1.1 + len(halves) * block + 0.9, 11.0)
-    height = max(1.35 + MAP * len(rows) + 0.4, 5.4) if alone else 1.35 + MAP * len(rows) + 0.4 + 4.0
-    question = "Did the error fall, and what remains?" if len(halves) > 1 else "Where does the model fail?"
+    width, height = max(1.1 + len(halves) * block + 0.9, 11.0), 1.35 + MAP * len(rows) + 0.4 + 4.0
     wide = f"{2.4 * _reach(data):.0f} mm wide"
-    refitted = figure_of(base, "mean_abs_error_percent")
-    step = f"{LAW_REFITTED} alone: {percent(refitted, 2)}; " if refitted is not None and known[1] is not base else ""
+    step = f"{LAW_REFITTED} alone: {percent(refitted_percent, 2)}; " if refitted_percent is not None else ""
     note = (
         f"{step}{DEVIATION}, {MINUS_IS_SOFTER}; maps from above, X to the right, {wide}; a point: mean of its readings"
     )
     with house_style():
         figure = new_figure(width, height)
-        figure.text(0.25 / width, 1.0 - 0.4 / height, question, size=14, weight="bold")
+        figure.text(0.25 / width, 1.0 - 0.4 / height, "Did the error fall, and what remains?", size=14, weight="bold")
         figure.text(0.25 / width, 1.0 - 0.66 / height, note, size=9.5, color=MUTED)
         for half, residual in enumerate(halves):
             left = 0.95 + half * block
-            title = _half_title(called[half], known[half], residual)
+            title = _half_title((AS_GIVEN, last)[half], held_out_percent if half else None, residual)
             figure.text(left / width, 1.0 - 1.0 / height, title, size=10.5, weight="bold")
             points = _half(figure, data, residual, left, limit)
         bar = figure.add_axes(
@@ -114,9 +101,7 @@ def before_after_png(
         )  # fmt: skip
         figure.colorbar(points, cax=bar, extend="both").set_label(f"{DEVIATION}, %", size=9)
         bar.grid(visible=False)
-        beside = 0.95 + block + 1.85
-        places = [(beside, 0.55, width - beside - 0.3, height - 1.85)] if alone else _below(width, len(halves))
-        _scatter_pair(figure, data, halves, directions, places)
+        _scatter_pair(figure, data, halves, directions)
         return figure
 
 
@@ -140,17 +125,10 @@ def _half(figure: Figure, data: Measurements, residual: FloatArray, left: float,
     return points
 
 
-def last_model(document: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The best explanation; the refitted strut law where none is needed or none was offered."""
-    base: Mapping[str, Any] = document.get("baseline") or {}
-    return base if document.get("verdict") == "adequate" else best_explanation(document) or base
-
-
-def _half_title(name: str, entry: Mapping[str, Any], residual: FloatArray) -> str:
+def _half_title(name: str, held_out: float | None, residual: FloatArray) -> str:
     """Name and errors: the mean as the paper counts it, and at left-out points where it is known."""
     relative = np.expm1(-residual[np.isfinite(residual)])
     text = f"{shortened(plain(name), 44)}   mean error {100 * float(np.mean(np.abs(relative))):.2f} %"
-    held_out = figure_of(entry, "held_out_error_percent")
     return text + (f" (at points left out {percent(held_out, 2)})" if held_out is not None else "")
 
 
@@ -225,29 +203,23 @@ def _spread(places: FloatArray, step: float) -> FloatArray:
     return out
 
 
-def _below(width: float, count: int) -> list[tuple[float, float, float, float]]:
-    """Diagrams beside each other below the maps, inches."""
-    step = (width - 1.6) / count
-    return [(0.95 + half * step, 0.55, step - 0.75, 3.2) for half in range(count)]
-
-
 def _scatter_pair(
     figure: Figure,
     data: Measurements,
     halves: Sequence[FloatArray],
     directions: NDArray[np.str_],
-    places: Sequence[tuple[float, float, float, float]],
 ) -> None:
-    """Measured against modelled, both on the same scales; `places` (x, y, width, height) in inches."""
+    """Measured against modelled, both on the same scales, beside each other below the maps."""
     width, height = figure.get_size_inches()
+    across = (width - 1.6) / len(halves)  # inches
     measured = n_per_mm_from_n_per_m(data.stiffness)
     modelled = [measured * np.exp(-residual) for residual in halves]
     values = np.concatenate([measured, *modelled])
     values = values[np.isfinite(values)]
     low, high = 0.93 * float(values.min()), 1.07 * float(values.max())
     for half, stiffness in enumerate(modelled):
-        x, y, wide, tall = places[half]
-        axes = figure.add_axes((x / width, y / height, wide / width, tall / height))
+        left = 0.95 + half * across
+        axes = figure.add_axes((left / width, 0.55 / height, (across - 0.75) / width, 3.2 / height))
         line = np.array([low, high])
         axes.fill_between(line, line * (1.0 - BAND), line * (1.0 + BAND), color=WITHIN, lw=0, zorder=1)
         axes.plot(line, line, color=MUTED, lw=1.0, zorder=2)

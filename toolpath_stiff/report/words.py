@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Mapping
 from typing import Any
@@ -63,6 +64,24 @@ def length_in_moves(plunges: Mapping[str, Any]) -> str:
 def only_plunges(figures: Mapping[str, Any]) -> bool:
     """Whether the figures of a program, a tool or an operation are those of plunges, for it does nothing else."""
     return bool(figures.get("headline") == PLUNGES_ONLY)
+
+
+def significant(value: float | None, digits: int = 3) -> str:
+    """Three significant digits, in thousands as usual, with an exponent where there would be rows of zeros."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if -4 < size < 5:
+        return f"{float(f'{value:.{digits - 1}e}'):.{max(digits - 1 - size, 0)}f}"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def percent(value: float | None, digits: int = 1) -> str:
+    """A figure that is in per cent already."""
+    return "-" if value is None else f"{value:.{digits}f} %"
 
 
 def duration(seconds: float) -> str:

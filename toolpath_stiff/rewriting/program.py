@@ -26,7 +26,7 @@ from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, Offsets, ToolEntry
@@ -101,7 +101,7 @@ class RewrittenProgram(Result):
 
 
 def rewrite_program(
-    program: Program,
+    program: ReadProgram,
     placement_origin: Pose,
     original_origin: Pose,
     *,
@@ -162,7 +162,7 @@ def _state(name: str, origin: ShopPose, offsets: Offsets | None, tools: dict[int
     return State(name, Frames(copy.deepcopy(offsets or Offsets()), origin, origin), copy.deepcopy(tools))
 
 
-def _check_plain(program: Program) -> None:
+def _check_plain(program: ReadProgram) -> None:
     if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
         raise ProgramError(
             "a program is rewritten by the words of the built-in interpreter in the dialects "
@@ -172,7 +172,7 @@ def _check_plain(program: Program) -> None:
         )
 
 
-def check_rewritable(program: Program) -> None:
+def check_rewritable(program: ReadProgram) -> None:
     """Raise `InputError` for a file that is not a program of a control, or is one of another machine's."""
     if program.kinematics:
         raise ProgramError(
@@ -256,7 +256,7 @@ def _refuse_left_out(words: bool, number: int, name: str) -> None:
         )
 
 
-def _text_of(program: Program) -> tuple[str, str]:
+def _text_of(program: ReadProgram) -> tuple[str, str]:
     """The program's text with its line ends, and its encoding."""
     if not program.path:
         return "\n".join([*program.source, ""]), "utf-8"
@@ -289,7 +289,7 @@ class OffsetBlocks:
     fanuc_reason: str = ""
 
 
-def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> OffsetBlocks:
+def offset_blocks(program: ReadProgram, placement: Pose, *, decimals: int = 4) -> OffsetBlocks:
     r"""Offset blocks that put a program at a placement.
 
     Parameters
@@ -333,7 +333,7 @@ def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> Of
     return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}\nG17 G54 G68 X0 Y0 R{turn}")
 
 
-def _not_here(program: Program) -> str:
+def _not_here(program: ReadProgram) -> str:
     """Why the program has no G54 of this machine's control, or ""."""
     if program.dialect == CUTTER_LOCATION:
         return NOT_POSTED
@@ -345,7 +345,7 @@ def _not_here(program: Program) -> str:
     )
 
 
-def _not_about_z(program: Program, placement: Pose) -> str:
+def _not_about_z(program: ReadProgram, placement: Pose) -> str:
     """Why a turn of X and Y cannot express the placement, or ""."""
     if max(abs(placement[3]), abs(placement[4])) > VERTICAL:
         return f"the set-up is tilted, and work offsets turn X and Y alone: {USE_WRITE}"
@@ -357,7 +357,7 @@ def _not_about_z(program: Program, placement: Pose) -> str:
     return ""
 
 
-def _not_g54_alone(program: Program) -> str:
+def _not_g54_alone(program: ReadProgram) -> str:
     """Why setting G54 would not move the whole program, or ""."""
     for number, text in enumerate(program.source, 1):
         if not MAY_BE_OFFSET.search("".join(COMMENTS.sub("", text).split())):
@@ -370,7 +370,7 @@ def _not_g54_alone(program: Program) -> str:
     return ""
 
 
-def _codes(text: str, number: int, program: Program) -> list[str]:
+def _codes(text: str, number: int, program: ReadProgram) -> list[str]:
     """G codes of a line, and its other words; what LinuxCNC's interpreter read holds words that ours does not know."""
     try:
         words = read_block(text, number, program.name).words

@@ -20,7 +20,8 @@ from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.results import Result
 from toolpath_stiff.stiffness import effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect
-from toolpath_stiff.stiffness.guard import check_declarations, line_in, line_of
+from toolpath_stiff.stiffness.declarations import check_declarations
+from toolpath_stiff.stiffness.effect_source import line_in, line_of
 from toolpath_stiff.stiffness.term_file import effects_of_terms
 
 ENTRY_POINTS = "toolpath_stiff.effects"

@@ -28,8 +28,11 @@ if TYPE_CHECKING:
     from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
 
 
+Values = Mapping[str, Any]  # name of a parameter -> SI value, or what is chosen: a number, a name
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
 
+
+HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading")
 
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
@@ -247,7 +250,7 @@ class Effect:
     described_from: tuple[str, ...] = ()
     file: str = ""  # that declares it without code
 
-    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """(n, 6) m/N in series with each strut. `p`: parameter name -> SI value.
 
         Examples
@@ -261,7 +264,7 @@ class Effect:
         """
         return None
 
-    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """(n, 12, 12) symmetric Q; twice the stored energy is [f; w]^T Q [f; w].
 
         f (6) are the strut forces with J^T f = w, w (6) the force and the moment about the tip, base axes. The
@@ -277,7 +280,7 @@ class Effect:
         """
         return None
 
-    def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def parallel_stiffness(self, path: LoadPath, p: Values) -> FloatArray | None:
         """(n, 6, 6) between platform and base about the tip, parallel to the struts, base axes.
 
         Examples
@@ -290,7 +293,7 @@ class Effect:
         """
         return None
 
-    def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
+    def geometry(self, machine: Machine, p: Values) -> Machine:
         """The machine with this effect's geometry.
 
         Examples
@@ -303,7 +306,7 @@ class Effect:
         """
         return machine
 
-    def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
+    def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
         """What the instrument reads, (n,) N/m, for a true stiffness (n,) N/m.
 
         Examples
@@ -333,9 +336,7 @@ class Effect:
             return 0.0
         return 0.5 if loop.kind == "joint" and loop.where else 1.0
 
-    def vertex_displacement(
-        self, path: LoadPath, p: Mapping[str, float], forces: FloatArray, vertex: int
-    ) -> FloatArray | None:
+    def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:
         """(n, 3) m, base axes: how far a vertex of the frame (1 to 3) moves under strut forces (n, 6) N.
 
         Of effects with `link = "frame"`: energy alone does not say which way a vertex moves. Without it an indicator
@@ -353,7 +354,7 @@ class Effect:
         """
         return None
 
-    def conditions(self, p: Mapping[str, Any]) -> tuple[str, ...]:
+    def conditions(self, p: Values) -> tuple[str, ...]:
         """Which of `CONDITIONS` it waits for with these values: those of `needs`, and those that a value names.
 
         None for a geometry: a machine has one, whatever the conditions.
@@ -373,11 +374,11 @@ class Effect:
         named = (q.name for q in self.parameters if q.kind == "text" and p.get(q.name))
         return tuple(dict.fromkeys(name for name in (*self.needs, *named) if name in CONDITIONS))
 
-    def acts_on(self, path: LoadPath, p: Mapping[str, Any]) -> bool:
+    def acts_on(self, path: LoadPath, p: Values) -> bool:
         """Whether these poses come with every condition that it waits for."""
         return all(getattr(path, CONDITIONS[name]) is not None for name in self.conditions(p))
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """What a fit has found, as an engineer says it: a clause with its size and unit, the cause first.
 
         `p`: parameter name -> value in the units of files, choices as they are.
@@ -387,6 +388,18 @@ class Effect:
             value = p[one.name] if one.discrete else f"{float(f'{p[one.name]:.3g}'):g} {one.unit}".rstrip()
             sizes.append(f"{one.name.replace('_', ' ')} {value}")
         return f"{self.title}, {', '.join(sizes)}"
+
+    @property
+    def hooks(self) -> list[str]:
+        """Which of `HOOKS` it implements.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.effects()["weak_strut"].hooks
+        ['strut_compliance']
+        """
+        return [hook for hook in HOOKS if getattr(type(self), hook) is not getattr(Effect, hook)]
 
     @property
     def is_instrument(self) -> bool:

@@ -23,9 +23,11 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness import closed_form, exact, guard
-from toolpath_stiff.stiffness.contract import Effect, LoadPath
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, acting_effects, load_path
+from toolpath_stiff.stiffness import closed_form, exact
+from toolpath_stiff.stiffness.active import ADDING
+from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
+from toolpath_stiff.stiffness.possible import is_compliance
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
 CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2 ms a call is not earned back
@@ -117,13 +119,13 @@ def _fast(
 ) -> FloatArray:
     """Closed form or compiled loops for one tool length; doubtful poses go to the exact route."""
     kernel = closed_form.prepare(model.machine, tool_length)
-    if route == "compiled" and kernel.table is None:
+    if route == "compiled" and not kernel.law.shape:
         from toolpath_stiff.stiffness import compiled
 
         compliance, good = compiled.tip_compliance(kernel, position, rotation)
     else:
         compliance, good = closed_form.tip_compliance(kernel, position, rotation)
-    good &= guard.is_compliance(compliance)  # what is none goes the exact route, which says what is wrong
+    good &= is_compliance(compliance)  # what is none goes the exact route, which says what is wrong
     if not good.all():
         bad = ~good
         turn = None if rotation is None else rotation[bad]
@@ -145,7 +147,7 @@ def compliance_along_columns(
     one of the fast routes. Where a pose is not good the exact route must be asked.
     """
     kernel = closed_form.prepare(machine, tool_length)
-    if route == "compiled" and kernel.table is None:
+    if route == "compiled" and not kernel.law.shape:
         from toolpath_stiff.stiffness import compiled
 
         return compiled.compliance_along_columns(kernel, position, direction, rotation)
@@ -172,12 +174,9 @@ def compliance_with_effects(
     kernel, n = closed_form.prepare(model.machine, tool_length), position.shape[1]
     sure = np.ones(n, dtype=bool)
     if model.control is not None:
-        order = list(kernel.order)
-        platform = np.ascontiguousarray(model.control.platform_joints_for(tool_length)[order].T)
-        frame = np.ascontiguousarray(model.control.frame_joints[order].T)
-        control = replace(kernel, frame=frame, platform=platform)
+        control = kernel.on_joints_of(model.control, tool_length)
         position, rotation, sure = closed_form.followed_columns(kernel, control, position, rotation)
-    if not any(map(_gives_way, acting_effects(model))):
+    if not any(hook in ADDING for active in acting_effects(model) for hook in active.effect.hooks):
         found, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
         found[~(sure & good)] = np.nan
         return found
@@ -201,13 +200,6 @@ def compliance_with_effects(
         path = path if len(some) == len(forces) else path.take(some)
         found[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
     return found
-
-
-def _gives_way(active: ActiveEffect) -> bool:
-    """Whether an effect does more than change the geometry."""
-    kind = type(active.effect)
-    hooks = ("strut_compliance", "load_compliance", "parallel_stiffness")
-    return any(getattr(kind, hook) is not getattr(Effect, hook) for hook in hooks)
 
 
 def _exact(

@@ -24,9 +24,9 @@ from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Machine, with_parameter
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
-from toolpath_stiff.stiffness import guard
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
-from toolpath_stiff.stiffness.contract import SETUP, Conditions, Effect, LoadPath, read_parameters
+from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath, read_parameters
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.units import mm_from_m
 
@@ -38,36 +38,6 @@ WORDS = {
     "time_min": ("the time since an indicator was zeroed, which no program has", ""),
     "direction": ("the direction of a reading, which no program has", ""),
 }
-
-
-@dataclass(frozen=True)
-class ActiveEffect:
-    """An effect with its parameters, name -> SI value."""
-
-    effect: Effect
-    values: Mapping[str, float]
-
-    def adds(self, hook: str, path: LoadPath) -> FloatArray | None:
-        """What `strut_compliance`, `load_compliance` or `parallel_stiffness` returns; None where it does not act.
-
-        Raises `EffectFault`.
-        """
-        if not self.effect.acts_on(path, self.values):
-            return None
-        return guard.added(self.effect, hook, path, self.values)
-
-    def geometry(self, machine: Machine) -> Machine:
-        """The machine with the effect's geometry. Raises `EffectFault`."""
-        return guard.changed_geometry(self.effect, machine, self.values)
-
-    def reading(self, stiffness: FloatArray, path: LoadPath) -> FloatArray:
-        """What an instrument shows, (n,) N/m, for a true stiffness; the same where it does not act.
-
-        Raises `EffectFault`.
-        """
-        if not self.effect.acts_on(path, self.values):
-            return stiffness
-        return guard.read_off(self.effect, stiffness, path, self.values)
 
 
 @dataclass(frozen=True)
@@ -113,7 +83,7 @@ class StiffnessModel:
         """Stiffness of the platform bars in N/m, inf if rigid; only meaningful if `is_plain`."""
         for active in self.effects:
             if isinstance(active.effect, PlatformFlexibility):
-                return active.values["bar_stiffness"]
+                return float(active.values["bar_stiffness"])
         return float(np.inf)
 
     @property
@@ -153,6 +123,7 @@ def build_model(
     >>> import numpy as np
     >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.stiffness import core
+    >>> from toolpath_stiff.stiffness.active import ActiveEffect
     >>> from toolpath_stiff.stiffness.catalogue import find_effect
     >>> machine = load_machine("nist")
     >>> weak = ActiveEffect(find_effect("weak_strut"), {"strut": 1, "factor": 0.7})

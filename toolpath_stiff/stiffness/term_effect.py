@@ -11,7 +11,7 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
 from toolpath_stiff.stiffness.term_loads import carriers, coupled, pair_stiffness, reading_share, strut_share
-from toolpath_stiff.stiffness.terms import AXES, IN_SERIES, OF_FORCES, UNITS, Term, formula, shaped
+from toolpath_stiff.stiffness.terms import ACTIONS, AXES, IN_SERIES, OF_FORCES, Term, formula, shaped
 
 ASSUMED = "described from readings; usual sizes are engineering experience, no source"
 
@@ -30,6 +30,12 @@ NEEDS = {
 }
 
 CATALOGUE_LINKS = {"one strut": "struts"}
+
+
+def size_parameter(action: str, size: str, meaning: str) -> Parameter:
+    """The parameter that a term's size is, with bounds and usual sizes of its action."""
+    unit, si, bounds, typical, _ = ACTIONS[action]
+    return Parameter(size, unit, si, bounds, typical, ASSUMED, meaning=meaning)
 
 
 class TermEffect(Effect):
@@ -58,7 +64,7 @@ class TermEffect(Effect):
             name, dict(terms), source, described_from, file,
         )  # fmt: skip
         self.parameters = tuple(parameters) or tuple(
-            Parameter(size, *UNITS[term.action], ASSUMED, meaning=f"size of {term.key}") for size, term in terms.items()
+            size_parameter(term.action, size, f"size of {term.key}") for size, term in terms.items()
         )
         self.title = "; ".join(parameter.meaning for parameter in self.parameters)
         first, *_ = terms.values()

@@ -6,12 +6,13 @@ The terms of a file are one effect; those of the geometry and those of readings 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.contract import Effect, Parameter
-from toolpath_stiff.stiffness.guard import NAME, wrong_in
-from toolpath_stiff.stiffness.term_effect import ASSUMED, TermEffect, kind_of
+from toolpath_stiff.stiffness.declarations import NAME, wrong_in
+from toolpath_stiff.stiffness.term_effect import ASSUMED, TermEffect, kind_of, size_parameter
 from toolpath_stiff.stiffness.terms import (
     ALONG,
     AXES,
@@ -21,9 +22,9 @@ from toolpath_stiff.stiffness.terms import (
     OF_FORCES,
     PAIR,
     PLACE,
+    SEEN,
+    SHAPES,
     SWINGS,
-    UNITS,
-    VARIABLES,
     Constants,
     Factor,
     Term,
@@ -57,7 +58,7 @@ def constant_key(name: str, variable: str) -> tuple[str, float]:
 
 def entry_of(term: Term, size: str, meaning: str) -> dict[str, Any]:
     """A term as an entry of a file, in the order of its keys."""
-    parameter = Parameter(size, *UNITS[term.action], ASSUMED, meaning=meaning)
+    parameter = size_parameter(term.action, size, meaning)
     bounds, typical = _range_keys(parameter)
     entry = {"name": "term", "size": size, "meaning": meaning, "link": term.link, "action": term.action}
     more = {} if term.where is None else {"where": term.where}
@@ -131,13 +132,11 @@ def _entry(toml: TomlReader, where: str, row: Mapping[str, Any]) -> tuple[Term, 
 
 def _parameter(toml: TomlReader, where: str, row: Mapping[str, Any], action: str) -> Parameter:
     """The size, with what it may be."""
-    unit, si, bounds, typical = UNITS[action]
-    size = _text(toml, f"{where}.size", row.get("size"))
-    meaning = _text(toml, f"{where}.meaning", row.get("meaning"))
-    keys = _range_keys(Parameter(size, unit, si, bounds, typical, ASSUMED))
-    given = (row.get(key, usual) for key, usual in zip(keys, (bounds, typical), strict=True))
-    bounds, typical = (tuple(pair) if isinstance(pair, list) else pair for pair in given)
-    parameter = Parameter(size, unit, si, bounds, typical, ASSUMED, meaning=meaning)
+    size, meaning = (_text(toml, f"{where}.{key}", row.get(key)) for key in ("size", "meaning"))
+    usual = size_parameter(action, size, meaning)
+    pairs = (row.get(key, pair) for key, pair in zip(_range_keys(usual), (usual.bounds, usual.typical), strict=True))
+    bounds, typical = (tuple(pair) if isinstance(pair, list) else pair for pair in pairs)
+    parameter = replace(usual, bounds=bounds, typical=typical)
     if wrong := wrong_in(parameter):
         raise toml.error(f"size {size}: {wrong[0]}", wrong[1], where=where)
     return parameter
@@ -148,9 +147,9 @@ def _shape(
 ) -> tuple[str, str, Constants, str]:
     """Variable, shape, constants and column of an action; "" for a second variable, which is one `of` the first's."""
     by_strut = () if of in (*IN_SERIES, "turning") else (*OF_FORCES, "strut length")
-    seen = [name for name in VARIABLES if name not in ("order", *by_strut)]
+    seen = [name for name in SEEN if name not in by_strut]
     variable = toml.choice(f"{where}.varies_with", row.get("varies_with"), seen, f"one of {', '.join(seen)}")
-    shapes = SHAPES_OF.get(variable, (*FORMULAS,)[1:-1])
+    shapes = SHAPES_OF.get(variable, SHAPES[1:-1])
     shape = toml.choice(f"{where}.shape", row.get("shape"), shapes, f"one of {', '.join(shapes)}")
     column = row.get("of", "")
     columns = [name for name in COLUMNS.get(action, COLUMNS.get(variable, ("",))) if not by_strut or name not in SWINGS]
@@ -160,7 +159,9 @@ def _shape(
         toml.choice(f"{where}.of", column, columns, f"one of {', '.join(map(repr, columns))}")
     constants = toml.table(f"{where}.constants", row.get("constants", {}), "a table of numbers")
     pair = PAIR if action == "coupling" else ()
-    known = [{constant_key(name, variable)[0]: name for name in (*names, *pair)} for names in FORMULAS[shape]]
+    known = [
+        {constant_key(name, variable)[0]: name for name in (*names, *pair)} for kind, names in FORMULAS if kind == shape
+    ]
     names = next((keys for keys in known if keys.keys() == constants.keys()), None)
     if names is None:
         ways = " or ".join(", ".join(keys) or "none" for keys in known)

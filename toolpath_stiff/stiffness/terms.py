@@ -12,9 +12,9 @@ where the link can only give; a strut's stiffness may change to both sides, with
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,18 +23,26 @@ from toolpath_stiff.machine.kinematics import joint_angles
 from toolpath_stiff.stiffness.contract import LoadPath
 
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
+AXES = {"X": 0, "Y": 1, "Z": 2}
+SWINGS = ("frame joint", "platform joint")
+IDLE = 1e-3  # N in a strut: below, a power of the force would diverge, and the strut adds nothing that shows
+
+Action = str
+Constants = tuple[tuple[str, float], ...]
+Pair = tuple[float, float]
 
 
-VARIABLES = (
-    "constant", "x", "y", "z", "radius", "tilt", "strut length", "strut force", "force sign", "load", "time", "order",
-    "setup", "temperature", "direction",
-)  # fmt: skip
+class Acting(NamedTuple):
+    """How large a term of an action is: unit, its SI value, bounds and usual sizes in it; what it adds of a size.
 
+    Sizes are assumed: what a machine that still mills can have. In the equation {} is the size, s its share, h a load.
+    """
 
-SHAPES = ("offset", "slope", "square", "bump", "threshold", "periodic", "sign")
-
-
-DIRECTIONS = ("X", "Y", "Z", "horizontal", "radial", "axial", "along the struts", "tangential", "all", "reading")
+    unit: str
+    si: float
+    bounds: Pair
+    typical: Pair
+    equation: str
 
 
 # How a term acts:
@@ -51,28 +59,30 @@ DIRECTIONS = ("X", "Y", "Z", "horizontal", "radial", "axial", "along the struts"
 #   joint offset    a joint stands off its place, and the control does not know; m
 #   reading factor  the deflection is read too large by a share
 #   reading shift   the deflection is read too large by a displacement; m
-Action = Literal[
-    "give", "rocking", "tilting", "vertex", "strut", "frame pin", "platform pin", "turning", "strut factor", "coupling",
-    "joint offset", "reading factor", "reading shift",
-]  # fmt: skip
-
-
-# Action -> unit, its SI value, bounds and usual sizes in that unit; assumed: what a machine that still mills can have.
-UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = {
-    "give": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
-    "rocking": ("nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0)),
-    "tilting": ("nrad/N/m", 1e-9, (0.0, 5000.0), (1.0, 300.0)),
-    "vertex": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
-    "strut": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
-    "frame pin": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
-    "platform pin": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
-    "turning": ("kN m/rad", 1e3, (0.0, 5000.0), (5.0, 550.0)),
-    "strut factor": ("%", 0.01, (-50.0, 400.0), (-20.0, 40.0)),
-    "coupling": ("%", 0.01, (-50.0, 50.0), (-20.0, 20.0)),
-    "joint offset": ("mm", 1e-3, (-30.0, 30.0), (-3.0, 3.0)),
-    "reading factor": ("%", 0.01, (-50.0, 100.0), (-10.0, 10.0)),
-    "reading shift": ("um", 1e-6, (-200.0, 200.0), (-10.0, 10.0)),
-}
+FEW_NM_PER_N = ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0))
+ACTIONS: dict[Action, Acting] = {
+    "give": Acting(*FEW_NM_PER_N, "c += {} s h^2, h = tip force"),
+    "rocking": Acting(
+        "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), "c += {} s h^2, h = moment of the tip force about the origin"
+    ),
+    "tilting": Acting(
+        "nrad/N/m", 1e-9, (0.0, 5000.0), (1.0, 300.0),
+        "c += {} s h^2, h = moment of the tip force about the platform's middle",
+    ),
+    "vertex": Acting(*FEW_NM_PER_N, "c += {} s h^2, h = force in the vertex"),
+    "strut": Acting(*FEW_NM_PER_N, "c_i += {} s"),
+    "frame pin": Acting(*FEW_NM_PER_N, "c_i += {} s (u_i . pin)^2"),
+    "platform pin": Acting(*FEW_NM_PER_N, "c_i += {} s (u_i . pin)^2"),
+    "turning": Acting("kN m/rad", 1e3, (0.0, 5000.0), (5.0, 550.0), "K += sum over i of {} s B_i^T B_i"),
+    "strut factor": Acting("%", 0.01, (-50.0, 400.0), (-20.0, 40.0), "c_i += {} s / k_i"),
+    "coupling": Acting("%", 0.01, (-50.0, 50.0), (-20.0, 20.0), "c_ij += {} s / sqrt(k_i k_j)"),
+    "joint offset": Acting("mm", 1e-3, (-30.0, 30.0), (-3.0, 3.0), "joint += {}"),
+    "reading factor": Acting("%", 0.01, (-50.0, 100.0), (-10.0, 10.0), "k_read = k / (1 + {} s)"),
+    "reading shift": Acting("um", 1e-6, (-200.0, 200.0), (-10.0, 10.0), "F / k_read = F / k + {} s"),
+}  # fmt: skip
+PINS = ("frame pin", "platform pin")
+IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of each strut by itself
+PAIR = ("first", "second")  # constants of a coupling
 
 
 # (action, link) -> directions along which it may act there.
@@ -94,64 +104,71 @@ ALONG: dict[tuple[str, str], tuple[str, ...]] = {
 }
 
 
-# Action -> what it adds of a size, its share s of it, and h, the load of the link.
-EQUATIONS = {
-    "give": "c += {} s h^2, h = tip force",
-    "rocking": "c += {} s h^2, h = moment of the tip force about the origin",
-    "tilting": "c += {} s h^2, h = moment of the tip force about the platform's middle",
-    "vertex": "c += {} s h^2, h = force in the vertex",
-    "strut": "c_i += {} s",
-    "frame pin": "c_i += {} s (u_i . pin)^2",
-    "platform pin": "c_i += {} s (u_i . pin)^2",
-    "turning": "K += sum over i of {} s B_i^T B_i",
-    "strut factor": "c_i += {} s / k_i",
-    "coupling": "c_ij += {} s / sqrt(k_i k_j)",
-    "joint offset": "joint += {}",
-    "reading factor": "k_read = k / (1 + {} s)",
-    "reading shift": "F / k_read = F / k + {} s",
+def _tilt(path: LoadPath, column: str) -> FloatArray:
+    axis = path.rotation[:, :, 2]
+    if column in SWINGS:
+        return joint_angles(path.machine, path.struts, path.rotation)[SWINGS.index(column)]
+    if column:
+        return np.asarray(np.arcsin(np.clip(axis[:, AXES[column]], -1.0, 1.0)))
+    return np.asarray(np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2]))
+
+
+# Variable -> its values at n poses, SI: (n,), or (n, 6) of each strut; of the strut forces under the load.
+SEEN: dict[str, Callable[[LoadPath, str], FloatArray | None]] = {
+    "constant": lambda path, column: np.ones(len(path)),
+    "x": lambda path, column: path.position[:, 0],
+    "y": lambda path, column: path.position[:, 1],
+    "z": lambda path, column: path.position[:, 2],
+    "radius": lambda path, column: np.hypot(path.position[:, 0], path.position[:, 1]),
+    "tilt": _tilt,
+    "strut length": lambda path, column: path.struts.lengths,
+    "strut force": lambda path, column: None if path.strut_forces is None else np.abs(path.strut_forces),
+    "force sign": lambda path, column: None if path.strut_forces is None else np.sign(path.strut_forces),
+    "load": lambda path, column: path.force,
+    "time": lambda path, column: path.time,
+    "setup": lambda path, column: None if path.setup is None else (path.setup == column).astype(float),
+    "temperature": lambda path, column: path.temperature,
+    "direction": lambda path, column: np.ones(len(path)),
 }
-
-
-# Shape -> names of its constants -> s of the variable v.
-FORMULAS: dict[str, dict[tuple[str, ...], str]] = {
-    "offset": {(): "v"},
-    "slope": {
-        ("start", "end"): "(v - start) / (end - start)",
-        ("power", "reference"): "(v / reference)^power",
-    },
-    "square": {("centre", "reach"): "((v - centre) / reach)^2"},
-    "bump": {("centre", "width"): "exp(-((v - centre) / width)^2 / 2)"},
-    "threshold": {
-        ("edge", "side"): "(1 where side (v - edge) > 0, else 0)",
-        ("from", "end"): "max(0, (v - from) / (end - from))",
-        ("beyond",): "max(0, 1 - beyond / v)",
-        ("within",): "min(1, within / v)",
-    },
-    "periodic": {("period", "crest"): "(1 + cos(2 pi (v - crest) / period)) / 2"},
-    "sign": {("side",): "(1 where side v > 0, else 0)"},
-}
-
-
+VARIABLES = (*SEEN, "order")  # of the readings, which no effect sees
 PLACE = ("x", "y", "z", "radius")
-PINS: tuple[Action, ...] = ("frame pin", "platform pin")
+OF_FORCES = ("strut force", "force sign")
 
 
-IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of each strut by itself
+def _growing(v: FloatArray, power: FloatArray, reference: FloatArray) -> FloatArray:
+    return np.asarray((np.maximum(v, IDLE) / reference) ** power)
 
 
-SWINGS = ("frame joint", "platform joint")
-
-
-PAIR = ("first", "second")  # constants of a coupling
-
-
-AXES = {"X": 0, "Y": 1, "Z": 2}
-
-
-Constants = tuple[tuple[str, float], ...]
-
-
-IDLE = 1e-3  # N in a strut: below, a power of the force would diverge, and the strut adds nothing that shows
+# Shape and names of its constants -> share s of the variable v in words, and as a function. Coulomb friction holds up
+# to a force `beyond`: (v - beyond) / v gives; play that a force `within` uses up gives no more: min(v, within) / v.
+FORMULAS: dict[tuple[str, tuple[str, ...]], tuple[str, Callable[..., FloatArray]]] = {
+    ("offset", ()): ("v", lambda v: v),
+    ("slope", ("start", "end")): ("(v - start) / (end - start)", lambda v, start, end: (v - start) / (end - start)),
+    ("slope", ("power", "reference")): ("(v / reference)^power", _growing),
+    ("square", ("centre", "reach")): ("((v - centre) / reach)^2", lambda v, centre, reach: ((v - centre) / reach) ** 2),
+    ("bump", ("centre", "width")): (
+        "exp(-((v - centre) / width)^2 / 2)", lambda v, centre, width: np.exp(-0.5 * ((v - centre) / width) ** 2)
+    ),
+    ("threshold", ("edge", "side")): (
+        "(1 where side (v - edge) > 0, else 0)", lambda v, edge, side: (side * (v - edge) > 0.0).astype(float)
+    ),
+    ("threshold", ("from", "end")): (
+        "max(0, (v - from) / (end - from))",
+        lambda v, end, **at: np.maximum((v - at["from"]) / (end - at["from"]), 0.0),  # a word of Python's
+    ),
+    ("threshold", ("beyond",)): (
+        "max(0, 1 - beyond / v)", lambda v, beyond: np.maximum(1.0 - beyond / np.maximum(v, IDLE), 0.0)
+    ),
+    ("threshold", ("within",)): (
+        "min(1, within / v)", lambda v, within: np.minimum(within / np.maximum(v, IDLE), 1.0)
+    ),
+    ("periodic", ("period", "crest")): (
+        "(1 + cos(2 pi (v - crest) / period)) / 2",
+        lambda v, period, crest: 0.5 * (1.0 + np.cos(2.0 * np.pi * (v - crest) / period)),
+    ),
+    ("sign", ("side",)): ("(1 where side v > 0, else 0)", lambda v, side: (side * v > 0.0).astype(float)),
+}  # fmt: skip
+SHAPES = tuple(dict.fromkeys(shape for shape, _ in FORMULAS))
 
 
 @dataclass(frozen=True)
@@ -171,9 +188,9 @@ class Term:
     Attributes
     ----------
     link, direction, variable, shape
-        Of `LINKS`, `DIRECTIONS`, `VARIABLES` (or the name of a further column), `SHAPES`.
+        Of `LINKS`, `ALONG`, `VARIABLES` (or the name of a further column), `SHAPES`.
     action
-        How it acts, see `Action`.
+        How it acts, one of `ACTIONS`.
     where
         Strut (1 to 6) or vertex (1 to 3), numbered from 1; None: all of them, or the link has none.
     at
@@ -206,17 +223,17 @@ class Term:
     @property
     def unit(self) -> str:
         """Unit of the size in documents."""
-        return UNITS[self.action][0]
+        return ACTIONS[self.action].unit
 
     @property
     def si(self) -> float:
         """SI value of one `unit`."""
-        return UNITS[self.action][1]
+        return ACTIONS[self.action].si
 
     @property
     def bounds(self) -> tuple[float, float]:
         """What the size may be, in `unit`."""
-        return UNITS[self.action][2]
+        return ACTIONS[self.action].bounds
 
     @property
     def signs(self) -> tuple[float, ...]:
@@ -243,8 +260,7 @@ class Term:
         """The same with its second variable as the only one."""
         if self.times is None:
             return None
-        one = self.times
-        return replace(self, variable=one.variable, shape=one.shape, at=one.at, column=one.column, times=None)
+        return replace(self, **vars(self.times), times=None)
 
     @property
     def constants(self) -> dict[str, float]:
@@ -267,37 +283,9 @@ class Term:
 
 
 def variable_values(variable: str, path: LoadPath, column: str = "") -> FloatArray:
-    """What a variable is at n poses, SI: (n,), or (n, 6) for those of each strut.
-
-    Strut force and its sign are those under the load, `path.strut_forces`.
-    """
-    position = path.position
-    if variable in ("constant", "direction"):
-        return np.ones(len(path))
-    if variable in ("x", "y", "z"):
-        return np.asarray(position[:, "xyz".index(variable)])
-    if variable == "radius":
-        return np.hypot(position[:, 0], position[:, 1])
-    if variable == "tilt":
-        axis = path.rotation[:, :, 2]
-        if column in SWINGS:
-            return joint_angles(path.machine, path.struts, path.rotation)[SWINGS.index(column)]
-        if column:
-            return np.arcsin(np.clip(axis[:, AXES[column]], -1.0, 1.0))
-        return np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2])
-    if variable == "strut length":
-        return path.struts.lengths
-    if variable == "load":
-        return path.force
-    if variable == "setup":
-        return np.zeros(len(path)) if path.setup is None else (path.setup == column).astype(float)
-    found = {
-        "time": path.time,
-        "temperature": path.temperature,
-        "strut force": None if path.strut_forces is None else np.abs(path.strut_forces),
-        "force sign": None if path.strut_forces is None else np.sign(path.strut_forces),
-    }[variable]
-    return np.zeros(len(path)) if found is None else found
+    """Values of a variable at n poses, SI: (n,), or (n, 6) for those of each strut; 0 where nobody gives them."""
+    values = SEEN[variable](path, column)
+    return np.zeros(len(path)) if values is None else values
 
 
 def shape_values(shape: str, values: FloatArray, at: Mapping[str, float], signed: bool) -> FloatArray:
@@ -305,28 +293,9 @@ def shape_values(shape: str, values: FloatArray, at: Mapping[str, float], signed
 
     `at` holds numbers, or arrays that broadcast with the values.
     """
-    if shape == "offset":
-        return values
-    if shape == "slope":
-        if "power" in at:
-            return np.asarray((np.maximum(values, IDLE) / at["reference"]) ** at["power"])
-        line = (values - at["start"]) / (at["end"] - at["start"])
-        return np.asarray(line if signed else np.maximum(line, 0.0))
-    if shape == "square":
-        return np.asarray(((values - at["centre"]) / at["reach"]) ** 2)
-    if shape == "bump":
-        return np.asarray(np.exp(-0.5 * ((values - at["centre"]) / at["width"]) ** 2))
-    if shape == "threshold" and "beyond" in at:  # Coulomb friction holds up to the edge: (v - edge) / v of a force v
-        return np.maximum(1.0 - at["beyond"] / np.maximum(values, IDLE), 0.0)
-    if shape == "threshold" and "within" in at:  # play that a force uses up gives no more: min(v, edge) / v
-        return np.minimum(at["within"] / np.maximum(values, IDLE), 1.0)
-    if shape == "threshold" and "from" in at:  # nothing up to there, then a straight line
-        return np.asarray(np.maximum((values - at["from"]) / (at["end"] - at["from"]), 0.0))
-    if shape == "threshold":
-        return np.asarray(at["side"] * (values - at["edge"]) > 0.0, dtype=float)
-    if shape == "periodic":
-        return np.asarray(0.5 * (1.0 + np.cos(2.0 * np.pi * (values - at["crest"]) / at["period"])))
-    return np.asarray(at["side"] * values > 0.0, dtype=float)  # sign
+    names = tuple(name for name in at if name not in PAIR)
+    share = FORMULAS[shape, names][1](values, **{name: at[name] for name in names})
+    return np.maximum(share, 0.0) if names == ("start", "end") and not signed else np.asarray(share)
 
 
 def shaped(term: Term, path: LoadPath) -> FloatArray:
@@ -354,13 +323,10 @@ def multiplied(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.asarray(wide * narrow[:, None])
 
 
-OF_FORCES = ("strut force", "force sign")
-
-
 def formula(term: Term, size: str) -> str:
     """What a term adds, its size and its constants by name."""
     along = f" along {term.direction}" if term.link == "instrument" and term.direction in AXES else ""
-    return f"{EQUATIONS[term.action].format(size)}{along}, s = {_share_formula(term, len(term.signs) > 1)}"
+    return f"{ACTIONS[term.action].equation.format(size)}{along}, s = {_share_formula(term, len(term.signs) > 1)}"
 
 
 def _share_formula(term: Term, signed: bool) -> str:
@@ -371,6 +337,6 @@ def _share_formula(term: Term, signed: bool) -> str:
         share = f"(1 in set-up {term.column}, else 0)"
     else:
         names = tuple(name for name, _ in term.at if name not in PAIR)
-        share = re.sub(r"\bv\b", " ".join((term.variable, term.column)).strip(), FORMULAS[term.shape][names])
+        share = re.sub(r"\bv\b", " ".join((term.variable, term.column)).strip(), FORMULAS[term.shape, names][0])
         share = f"max(0, {share})" if names == ("start", "end") and not signed else share
     return share if term.second is None else f"{share} {_share_formula(term.second, signed=False)}"

@@ -22,11 +22,12 @@ from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import exact, guard
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ADDING, ActiveEffect
 from toolpath_stiff.stiffness.catalogue import effects_from_file
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
-from toolpath_stiff.stiffness.guard import is_foreign
-from toolpath_stiff.stiffness.model import TOOL, ActiveEffect, StiffnessModel, build_model, load_path
+from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
+from toolpath_stiff.stiffness.model import TOOL, StiffnessModel, build_model, load_path
 from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
 
 POSES, DRAWN, TIMED = 24, 600, 512
@@ -92,7 +93,7 @@ def refuse_failing(effects: Iterable[Effect], machine: Machine, machine_name: st
     """Raise `InputError` for the first effect from outside the package that fails on a machine, which it names."""
     for effect in effects:
         if told := failure(effect, machine):
-            file = guard.file_of(effect)
+            file = file_of(effect)
             check = command_line("effects", "check", file, *options(machine=machine_name))
             raise EffectError(
                 f"effect {effect.name} {told}", file=file,
@@ -281,7 +282,7 @@ def _sign(model: StiffnessModel, effect: Effect, poses: FloatArray) -> list[Outc
         return []
     path, name = _path(model, poses), "sign"
     for active in model.effects:
-        for hook in guard.SHAPES:
+        for hook in ADDING:
             added = active.adds(hook, path)
             if added is None:
                 continue

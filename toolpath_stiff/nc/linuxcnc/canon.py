@@ -16,7 +16,7 @@ from functools import cached_property
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, step_in_words
+from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, needs_tags, step_in_words, tool_numbers
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
 from toolpath_stiff.nc.tables import ToolEntry, tool_table_hint
 from toolpath_stiff.nc.words import AXES
@@ -51,15 +51,12 @@ class Follower:
     name: str
     lines: Sequence[Line]
     tools: dict[int, ToolEntry] | None
-    tagged: bool
-    numbers: Sequence[int] = ()
-    reference: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    posted: bool
+    reference: Sequence[float] = (0.0, 0.0, 0.0)
     recorder: Recorder = field(default_factory=Recorder)
-    warnings: list[str] = field(default_factory=list)
     used_tools: list[int] = field(default_factory=list)
     first_motion: int | None = None
     ended: bool = False
-    posted: bool = False
 
     scale: float = 1.0
     plane: str = "XY"
@@ -87,6 +84,9 @@ class Follower:
     moves_of_line: int = 0
     from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
 
+    def __post_init__(self) -> None:
+        self.tagged, self.numbers = needs_tags(self.lines), tool_numbers(self.tools, self.lines)
+
     def follow(self, text: str) -> None:
         """Take every command. Raises `InputError` for what gives no path: probing, splines, tools of unknown length."""
         for match in CALL.finditer(text):
@@ -104,20 +104,12 @@ class Follower:
         """An error of a line of the program."""
         return ProgramError(found, expected=expected, hint=hint, file=self.name, line=line or None)
 
-    # -- frames ----------------------------------------------------------------------------------------------------
-
     def world(self, program: Vector) -> Vector:
         """Control coordinates (mm, degrees) of a point as printed."""
         s, g, o = self.scale, self.g92, self.g5x
         x, y, z, a, b, c = program
-        x, y = x * s + g[0], y * s + g[1]
-        if self.rotation:
-            x, y = self._turn(x, y)
+        x, y = _turned(x * s + g[0], y * s + g[1], self.rotation)
         return [x + o[0], y + o[1], z * s + g[2] + o[2], a + g[3] + o[3], b + g[4] + o[4], c + g[5] + o[5]]
-
-    def _turn(self, x: float, y: float) -> tuple[float, float]:
-        cos, sin = math.cos(self.rotation), math.sin(self.rotation)
-        return (cos * x - sin * y, sin * x + cos * y)
 
     def _lengths(self, inner: str) -> Vector:
         return [v * self.scale if i < 3 else v for i, v in enumerate(_numbers(inner)[:6])]
@@ -153,13 +145,11 @@ class Follower:
 
     def _no_length(self, words: str) -> InputError:
         """Of a G43 without a length: which tool's, unless H is computed."""
-        if self.tools is not None:
-            missing, hint = "which the tool table does not give", "give it in a tool table (--tools FILE)"
-            return self.fail(self.reading, f"G43 needs a tool's length, {missing}", hint=hint)
-        named = LENGTH_WORD.search(words)
-        tool = int(named[1]) if named and int(named[1]) else self.tool  # H0: that of the spindle
-        hint = "give one with --tools FILE" if "H" in words and not named else tool_table_hint(tool)
-        return self.fail(self.reading, "G43 needs a tool's length, and there is no tool table", hint=hint)
+        missing = "and there is no tool table" if self.tools is None else "which the tool table does not give"
+        named, hint = LENGTH_WORD.search(words), "give it in a tool table (--tools FILE)"
+        if self.tools is None and (named or "H" not in words):
+            hint = tool_table_hint(int(named[1] if named else 0) or self.tool)  # H0: that of the spindle
+        return self.fail(self.reading, f"G43 needs a tool's length, {missing}", hint=hint)
 
     def _on_use_tool_length_offset(self, inner: str) -> None:
         words = self._words(self.reading)
@@ -170,7 +160,7 @@ class Follower:
             raise self._no_length(words)
         if self.renamed and "G43" in words and "H" not in words and "G43.1" not in words:
             raise self.fail(self.reading, "G43 after M61: LinuxCNC's rs274 takes the length of the tool before", "H")
-        self.position = [*self.position[:2], self.position[2] + self.tool_z - z, *self.position[3:]]
+        self.position[2] += self.tool_z - z
         self.raised += self.tool_z - z
         self.tool_z = z
         cancelled = z == 0.0 and "G49" in words
@@ -179,8 +169,6 @@ class Follower:
 
     def _on_select_plane(self, inner: str) -> None:
         self.plane = inner.removeprefix("CANON_PLANE_")
-
-    # -- feeds and tools -------------------------------------------------------------------------------------------
 
     def _on_set_feed_rate(self, inner: str) -> None:
         self.feed, self.feed_scale, self.feed_line = _numbers(inner)[0], self.scale, self.reading
@@ -203,8 +191,7 @@ class Follower:
             if self.speed == 0.0:
                 raise self.fail(self.line, "a feed per revolution with the spindle at S0", "S above 0")
             return (self.synchronised or self.feed * self.feed_scale) * self.speed
-        rotary = not arc and start[:3] == end[:3]
-        return self.feed if rotary else self.feed * self.feed_scale
+        return self.feed * (1.0 if not arc and start[:3] == end[:3] else self.feed_scale)
 
     def _on_change_tool(self, inner: str) -> None:
         place = int(_numbers(inner)[0])
@@ -218,8 +205,6 @@ class Follower:
 
     def _on_dwell(self, inner: str) -> None:
         self.recorder.add_dwell(_numbers(inner)[0])
-
-    # -- lines -----------------------------------------------------------------------------------------------------
 
     def _words(self, line: int) -> str:
         return self.lines[line - 1].plain if line else ""
@@ -262,26 +247,17 @@ class Follower:
     def _on_program_end(self, _: str) -> None:
         self.ended = True
 
-    # -- moves -----------------------------------------------------------------------------------------------------
-
     def _on_straight_traverse(self, inner: str) -> None:
-        self._move(RAPID, _numbers(inner), None)
+        self._move(RAPID, self.world(_numbers(inner)))
 
     def _on_straight_feed(self, inner: str) -> None:
-        self._move(CYCLE if self.cycle else FEED, _numbers(inner), None)
+        self._move(CYCLE if self.cycle else FEED, self.world(_numbers(inner)))
 
     def _on_rigid_tap(self, inner: str) -> None:
         """Down and, the spindle reversed, back."""
-        start = [*self._program_point(), 0.0, 0.0, 0.0]
-        end = _numbers(inner)
-        rotary = [p - g - o for p, g, o in zip(self.position[3:], self.g92[3:], self.g5x[3:], strict=True)]
-        self._move(CYCLE, [*end[:3], *rotary], None)
-        self._move(CYCLE, [*start[:3], *rotary], None)
-
-    def _program_point(self) -> Vector:
-        """Where the controlled point is, in program coordinates of the active unit."""
-        unturned = self._unrotated(self.position)
-        return [(v - g) / self.scale for v, g in zip(unturned, self.g92[:3], strict=True)]
+        here = list(self.position)
+        self._move(CYCLE, [*self.world([*_numbers(inner)[:3], 0.0, 0.0, 0.0])[:3], *here[3:]])
+        self._move(CYCLE, here)
 
     def _on_arc_feed(self, inner: str) -> None:
         e1, e2, c1, c2, turns, axis_end, a, b, c = _numbers(inner)
@@ -290,11 +266,10 @@ class Follower:
         first, second, normal = PLANES[self.plane]
         end = [0.0, 0.0, 0.0, a, b, c]
         end[first], end[second], end[normal] = e1, e2, axis_end
-        self._move(ARC, end, (first, second, normal, c1, c2, turns))
+        self._move(ARC, self.world(end), (c1, c2, turns))
 
-    def _move(self, motion: int, printed: Vector, arc: tuple[int, int, int, float, float, float] | None) -> None:
-        """One move to a point as printed; an arc with its axes, centre and turns."""
-        end = self.world(printed)
+    def _move(self, motion: int, end: Vector, arc: tuple[float, float, float] | None = None) -> None:
+        """One move to a point in control coordinates; an arc with its centre as printed and its turns."""
         if self.lost and self.line:
             self._find_height(end)
         self.raised = 0.0
@@ -310,44 +285,33 @@ class Follower:
             near = SAME_PLACE * self.scale
             start = [e if abs(e - s) < near else s for s, e in zip(start, end, strict=True)]
             self.frame_changed = False
-        centred = self._arc(start, end, arc) if arc else None
+        centred = self._arc(start, end, *arc) if arc else None
         shift = (*self.reference, 0.0, 0.0, 0.0)
-        start = [s - r for s, r in zip(start, shift, strict=True)]
-        end = [e - r for e, r in zip(end, shift, strict=True)]
+        start, end = ([value - zero for value, zero in zip(point, shift, strict=True)] for point in (start, end))
         feed = math.nan if motion == RAPID else self._feed_of(start, end, arc is not None)
         flags = self._machine_flags(start, end)
         added = self.recorder.add(self.line, motion, start, end, feed, self.tool, self.tool_length, flags, centred)
         if added and self.tool not in self.used_tools:
             self.used_tools.append(self.tool)
 
-    def _arc(self, start: Vector, end: Vector, arc: tuple[int, int, int, float, float, float]) -> Arc:
-        first, second, normal, c1, c2, turns = arc
+    def _arc(self, start: Vector, end: Vector, c1: float, c2: float, turns: float) -> Arc:
+        first, second, normal = PLANES[self.plane]
         # In the plane the sweep is that of program coordinates, before any rotation.
-        here = self._unrotated(start)
-        there = self._unrotated(end)
+        here, there = self._unrotated(start), self._unrotated(end)
         if max(abs(here[first] - there[first]), abs(here[second] - there[second])) < SAME_PLACE * self.scale:
             there = self._end_in_words(here, there, (first, second))
         middle = list(here)
-        g = self.g92
-        middle[first], middle[second] = c1 * self.scale + g[first], c2 * self.scale + g[second]
-        sweep = geometry.arc_sweep(
-            (here[first], here[second]),
-            (there[first], there[second]),
-            (middle[first], middle[second]),
-            turns < 0,
-            int(abs(turns)) or 1,
-        )
+        middle[first], middle[second] = c1 * self.scale + self.g92[first], c2 * self.scale + self.g92[second]
+        beginning, ending, center = ((point[first], point[second]) for point in (here, there, middle))
+        sweep = geometry.arc_sweep(beginning, ending, center, turns < 0, int(abs(turns)) or 1)
         try:
-            geometry.check_bulge(math.dist((here[first], here[second]), (middle[first], middle[second])), sweep)
+            geometry.check_bulge(math.dist(beginning, center), sweep)
         except geometry.ArcError as error:
             raise self.fail(self.line, error.found, error.expected) from None
-        x, y = self._turn(middle[0], middle[1]) if self.rotation else (middle[0], middle[1])
-        center = [v + o - r for v, o, r in zip((x, y, middle[2]), self.g5x[:3], self.reference, strict=True)]
-        vector = [0.0, 0.0, 0.0]
-        vector[normal] = 1.0
-        if self.rotation:
-            vector[0], vector[1] = self._turn(vector[0], vector[1])
-        return Arc((center[0], center[1], center[2]), (vector[0], vector[1], vector[2]), sweep)
+        middle[:2] = _turned(middle[0], middle[1], self.rotation)
+        x, y, z = (v + o - r for v, o, r in zip(middle, self.g5x[:3], self.reference, strict=True))
+        vector = [float(axis == normal) for axis in range(3)]
+        return Arc((x, y, z), (*_turned(vector[0], vector[1], self.rotation), vector[2]), sweep)
 
     def _end_in_words(self, here: Vector, there: Vector, axes: tuple[int, int]) -> Vector:
         """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
@@ -373,10 +337,7 @@ class Follower:
     def _unrotated(self, control: Vector) -> Vector:
         """Control coordinates less the work offset, turned back: those to which G92 adds."""
         x, y, z = (p - o for p, o in zip(control[:3], self.g5x[:3], strict=True))
-        if not self.rotation:
-            return [x, y, z]
-        cos, sin = math.cos(self.rotation), math.sin(self.rotation)
-        return [cos * x + sin * y, cos * y - sin * x, z]
+        return [*_turned(x, y, -self.rotation), z]
 
     def _check_turned(self) -> None:
         words = self._words(self.line)
@@ -426,6 +387,13 @@ class Follower:
         for axis in named:
             self.from_machine[axis] = machine
         return (was, any(self.from_machine[of]))
+
+
+def _turned(x: float, y: float, rotation: float) -> tuple[float, float]:
+    if not rotation:
+        return (x, y)
+    cos, sin = math.cos(rotation), math.sin(rotation)
+    return (cos * x - sin * y, sin * x + cos * y)
 
 
 def _numbers(inner: str) -> Vector:

@@ -2,85 +2,52 @@
 
 from __future__ import annotations
 
-import copy as copying
+import copy
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import LISTED
+from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc.canon import Follower
+from toolpath_stiff.nc.linuxcnc.fence import Dropped, refuse_other_programs, unclosed, without_others
 from toolpath_stiff.nc.linuxcnc.inputs import (
-    Dropped,
     Line,
     first_offset,
     needs_tags,
     numbered,
     parameter_file,
-    refuse_other_programs,
     split,
     tool_file,
     tool_numbers,
-    unclosed,
-    without_others,
 )
 from toolpath_stiff.nc.linuxcnc.runner import StoppedError, find_rs274, message_and_line, run_rs274
-from toolpath_stiff.nc.moves import Moves, ToolUse, Unsupported
-from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.moves import ReadProgram, Unsupported
+from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START
-from toolpath_stiff.nc.tables import Offsets, tool_of
-from toolpath_stiff.units import ShopPose
+from toolpath_stiff.nc.tables import tool_of
+from toolpath_stiff.units import ShopPose, pose_in_si
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.linuxcnc.runner import Limits, Run
 
-
 MACHINE_CODES = re.compile(r"G0*(?:53|28|30)(?!\d)")
-
-
 OFFSET_CODES = re.compile(r"G0*10(?!\d)")
-
-
 SETS_G54 = re.compile(r"L0*20?(?!\d).*P0*[01](?!\d)|P0*[01](?!\d).*L0*20?(?!\d)")
-
-
 HARMLESS_WORD = re.compile(r"([GM])([0-9]+\.?[0-9]*)")
-
-
 FILES = re.compile(r"\s*(logopen|logappend|probeopen)\b", re.IGNORECASE)
-
-
 LOOPS = re.compile(r"O(?:<[^<>]*>|\d+|[#\[].*)(?:WHILE|REPEAT|DO)")
-
-
-MOST_NAMED = 5  # loops, in a message
-
-
 TURNING = re.compile(r"G0*(33|76|95|96)(?![\d.])")  # what lathes' programs have, seldom those of mills
-
-
 WAITS = re.compile(r"M0*66(?!\d)")
+MOST_NAMED = 5  # loops, in a message
+NO_SHIFT = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class Reading:
-    """What the second interpreter found; see `Program` for the fields."""
-
-    moves: Moves
-    origin: ShopPose
-    source: str
-    unsupported: tuple[Unsupported, ...]
-    warnings: tuple[str, ...]
-    assumptions: tuple[str, ...]
-    tools: tuple[ToolUse, ...]
-    turning: dict[str, int]  # what makes the program look like a lathe's, with its line
-
-
-def read(request: Request, limits: Limits | None = None) -> Reading:
-    """What `rs274` makes of a program, within the limits of its run.
+def read(request: Request, limits: Limits | None = None) -> ReadProgram:
+    """A program as `rs274` reads it, within the limits of its run.
 
     Raises
     ------
@@ -110,75 +77,75 @@ def refusal(source: Sequence[str], name: str) -> InputError | None:
     return None
 
 
-@dataclass
 class _Session:
-    request: Request
-    lines: list[Line]
-    rs274: str
-    dropped: Sequence[Dropped]
-    limits: Limits | None
+    """A program being read, as often as it takes to know its zero."""
 
-    def read(self) -> Reading:
-        origin, default_origin = self.request.zero
-        offsets = copying.deepcopy(self.request.offsets)
+    def __init__(
+        self, request: Request, lines: list[Line], rs274: str, dropped: Sequence[Dropped], limits: Limits | None
+    ) -> None:
+        self.request, self.lines, self.rs274, self.dropped, self.limits = request, lines, rs274, dropped, limits
+        self.offsets = copy.deepcopy(request.offsets)
+
+    def read(self) -> ReadProgram:
+        request = self.request
+        origin, default_origin = request.zero
         shift = self._shift(origin, default_origin)
-        run, follower = self._run(offsets, shift)
+        run, follower = self._run(shift)
         # G54 as it stood at the first motion is the zero of the set-up frame.
-        axes, given = self._first_g54(run, follower, offsets, shift)
+        axes, given = self._first_g54(run, follower, shift)
         if any(axes[:3]):
-            follower = self._follow(run, (axes[0], axes[1], axes[2]))
+            follower = self._follow(run, axes[:3])
         g54 = (axes[0], axes[1], axes[2], 0.0, 0.0, 0.0)
+        place, source = (g54, "program") if given else (default_origin, "default")
         if origin is not None:
-            place, says = origin, "option"
-        elif given:
-            place, says = g54, "program"
-        else:
-            place, says = default_origin, "default"
-        if shift == (0.0, 0.0, 0.0) and self._uses(MACHINE_CODES) and place != g54:
+            place, source = origin, "option"
+        if shift == NO_SHIFT and self._uses(MACHINE_CODES) and place != g54:
             raise self._machine_error()
         if not follower.recorder.cuts:
-            raise ProgramError(
-                "no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=self.request.name
-            )
-        return Reading(
-            moves=follower.recorder.moves(),
-            origin=place,
-            source=says,
+            raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
+        moves = follower.recorder.moves()
+        return ReadProgram(
+            name=request.name,
+            path=request.path,
+            source=request.lines,
+            moves=moves,
+            origin=pose_in_si(place),
+            origin_source=source,
             unsupported=tuple(self._unsupported()),
-            warnings=tuple(self._warnings(says, given, follower)),
+            warnings=(*self._warnings(source, given), *lathe_warning(self._turning(), moves)),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program", *self._left_out()),
-            tools=tuple(tool_of(self.request.tools, number).in_use() for number in follower.used_tools),
-            turning=self._turning(),
+            tools=tuple(tool_of(request.tools, number).in_use() for number in follower.used_tools),
+            interpreter="linuxcnc",
+            dialect="linuxcnc",
         )
 
     def _uses(self, codes: re.Pattern[str]) -> bool:
         return any(codes.search(line.plain) for line in self.lines)
 
-    def _shift(self, origin: ShopPose | None, default_origin: ShopPose) -> tuple[float, float, float]:
+    def _shift(self, origin: ShopPose | None, default_origin: ShopPose) -> Sequence[float]:
         """How far all work offsets must be moved for machine coordinates to be those of the machine; mm.
 
         It matters to G53, G28 and G30 alone. G10 writes offsets that are machine coordinates already: then none.
         """
-        g54 = self.request.offsets.table[0]
+        g54 = self.offsets.table[0]
         place = origin if origin is not None else None if g54.given else default_origin
         if place is None or not self._uses(MACHINE_CODES) or self._uses(OFFSET_CODES):
-            return (0.0, 0.0, 0.0)
+            return NO_SHIFT
         if any(place[3:]):
             raise self._machine_error()
         return (place[0] - g54.axes[0], place[1] - g54.axes[1], place[2] - g54.axes[2])
 
     def _machine_error(self) -> InputError:
-        number = next((line.number for line in self.lines if MACHINE_CODES.search(line.plain)), None)
         return ProgramError(
             "machine coordinates (G53, G28, G30) in a program whose zero lies elsewhere than its G10 says, or is "
             "turned: LinuxCNC's interpreter knows the machine by its offsets alone",
             expected="G54 as the program or the offsets file sets it",
             hint=f"leave {both_names('--origin')} out, or read the program with --interpreter builtin",
             file=self.request.name,
-            line=number,
+            line=next((line.number for line in self.lines if MACHINE_CODES.search(line.plain)), None),
         )
 
-    def _prefix(self, offsets: Offsets, shift: tuple[float, float, float]) -> tuple[tuple[str, ...], int]:
+    def _prefix(self, shift: Sequence[float]) -> tuple[tuple[str, ...], int]:
         """Blocks before the program, and the work offset (index) that is in force before them.
 
         rs274 begins at 0 of the machine and, where the offset in force is turned, with wrong numbers: so another one
@@ -186,8 +153,8 @@ class _Session:
         """
         active = 0
         prefix: list[str] = []
-        if offsets.table[0].rotation:
-            plain = [index for index, offset in enumerate(offsets.table) if not offset.rotation]
+        if self.offsets.table[0].rotation:
+            plain = [index for index, offset in enumerate(self.offsets.table) if not offset.rotation]
             if not plain:
                 raise ProgramError(
                     "every work offset is turned: LinuxCNC's rs274 begins with wrong numbers",
@@ -203,44 +170,32 @@ class _Session:
             prefix += [f"N0G21G90G53G0X{x:.6f}Y{y:.6f}Z{z:.6f}", "N0G80"]
         return tuple(prefix), active
 
-    def _run(
-        self, offsets: Offsets, shift: tuple[float, float, float], until: int | None = None
-    ) -> tuple[Run, Follower]:
+    def _run(self, shift: Sequence[float], until: int | None = None) -> tuple[Run, Follower]:
         """Run the program, or its part before the line `until` is first executed."""
-        prefix, active = self._prefix(offsets, shift)
-        lines = self.lines
-        if until is not None:
-            lines = [Line(line.number, "M2") if line.number == until else line for line in lines]
-        text = numbered(
-            lines,
-            self.request.name,
-            block_delete=bool(self.request.switches),
-            tags=needs_tags(self.lines),
-            prefix=prefix,
-        )
+        name, tools = self.request.name, self.request.tools
+        prefix, active = self._prefix(shift)
+        lines = [Line(line.number, "M2") if line.number == until else line for line in self.lines]
+        switch = bool(self.request.switches)
         try:
             run = run_rs274(
-                text,
-                parameter_file(offsets, shift, active),
-                tool_file(tool_numbers(self.request.tools, self.lines), self.request.tools),
+                numbered(lines, name, block_delete=switch, tags=needs_tags(self.lines), prefix=prefix),
+                parameter_file(self.offsets, shift, active),
+                tool_file(tool_numbers(tools, self.lines), tools),
                 rs274=self.rs274,
                 limits=self.limits,
             )
         except StoppedError as error:
             loops = [str(line.number) for line in self.lines if LOOPS.match(line.words)][:MOST_NAMED]
             hint = f"loops begin in the lines {', '.join(loops)}" if loops else ""
-            raise ProgramError(str(error), hint=hint, file=self.request.name, line=error.line) from None
-        follower = self._follow(run, (0.0, 0.0, 0.0))
+            raise ProgramError(str(error), hint=hint, file=name, line=error.line) from None
+        follower = self._follow(run)
         if run.message or not follower.ended:
             raise self._refusal(run.message, len(prefix))
         return run, follower
 
-    def _follow(self, run: Run, reference: tuple[float, float, float]) -> Follower:
-        numbers = tool_numbers(self.request.tools, self.lines)
-        follower = Follower(
-            self.request.name, self.lines, self.request.tools, needs_tags(self.lines), numbers, reference
-        )
-        follower.posted = self.request.posted is not None
+    def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
+        request = self.request
+        follower = Follower(request.name, self.lines, request.tools, request.posted is not None, reference)
         follower.follow(run.canon)
         return follower
 
@@ -258,64 +213,61 @@ class _Session:
             line=line or None,
         )
 
-    def _first_g54(
-        self, run: Run, follower: Follower, offsets: Offsets, shift: tuple[float, float, float]
-    ) -> tuple[list[float], bool]:
+    def _first_g54(self, run: Run, follower: Follower, shift: Sequence[float]) -> tuple[list[float], bool]:
         """G54's axes (mm) at the first motion, and whether they were set at all."""
-        before = [a + s for a, s in zip(offsets.table[0].axes, (*shift, 0.0, 0.0, 0.0), strict=True)]
-        given = offsets.table[0].given
-        after, _ = first_offset(run.parameters)
-        if all(abs(a - b) < 1e-4 for a, b in zip(after, before, strict=True)) and not self._uses(OFFSET_CODES):
-            return before, given
+        g54 = self.offsets.table[0]
+        before = [a + s for a, s in zip(g54.axes, (*shift, 0.0, 0.0, 0.0), strict=True)]
+
+        def moved(axes: list[float]) -> bool:
+            return any(abs(a - b) >= 1e-4 for a, b in zip(axes, before, strict=True))
+
+        after = first_offset(run.parameters)
+        if not moved(after) and not self._uses(OFFSET_CODES):
+            return before, g54.given
         if follower.first_motion is None:
             return after, True
-        at_first, _ = first_offset(self._run(offsets, shift, until=follower.first_motion)[0].parameters)
-        moved = any(abs(a - b) > 1e-4 for a, b in zip(at_first, before, strict=True))
-        early = [line for line in self.lines if line.number < follower.first_motion]
-        zeroed = any(OFFSET_CODES.search(line.plain) and SETS_G54.search(line.plain) for line in early)
-        return at_first if moved else before, given or moved or zeroed
+        at_first = first_offset(self._run(shift, until=follower.first_motion)[0].parameters)
+        if moved(at_first):
+            return at_first, True
+        early = (line.plain for line in self.lines if line.number < follower.first_motion)
+        return before, g54.given or any(OFFSET_CODES.search(words) and SETS_G54.search(words) for words in early)
 
     def _turning(self) -> dict[str, int]:
-        found: dict[str, int] = {}
+        """What makes the program look like a lathe's, with its line."""
+        signs: dict[str, int] = {}
         for line in self.lines:
             for number in TURNING.findall(line.plain) if "G" in line.words else ():
-                found.setdefault(f"G{number}", line.number)
-        return found
+                signs.setdefault(f"G{number}", line.number)
+        return signs
 
     def _left_out(self) -> list[str]:
-        if not self.dropped:
-            return []
         words = list(dict.fromkeys(word for _, word in self.dropped))
         more = f" and {len(words) - MOST_NAMED} more" if len(words) > MOST_NAMED else ""
-        return [
-            "left out for LinuxCNC's interpreter, which does not know it there, and which changes no path: "
-            f"{', '.join(words[:MOST_NAMED])}{more}"
-        ]
+        shown = ", ".join(words[:MOST_NAMED]) + more
+        reason = "left out for LinuxCNC's interpreter, which does not know it there, and which changes no path"
+        return [f"{reason}: {shown}"] if words else []
 
     def _unsupported(self) -> list[Unsupported]:
         """Words that change nothing in a path, and comments that would write files."""
-        found = [
-            Unsupported(
-                number,
-                self._column(self.lines[number - 1], word),
-                word,
-                "an M code of one control, not acted upon" if word[0] == "M" else "changes no path",
-            )
-            for number, word in self.dropped
-        ]
+        unsupported = []
+
+        def add(line: Line, word: str, reason: str) -> None:
+            unsupported.append(Unsupported(line.number, self._column(line, word), word, reason))
+
+        for number, word in self.dropped:
+            reason = "an M code of one control, not acted upon" if word[0] == "M" else "changes no path"
+            add(self.lines[number - 1], word, reason)
         for line in self.lines:
-            if "G" in line.words or "M" in line.words:
-                for letter, digits in HARMLESS_WORD.findall(line.plain):
-                    reason = LISTED.get(code_name(letter, float(digits)))
-                    if reason:
-                        column = self._column(line, letter + digits)
-                        found.append(Unsupported(line.number, column, letter + digits, reason))
-            found += [
+            for letter, digits in HARMLESS_WORD.findall(line.plain):
+                code = code_name(letter, float(digits))
+                if code in LISTED:
+                    add(line, letter + digits, LISTED[code])
+            unsupported += [
                 Unsupported(line.number, column, text.split(",")[0].strip(), "no file is written")
                 for column, text in line.comments
                 if FILES.match(text)
             ]
-        return found
+        return unsupported
 
     def _column(self, line: Line, word: str) -> int:
         """Where a word stands in its line, whatever blanks are within it."""
@@ -325,13 +277,10 @@ class _Session:
         match = re.search(r"\s*".join(map(re.escape, word)), text, re.IGNORECASE)
         return match.start() + 1 if match else 1
 
-    def _warnings(self, says: str, given: bool, follower: Follower) -> list[str]:
-        warnings = list(follower.warnings)
-        if says == "option" and given:
-            warnings.append(
-                f"the program or the offsets file sets G54; {both_names('--origin')} overrides it, other offsets keep "
-                "their distance to it"
-            )
+    def _warnings(self, source: str, given: bool) -> list[str]:
+        warnings = []
+        if source == "option" and given:
+            warnings.append(ORIGIN_WINS)
         warnings += [
             f"line {number}: what {word} does on its control is not known"
             for number, word in self.dropped

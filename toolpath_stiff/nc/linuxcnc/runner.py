@@ -26,17 +26,9 @@ HOW_TO_CONFINE = (
     "install bubblewrap (Debian, Ubuntu: apt install bubblewrap), or say --unconfined (unconfined=True): "
     "rs274 may then write wherever you may"
 )
-
-
 HOW_TO_GET = "install LinuxCNC (Debian, Ubuntu: apt install linuxcnc-uspace), or name the program with --rs274 PATH"
-
-
 PROGRAM, CANON, PARAMETERS, TOOLS, ERRORS = "program.ngc", "canon.txt", "rs274.var", "tool.tbl", "errors.txt"
-
-
 LONGEST_MESSAGE = 4000
-
-
 LIMITER = Path(__file__).with_name("limiter.py").resolve()
 
 
@@ -68,14 +60,14 @@ class Run:
 
 def find_rs274(path: str | None = None, unconfined: bool = False) -> str:
     """The interpreter's path. Raises `InputError` with how to get it, or what is to confine it."""
-    found = shutil.which(path or "rs274")
-    if found is None:
+    program = shutil.which(path or "rs274")
+    if program is None:
         what = f"{path!r} is not a program that can be run" if path else "LinuxCNC's interpreter rs274 is not installed"
         raise ProgramError(what, hint=HOW_TO_GET)
     if not unconfined and _bubblewrap() is None:
         what = "bubblewrap, which keeps LinuxCNC's interpreter from all files but its own, is not there or may not work"
         raise ProgramError(what, hint=HOW_TO_CONFINE)
-    return str(Path(found).resolve())
+    return str(Path(program).resolve())
 
 
 def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: Limits | None = None) -> Run:
@@ -95,8 +87,14 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: 
         (folder / PROGRAM).write_text(program, encoding="ascii")
         (folder / PARAMETERS).write_text(parameters, encoding="ascii")
         (folder / TOOLS).write_text(tools, encoding="ascii")
-        command = [rs274, "-g", "-t", TOOLS, "-v", PARAMETERS, PROGRAM, CANON]
-        code = _execute([*_sandbox(folder), *_limiter(limits), *command], folder, limits)
+        wrapper = _bubblewrap()
+        sandbox = () if wrapper is None else (*wrapper, "--bind", str(folder), str(folder), "--chdir", str(folder))
+        # A small Python that limits itself and becomes what follows. Setting the limits between fork and exec of this
+        # process would not be safe where it has threads; and bubblewrap, which goes before, starts a process.
+        values = (str(value) for value in (limits.seconds, limits.memory_bytes, limits.file_bytes))
+        limiter = (sys.executable, "-I", "-S", str(LIMITER), *values)
+        command = (rs274, "-g", "-t", TOOLS, "-v", PARAMETERS, PROGRAM, CANON)
+        code = _execute([*sandbox, *limiter, *command], folder, limits)
         message = _text(folder / ERRORS, LONGEST_MESSAGE)
         over = _exceeded(code, limits)
         if over:
@@ -110,14 +108,9 @@ def _execute(command: list[str], folder: Path, limits: Limits) -> int:
     with (folder / ERRORS).open("wb") as errors:
         try:
             process = subprocess.Popen(
-                command,
-                cwd=folder,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=errors,
-                stderr=errors,
+                command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=errors, stderr=errors,
                 start_new_session=True,
-            )
+            )  # fmt: skip
         except OSError as error:
             raise ProgramError(f"cannot run {command[0]!r}: {error.strerror}", hint=HOW_TO_GET) from None
         try:
@@ -158,36 +151,18 @@ def _ended(process: subprocess.Popen[bytes], seconds: float) -> bool:
         os.close(handle)
 
 
-def _limiter(limits: Limits) -> list[str]:
-    """A command before the command: a small Python that limits itself and becomes what follows.
-
-    Setting the limits between fork and exec of this process would not be safe where it has threads; and bubblewrap,
-    which goes before, starts a process.
-    """
-    values = (limits.seconds, limits.memory_bytes, limits.file_bytes)
-    return [sys.executable, "-I", "-S", str(LIMITER), *(str(value) for value in values)]
-
-
 def _exceeded(code: int, limits: Limits) -> str:
     """Which limit an exit code stands for; a shell's or bubblewrap's 128 + n is signal n."""
     number = -code if code < 0 else code - 128
-    end = "an endless loop, or a program too long for it"
-    if number in (signal.SIGXCPU, signal.SIGKILL):
-        return f"LinuxCNC's interpreter was stopped after {limits.seconds} s of processor time: {end}"
-    if number == signal.SIGXFSZ:
-        return f"LinuxCNC's interpreter was stopped after {limits.file_bytes / 1e6:.0f} MB of output: {end}"
+    limit: dict[int, str] = {signal.SIGXFSZ: f"{limits.file_bytes / 1e6:.0f} MB of output"}
+    limit |= dict.fromkeys((signal.SIGXCPU, signal.SIGKILL), f"{limits.seconds} s of processor time")
+    if number in limit:
+        end = "an endless loop, or a program too long for it"
+        return f"LinuxCNC's interpreter was stopped after {limit[number]}: {end}"
     if number in (signal.SIGABRT, signal.SIGSEGV, signal.SIGBUS):
         memory = limits.memory_bytes >> 20
         return f"LinuxCNC's interpreter crashed (signal {number}; its memory is limited to {memory} MB)"
     return ""
-
-
-def _sandbox(folder: Path) -> list[str]:
-    """Bubblewrap around the command, if it can be used here."""
-    wrapper = _bubblewrap()
-    if wrapper is None:
-        return []
-    return [*wrapper, "--bind", str(folder), str(folder), "--chdir", str(folder)]
 
 
 @cache

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.analysis.document import compare_summaries
 from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
+from toolpath_stiff.column_files import check_parquet
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.analysis.page import page_pieces
 from toolpath_stiff.report.analysis.path import path_picture
@@ -36,8 +37,16 @@ if TYPE_CHECKING:
 
 
 def names(plots: bool = True, table: str = "csv") -> tuple[str, ...]:
-    """Names of the files that `files` makes."""
+    """Names of the files that `files` makes. Raises `InputError` where there is no such table."""
+    check_table(table)
     return (f"samples.{table}", "summary.json", *(("path.png", "profile.png", "report.html") if plots else ()))
+
+
+def check_table(table: str) -> str:
+    """The format of a table of samples. Raises `InputError` where it is unknown, or what it needs is not installed."""
+    if one_of("table", table, tuple(TABLES)) == "parquet":
+        check_parquet()
+    return table
 
 
 def files(analysis: Analysis, plots: bool, table: str, show_plunges: bool) -> dict[str, Callable[[], Content]]:
@@ -45,7 +54,7 @@ def files(analysis: Analysis, plots: bool, table: str, show_plunges: bool) -> di
 
     With `show_plunges` axes and colour scales hold the plunges beside the headline figures too.
     """
-    samples = TABLES[one_of("table", table, tuple(TABLES))]
+    samples = TABLES[check_table(table)]
     contents: dict[str, Callable[[], Content]] = {
         f"samples.{table}": lambda: samples(analysis),
         "summary.json": analysis.to_json,

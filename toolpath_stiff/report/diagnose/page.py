@@ -3,47 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
 
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.documents import Document
+from toolpath_stiff.diagnosis.beside import beside_text
+from toolpath_stiff.diagnosis.result import Diagnosis
+from toolpath_stiff.diagnosis.rows import percent_of
+from toolpath_stiff.diagnosis.words import assumptions, doubts, next_steps, verdict_text, why
 from toolpath_stiff.files import Content
-from toolpath_stiff.inference.errors import deviation_percent
-from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, envelope_png, ladder_png
+from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent
+from toolpath_stiff.report import explanations as words
+from toolpath_stiff.report.diagnose.ladder import ladder_png
+from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, envelope_png
 from toolpath_stiff.report.diagnose.portrait import portrait_png, portrait_section
-from toolpath_stiff.report.explanations import (
-    HEADLINES,
-    best_explanation,
-    explanations,
-    figure_of,
-    floor_text,
-    headline,
-    hidden_name,
-    is_offered,
-    is_plausible,
-    model_rows,
-    name_text,
-    parameter_texts,
-    path_text,
-    percent,
-    plausible_text,
-    probability_text,
-    remark_text,
-    row_name,
-    significant,
-)
-from toolpath_stiff.report.explanations import text as explanations_text
 from toolpath_stiff.report.loops import loops_section
 from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
 from toolpath_stiff.report.residuals import before_after_png
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, counted, machine_text
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, significant
+from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, number
 
-if TYPE_CHECKING:
-    from toolpath_stiff.diagnosis.result import Diagnosis
+text = words.text  # what a terminal shows
 
 
 # Picture -> the question that it answers, and how it is read.
@@ -79,165 +60,143 @@ QUESTIONS = {
 }
 
 
-def diagnose_html(document: Document, pictures: Mapping[str, bytes]) -> str:
+def diagnose_html(found: Diagnosis, pictures: Mapping[str, bytes]) -> str:
     """The page's text.
 
     Parameters
     ----------
-    document
-        As in `diagnose.json`.
+    found
+        The diagnosis.
     pictures
         File name -> PNG; those in `QUESTIONS` are shown.
     """
-    verdict, files = document["verdict"], ", ".join(document["data"])
-    about = [counted(document["readings"], "reading"), files, f"machine {machine_text(document)}"]
-    beside = document["not_excluded_text"]
+    about, beside = words.data_text(found), beside_text(found.unexcluded)
+
+    def shown(name: str) -> Markup:
+        return picture(name, pictures, QUESTIONS)
+
     sections = [
-        section("Why", bullets(document["why"])),
-        picture("ladder.png", pictures, QUESTIONS),
-        section("What the missing thing looks like", portrait_section(document)),
-        picture("portrait.png", pictures, QUESTIONS),
-        section("What the fits say", _candidates(document)),
-        picture("before_after.png", pictures, QUESTIONS),
-        picture("confounding.png", pictures, QUESTIONS),
-        picture("detectable.png", pictures, QUESTIONS),
-        *loops_section(document["loops"]),
-        section("What to measure or do next", _next(document)),
-        section("What these data cannot test", _cannot_test(document)),
-        section("How much the choice matters on the tool path", _path(document)),
-        picture("envelope.png", pictures, QUESTIONS),
-        section("How much readings scatter", _noise(document)),
-        section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
+        section("Why", bullets(why(found))),
+        shown("ladder.png"),
+        section("What the missing thing looks like", portrait_section(found.portrait)),
+        shown("portrait.png"),
+        section("What the fits say", _candidates(found)),
+        shown("before_after.png"),
+        shown("confounding.png"),
+        shown("detectable.png"),
+        *loops_section(found.loops),
+        section("What to measure or do next", _next(found)),
+        section("What these data cannot test", _cannot_test(found)),
+        section("How much the choice matters on the tool path", _path(found)),
+        shown("envelope.png"),
+        section("How much readings scatter", _noise(found)),
+        section("Assumptions", bullets([*assumptions(found), *found.data.notes, *doubts(found)])),
     ]
     return page(
-        title=f"Diagnosis: {files}",
-        verdict=verdict,
-        headline=headline(document),
-        text=" ".join(filter(None, (document["text"], f"May be there beside it: {beside}." if beside else ""))),
+        title=f"Diagnosis: {about[1]}",
+        verdict=found.verdict,
+        headline=words.headline(found),
+        text=" ".join(filter(None, (verdict_text(found), f"May be there beside it: {beside}." if beside else ""))),
         about=about,
-        figures=_figures(document),
-        warnings=document["warnings"],
+        figures=_figures(found),
+        warnings=found.predictor.data.warnings,
         sections=sections,
-        footer=markup("<code>{}</code> seed {}", document["command"], document["seed"]),
-        verdict_class=verdict if verdict in HEADLINES else "",
+        footer=markup("<code>{}</code> seed {}", found.line, found.seed),
+        verdict_class=found.verdict,
     )
 
 
-def _figures(document: Document) -> list[tuple[str, str]]:
+def _figures(found: Diagnosis) -> list[tuple[str, str]]:
     """The few figures that say it all."""
-    base = document["baseline"]
-    best = best_explanation(document)
-    key = "mean_abs_error_percent"
-    found = [(percent(base["as_given"][key], 2), "mean error as given")]
-    found.append((percent(figure_of(base, key), 2), "mean error, strut law refitted"))
-    if best is not None and document["verdict"] in ("identified", "described", "ambiguous"):
-        found.append((percent(figure_of(best, key), 2), f"mean error with {name_text(best)}"))
-        found.append((percent(figure_of(best, "held_out_error_percent"), 2), "the same at points left out"))
-    found.append((floor_text(document), "would be left by scatter alone"))
-    standing = explanations(document)
-    described = document["verdict"] == "described"
-    remark = "are left standing" if len(standing) > 1 else "describes it" if described else "is the explanation"
-    found.append((plausible_text(standing), remark) if standing else ("no effect", "of the catalogue is left standing"))
-    return found
+    rows, standing = found.rows, found.explanations
+    figures = [
+        (percent(rows.as_given.mean_abs_error_percent, 2), "mean error as given"),
+        (percent(rows.refitted.mean_abs_error_percent, 2), "mean error, strut law refitted"),
+    ]
+    if rows.best is not None and found.verdict in ("identified", "described", "ambiguous"):
+        figures.append((percent(rows.best.mean_abs_error_percent, 2), f"mean error with {plain(rows.best.label)}"))
+        figures.append((percent(rows.best.held_out_error_percent, 2), "the same at points left out"))
+    figures.append((words.floor_text(found), "would be left by scatter alone"))
+    one = "describes it" if found.verdict == "described" else "is the explanation"
+    remark = "are left standing" if len(standing) > 1 else one
+    none = ("no effect", "of the catalogue is left standing")
+    return [*figures, (words.plausible_text(standing), remark) if standing else none]
 
 
-def _candidates(document: Document) -> Markup:
+def _candidates(found: Diagnosis) -> Markup:
     """As given, strut law refitted, pairs and all candidates."""
-    rows = []
-    for entry in [*model_rows(document), *document["pairs"], *document["candidates"]]:
-        name, title = row_name(entry), str(entry.get("finding") or entry.get("title") or "")
-        gain = figure_of(entry, "held_out_gain_in_se")
-        kind = "plausible" if is_plausible(entry, document) else "" if is_offered(entry, document) else "out"
-        rows.append(
-            (
-                kind,
-                (
-                    markup("{}<small>{}</small>", name, title),
-                    Markup("<br>").join(markup('<span class="whole">{}</span>', s) for s in parameter_texts(entry))
-                    or "-",
-                    probability_text(figure_of(entry, "probability")),
-                    percent(figure_of(entry, "mean_abs_error_percent"), 2),
-                    percent(figure_of(entry, "held_out_error_percent"), 2),
-                    "-" if gain is None else f"{gain:.1f}",
-                    {True: "yes", False: "no"}.get(entry.get("adequate"), "-"),
-                    remark_text(entry),
-                ),
-            )
+    cells = []
+    for row in (found.rows.as_given, found.rows.refitted, *found.rows.pairs, *found.rows.candidates):
+        sizes = Markup("<br>").join(markup('<span class="whole">{}</span>', size) for size in words.size_texts(row))
+        texts = (
+            markup("{}<small>{}</small>", row.label, row.finding or row.title),
+            sizes or "-",
+            words.probability_text(row.probability),
+            percent(row.mean_abs_error_percent, 2),
+            percent(row.held_out_error_percent, 2),
+            "-" if row.held_out_gain_in_se is None else f"{row.held_out_gain_in_se:.1f}",
+            "-" if row.adequate is None else "yes" if row.adequate else "no",
+            words.remark_text(row),
         )
+        cells.append(("plausible" if row.standing else "" if row.offered else "out", texts))
     head = ("effect", "size (95 % interval)", "probability", "mean error", "at points left out",
             "fall in standard errors", "leaves scatter only", "remark")  # fmt: skip
-    return table(head, rows, range(2, 6))
+    return table(head, cells, range(2, 6))
 
 
-def _next(document: Document) -> Markup:
+def _next(found: Diagnosis) -> Markup:
     """What to do, and the readings that tell most."""
-    readings = document["next_measurements"]
-    body = hint_list(document["next"])
-    if readings:
-        keys = list(dict.fromkeys(key for entry in readings for key in entry if key != "why"))
-        keys = [key for key in keys if any(entry.get(key) not in ("", None) for entry in readings)]
-        rows = [("", [*(_cell(entry.get(key)) for key in keys), _cell(entry.get("why"))]) for entry in readings]
-        numeric = [i for i, key in enumerate(keys) if all(_is_number(entry.get(key)) for entry in readings)]
-        body += table([*keys, "why"], rows, numeric)
-    return body
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    readings = found.next_measurements
+    keys = list(dict.fromkeys(key for reading in readings for key in reading if key != "why"))
+    keys = [key for key in keys if any(reading.get(key) not in ("", None) for reading in readings)]
+    rows = [("", [_cell(reading.get(key)) for key in (*keys, "why")]) for reading in readings]
+    numeric = [i for i, key in enumerate(keys) if all(isinstance(r.get(key), int | float) for r in readings)]
+    return hint_list(next_steps(found)) + table([*keys, "why"], rows, numeric)
 
 
 def _cell(value: object) -> str:
-    if value is None:
-        return Markup()
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _cannot_test(document: Document) -> Markup:
+def _cannot_test(found: Diagnosis) -> Markup:
     rows = []
-    for entry in document["cannot_test"]:
-        columns = Markup(", ").join(markup("<code>{}</code>", name) for name in entry["missing"])
-        rows.append(("", [entry["effect"], columns or "nothing in these data depends on it"]))
+    for name, lacks in sorted(found.cannot_test.items()):
+        columns = Markup(", ").join(markup("<code>{}</code>", column) for column in lacks)
+        rows.append(("", [name, columns or "nothing in these data depends on it"]))
     # 80 % power is what `detectable` asks for.
     never = "even at its largest possible size these data would show it less than four times in five"
-    rows += [("", [hidden_name(e), never]) for e in document["detectable"] if not e["detectable"]]
-    return table(("effect", "the column that is missing"), rows) if rows else Markup()
+    rows += [("", [words.hidden_name(smallest), never]) for smallest in found.detectable if not smallest.seen]
+    return table(("effect", "the column that is missing"), rows)
 
 
-def _path(document: Document) -> Markup:
+def _path(found: Diagnosis) -> Markup:
     """What the plausible explanations predict on the path."""
-    text = path_text(document)
-    if not text:
+    text = words.path_text(found.path)
+    if found.path is None or not text:
         return Markup()
-    explanations = (document["path"] or {}).get("explanations") or {}
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
-    rows = [("", [name, *(number(figure_of(one, key)) for key in keys)]) for name, one in explanations.items()]
-    listed = table(("explanation", "mean N/mm", "range N/mm", "weakest N/mm"), rows, (1, 2, 3)) if rows else Markup()
+    explanations = found.path.get("explanations", {})
+    rows = [("", [name, *(number(figures[key]) for key in keys)]) for name, figures in explanations.items()]
+    listed = table(("explanation", "mean N/mm", "range N/mm", "weakest N/mm"), rows, (1, 2, 3))
     return markup("<p>{}.</p>", text[0].upper() + text[1:]) + listed
 
 
-def _noise(document: Document) -> Markup:
+def _noise(found: Diagnosis) -> Markup:
     """Where the noise comes from, and the verdict under each guess."""
-    noise = document["noise"]
-    parts = [
-        f"{word} {percent(value)}"
-        for word, key in (("repeats", "repeat_percent"), ("clamping", "clamping_percent"),
-                          ("struts among themselves", "strut_spread_percent"))
-        if (value := figure_of(noise, key)) is not None
-    ]  # fmt: skip
-    if (joints := figure_of(noise, "joint_error_mm")) is not None:
-        parts.append(f"joints {significant(joints, 2)} mm")
-    body = markup("<p>Standard deviations: {}. {}</p>", ", ".join(parts), noise["origin"]) if parts else Markup()
+    noise = found.noise
+    shares = (("repeats", noise.typical_repeat), ("clamping", noise.clamping),
+              ("struts among themselves", noise.strut_spread))  # fmt: skip
+    parts = [f"{name} {percent(percent_of(share, 4))}" for name, share in shares]
+    parts.append(f"joints {significant(json_number(float(mm_from_m(noise.joint_error)), 4), 2)} mm")
+    body = markup("<p>Standard deviations: {}. {}</p>", ", ".join(parts), noise.origin)
     rows = []
-    for name, judged in document["by_noise"].items():
-        shown = [f"{key} {probability_text(value)}" for key, value in judged["probability"].items()]
-        cells = [name, percent(judged["noise_percent"]), judged["verdict"], plausible_text(judged["plausible"])]
-        rows.append(("", [*cells, ", ".join(shown[:4])]))
+    for name, judged in found.judgements.items():
+        likely = [f"{key} {words.probability_text(json_number(p, 4))}" for key, p in judged.likely if p > 1e-4]
+        cells = [name, percent(percent_of(judged.noise.typical, 4)), judged.verdict]
+        rows.append(("", [*cells, words.plausible_text(judged.plausible), ", ".join(likely[:4])]))
     body += table(("noise", "one reading", "verdict", "plausible", "probability"), rows, (1,))
-    if len(rows) > 1:
-        body += markup(
-            '<p class="muted">{}</p>', "The noise is a guess: the verdict is what both guesses have in common."
-        )
-    return body
+    guess = "The noise is a guess: the verdict is what both guesses have in common."
+    return body + markup('<p class="muted">{}</p>', guess) if len(rows) > 1 else body
 
 
 def names(plots: bool = True) -> tuple[str, ...]:
@@ -247,46 +206,47 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return (*data, *pictures, "report.html") if plots else data
 
 
-def text(diagnosis: Diagnosis) -> str:
-    """The diagnosis in some 25 lines."""
-    return explanations_text(diagnosis.document)
-
-
-def files(diagnosis: Diagnosis, *, plots: bool = True) -> dict[str, Content]:
+def files(found: Diagnosis, *, plots: bool = True) -> dict[str, Content]:
     """The document as JSON, one row a reading, and with `plots` the pictures that have something to show, and page."""
-    contents: dict[str, Content] = {"diagnose.json": diagnosis.to_json(), "residuals.csv": residuals_csv(diagnosis)}
+    contents: dict[str, Content] = {"diagnose.json": found.to_json(), "residuals.csv": residuals_csv(found)}
     if not plots:
         return contents
-    document = diagnosis.document
+    base, best = found.rows.refitted, None if found.verdict == "adequate" else found.rows.best
+    word = "best of the catalogue:" if found.verdict == "unexplained" else "with"
+    before_after = before_after_png(
+        found.data, found.before, found.after, f"{word} {plain(best.label)}" if best else LAW_REFITTED,
+        (best or base).held_out_error_percent, base.mean_abs_error_percent if best else None,
+    )  # fmt: skip
     pictures: dict[str, bytes | None] = {
-        "ladder.png": ladder_png(document),
-        "portrait.png": portrait_png(document, diagnosis.data, diagnosis.portrait),
-        "confounding.png": confounding_png(document),
-        "detectable.png": detectable_png(document),
-        "before_after.png": before_after_png(document, diagnosis.data, diagnosis.before, diagnosis.after),
-        "envelope.png": envelope_png(document),
+        "ladder.png": ladder_png(found),
+        "portrait.png": portrait_png(found.portrait, found.data),
+        "confounding.png": confounding_png(found),
+        "detectable.png": detectable_png(found),
+        "before_after.png": before_after,
+        "envelope.png": envelope_png(found.main.base_gate),
     }
     drawn = {name: picture for name, picture in pictures.items() if picture is not None}
-    return {**contents, **drawn, "report.html": diagnose_html(document, drawn)}
+    return {**contents, **drawn, "report.html": diagnose_html(found, drawn)}
 
 
-def residuals_csv(diagnosis: Diagnosis) -> str:
+def residuals_csv(found: Diagnosis) -> str:
     """One row a reading: measured, modelled as given, with the law refitted, with the best explanation."""
-    data = diagnosis.data
+    data, residuals = found.data, (found.before, found.base.residual, found.after)
     models = ("as_given", "law_refitted", "after")
     head = [
         "file", "line", "point", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz",
         "stiffness_N_per_mm", *(f"{name}_N_per_mm" for name in models),
         *(f"{name}_deviation_percent" for name in models),
     ]  # fmt: skip
-    rows = []
-    for i in range(len(data)):
-        pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
-        measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
-        own = [float(r[i]) for r in (diagnosis.before, diagnosis.base.residual, diagnosis.after)]
-        modelled = [measured * float(np.exp(-r)) for r in own]
-        numbers = [f"{value:.6g}" for value in pose]
-        numbers += [f"{value:.1f}" for value in (measured, *modelled)]
-        numbers += [f"{float(deviation_percent(np.array(r))):.3f}" for r in own]
-        rows.append([str(data.file[i]), int(data.line[i]), str(data.point[i]), *numbers])
+    measured = n_per_mm_from_n_per_m(data.stiffness)
+    places = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles), data.direction], axis=1)
+    modelled = np.stack([measured, *(measured * np.exp(-residual) for residual in residuals)], axis=1)
+    deviations = np.stack([deviation_percent(residual) for residual in residuals], axis=1)
+    rows = [
+        [
+            str(data.file[i]), int(data.line[i]), str(data.point[i]), *(f"{value:.6g}" for value in places[i]),
+            *(f"{value:.1f}" for value in modelled[i]), *(f"{value:.3f}" for value in deviations[i]),
+        ]
+        for i in range(len(data))
+    ]  # fmt: skip
     return csv_text(head, rows)

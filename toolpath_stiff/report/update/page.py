@@ -313,11 +313,9 @@ def machine_heading(found: UpdateDocument) -> str:
 def _pictures(found: UpdateDocument, update: Update, bars: BarCurve | None) -> dict[str, Content]:
     last = found["steps"][-1]
     called = f"with {' + '.join(last['effects'])}" if last["effects"] else last["name"]
-    entry = {"effect": called, "held_out_error_percent": last["held_out_error_percent"]}
     drawn = before_after_png(
-        {"verdict": found["verdict"], "baseline": found["strut_law_refitted"], "candidates": [entry], "pairs": [],
-         "best": called},
-        update.data.of_tip, update.steps[0].residual, update.steps[-1].residual, names=("as given", called),
+        update.data.of_tip, update.steps[0].residual, update.steps[-1].residual, called,
+        last["held_out_error_percent"], found["strut_law_refitted"]["mean_abs_error_percent"],
     )  # fmt: skip
     pictures: dict[str, bytes] = {}
     if bars is not None:

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.report.explanations import figure_of, percent, significant
 from toolpath_stiff.report.figure import BLUE, INK, MUTED, SECOND_ORANGE, WITHIN, drawn, house_style, new_figure
-from toolpath_stiff.report.words import plain, shortened
+from toolpath_stiff.report.words import percent, plain, shortened, significant
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def figure_of(step: Mapping[str, Any], name: str) -> float | None:
+    """A finite number of a step, or None."""
+    value = step.get(name)
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
 
 
 @drawn

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
 
 REFERENCE_FORCE = 500.0  # N, force in the strut at which the compliance is given
 IDLE = 1e-3  # N: below, a strut adds nothing to the tip that could be measured, and the power law would diverge
@@ -40,14 +37,14 @@ class ContactNonlinearity(Effect):
         ),
     )
 
-    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Secant compliance of the contacts under the present strut forces."""
         if path.strut_forces is None:
             return None
         force = np.maximum(np.abs(path.strut_forces), IDLE)
         return np.asarray(p["compliance"] * np.cbrt(REFERENCE_FORCE / force))
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """Which part gives way, by how much."""
         return (
             f"the contacts in the joints of a strut give way by about {about(p['compliance'])} nm/N at "

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, sizes_in_words
 
 EXPERIENCE = "engineering experience, no source: stiff machine frames are built for 100 to 500 N/um"
 
@@ -57,7 +55,7 @@ class FrameCompliance(Effect):
         ),
     )
 
-    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Quadratic form of the six strut forces, coupling the two of each vertex."""
         form = np.zeros((len(path), 12, 12))
         for number, (pair, radial) in enumerate(frame_vertices(path.machine.frame_joints), start=1):
@@ -70,9 +68,7 @@ class FrameCompliance(Effect):
             form[:, first : last + 1 : last - first, first : last + 1 : last - first] += own
         return form
 
-    def vertex_displacement(
-        self, path: LoadPath, p: Mapping[str, float], forces: FloatArray, vertex: int
-    ) -> FloatArray | None:
+    def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:
         """By its own two springs under the pull of its two struts."""
         if p["vertex"] not in (0, vertex):
             return None
@@ -82,7 +78,7 @@ class FrameCompliance(Effect):
         moved[:, 2] += p["vertical"] * pull[:, 2]
         return np.asarray(moved)
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """Which part gives way, by how much."""
         sizes = sizes_in_words([(p["radial"], "nm/N radially"), (p["vertical"], "nm/N vertically")])
         which = f"frame vertex {p['vertex']} gives" if p["vertex"] else "all three frame vertices give"

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectError
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about, setup_parameter
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about, setup_parameter
 
 ALONG = 0.999  # |d_axis| from which a reading counts as taken along that axis: 2.6 degrees, no one aligns better
 
@@ -49,7 +46,7 @@ class GaugeScale(Effect):
         ),
     )
 
-    def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, Any]) -> FloatArray:
+    def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
         """Scaled where the gauge was used."""
         used = np.ones(len(stiffness), dtype=bool)
         if p["direction"]:
@@ -60,7 +57,7 @@ class GaugeScale(Effect):
             used &= path.setup == p["setup"] if path.setup is not None else False
         return np.where(used, (1.0 + p["scale"]) * stiffness, stiffness)
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """What is off, to which side, by how much."""
         where = f" along {'XYZ'[p['direction'] - 1]}" if p["direction"] else ""
         where += f" in set-up {p['setup']}" if p["setup"] else ""

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
 
 # N: a strut under less is idle. It would add less than g times this over F^2 to the tip's compliance, some 1e-14 m/N.
 IDLE = 1e-3
@@ -40,12 +37,12 @@ class JointClearance(Effect):
         ),
     )
 
-    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Secant compliance of the gaps under the present strut forces."""
         if path.strut_forces is None:
             return None
         return np.asarray(p["lost_motion"] / np.maximum(np.abs(path.strut_forces), IDLE))
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """What is off, to which side, by how much."""
         return f"every strut moves about {about(p['lost_motion'])} um to each side before it carries its load"

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
 
 
 class JointCompliance(Effect):
@@ -36,10 +33,10 @@ class JointCompliance(Effect):
         ),
     )
 
-    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """The constant, for every strut and pose."""
         return np.full((len(path), 6), p["compliance"])
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """Which part gives way, by how much."""
         return f"joints and nut of every strut give way by about {about(p['compliance'])} nm/N"

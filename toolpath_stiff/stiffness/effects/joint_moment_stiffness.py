@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
 
 
 class JointMomentStiffness(Effect):
@@ -41,14 +38,14 @@ class JointMomentStiffness(Effect):
         ),
     )
 
-    def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def parallel_stiffness(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Stiffness of all twelve rotational springs about the tip."""
         if p["stiffness"] == 0.0:
             return None
         rotations = end_rotations(path).reshape(len(path), 36, 6)
         return np.asarray(p["stiffness"] * np.swapaxes(rotations, 1, 2) @ rotations)
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """What is off, to which side, by how much."""
         return f"the joints resist turning by about {about(p['stiffness'] / 1e3)} kN m/rad at each end of each strut"
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
 from toolpath_stiff.stiffness.truss import free_platform_flexibility
 from toolpath_stiff.units import n_per_um_from_n_per_m
 
@@ -34,7 +31,7 @@ class PlatformFlexibility(Effect):
         ),
     )
 
-    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Quadratic form of the free truss; the tool's length moves the tip node."""
         if np.isinf(p["bar_stiffness"]):
             return None
@@ -47,7 +44,7 @@ class PlatformFlexibility(Effect):
             form[rows] = np.swapaxes(loads[rows], 1, 2) @ flexibility @ loads[rows]
         return form
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """Which part gives way, by how much."""
         stiffness = n_per_um_from_n_per_m(p["bar_stiffness"])
         return f"the platform is flexible: its bars have about {about(stiffness)} N/um each"

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.contract import Effect, about, length_error
+from toolpath_stiff.stiffness.contract import Effect, Values, about, length_error
 
 
 class PlatformRadiusError(Effect):
@@ -32,7 +29,7 @@ class PlatformRadiusError(Effect):
         ),
     )
 
-    def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
+    def geometry(self, machine: Machine, p: Values) -> Machine:
         """Joints on the wider circle; one on the tool axis has no outward direction and stays."""
         joints = machine.platform_joints.copy()
         radius = np.hypot(joints[:, 0], joints[:, 1])
@@ -40,7 +37,7 @@ class PlatformRadiusError(Effect):
         joints[off_axis, :2] *= (1.0 + p["error"] / radius[off_axis])[:, None]
         return machine.with_changes(platform_joints=joints)
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """What is off, to which side, by how much."""
         side = "out" if p["error"] > 0.0 else "in"
         return f"the platform's joints stand about {about(p['error'])} mm further {side} than in the machine file"

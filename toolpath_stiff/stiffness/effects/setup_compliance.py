@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, setup_parameter, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, setup_parameter, sizes_in_words
 
 
 class SetupCompliance(Effect):
@@ -36,7 +33,7 @@ class SetupCompliance(Effect):
         ),
     )
 
-    def load_compliance(self, path: LoadPath, p: Mapping[str, Any]) -> FloatArray | None:
+    def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Quadratic form of the tip force in the rows of the set-up."""
         if path.setup is None:
             return None
@@ -44,7 +41,7 @@ class SetupCompliance(Effect):
         form[path.setup == p["setup"], 6:9, 6:9] = np.diag([p["x"], p["y"], p["z"]])
         return form
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """Which part gives way, by how much."""
         sizes = sizes_in_words([(p[axis], f"nm/N along {axis.upper()}") for axis in "xyz"])
         return f"set-up {p['setup']} (riser or fixture) gives way by about {sizes}"

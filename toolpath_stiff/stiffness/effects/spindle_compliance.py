@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, sizes_in_words
 
 
 class SpindleCompliance(Effect):
@@ -45,14 +42,14 @@ class SpindleCompliance(Effect):
         ),
     )
 
-    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Quadratic form of the tip force alone."""
         form = np.zeros((len(path), 12, 12))
         own = np.diag([p["radial"], p["radial"], p["axial"]])
         form[:, 6:9, 6:9] = path.rotation @ own @ np.swapaxes(path.rotation, 1, 2)
         return form
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """Which part gives way, by how much."""
         sizes = sizes_in_words([(p["radial"], "nm/N across"), (p["axial"], "nm/N along")])
         return f"spindle, holder and tool give way by about {sizes} the tool axis"

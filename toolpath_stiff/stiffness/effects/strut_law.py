@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
 
 
 class StrutLawCurvature(Effect):
@@ -34,7 +31,7 @@ class StrutLawCurvature(Effect):
         ),
     )
 
-    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Difference of the compliances with and without curvature.
 
         On top of a table or a constant law as on top of a straight line; x of a constant law runs from one end of the
@@ -45,7 +42,7 @@ class StrutLawCurvature(Effect):
         x = (2.0 * length - law.length_1 - law.length_2) / (law.length_2 - law.length_1)
         return np.asarray(np.expm1(-p["curvature"] * (1.0 - x * x)) / law.stiffness(length))
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """What is off, to which side, by how much."""
         side = "stiffer" if p["curvature"] > 0.0 else "softer"
         return (

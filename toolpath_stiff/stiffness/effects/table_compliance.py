@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, sizes_in_words
 
 EXPERIENCE = "engineering experience, no source: machine beds are built for 100 to 500 N/um"
 
@@ -49,7 +46,7 @@ class TableCompliance(Effect):
         ),
     )
 
-    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Quadratic form of the tip force, in base axes."""
         x, y, z = path.position.T
         moment = np.zeros((len(path), 2, 3))  # (p x F)_x and (p x F)_y per component of F
@@ -59,7 +56,7 @@ class TableCompliance(Effect):
         form[:, 6:9, 6:9] = np.diag([p["x"], p["y"], p["z"]]) + p["rocking"] * np.swapaxes(moment, 1, 2) @ moment
         return form
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """Which part gives way, by how much."""
         sizes = sizes_in_words(
             [*((p[axis], f"nm/N along {axis.upper()}") for axis in "xyz"), (p["rocking"], "nrad/(N m) in rocking")]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
 
 
 class ThermalDrift(Effect):
@@ -32,14 +29,14 @@ class ThermalDrift(Effect):
         ),
     )
 
-    def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
+    def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
         """Force over the deflection as read; nan where drift against the load swallows the whole deflection."""
         if path.time is None:
             return stiffness
         deflection = path.force / stiffness + p["rate"] * path.time
         return np.where(deflection > 0.0, path.force / np.where(deflection > 0.0, deflection, 1.0), np.nan)
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """What is off, to which side, by how much."""
         side = "larger" if p["rate"] > 0.0 else "smaller"
         return f"the indicator drifts by about {about(p['rate'])} um/min towards {side} deflection while it is read"

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.contract import Effect, about, length_error
+from toolpath_stiff.stiffness.contract import Effect, Values, about, length_error
 
 
 class ToolLengthError(Effect):
@@ -28,11 +25,11 @@ class ToolLengthError(Effect):
         ),
     )
 
-    def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
+    def geometry(self, machine: Machine, p: Values) -> Machine:
         """Platform joints further above the tip."""
         return machine.with_changes(platform_joints=machine.platform_joints + np.array([0.0, 0.0, p["error"]]))
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """What is off, to which side, by how much."""
         side = "longer" if p["error"] > 0.0 else "shorter"
         return f"the tool is about {about(p['error'])} mm {side} than the length that was entered"

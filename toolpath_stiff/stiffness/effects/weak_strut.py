@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
 
 
 class WeakStrut(Effect):
@@ -43,14 +40,14 @@ class WeakStrut(Effect):
         ),
     )
 
-    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+    def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """What this strut's compliance is above the law's."""
         more = np.zeros((len(path), 6))
         which = int(p["strut"]) - 1
         more[:, which] = (1.0 / p["factor"] - 1.0) / path.machine.strut_law.stiffness(path.struts.lengths[:, which])
         return more
 
-    def finding(self, p: Mapping[str, Any]) -> str:
+    def finding(self, p: Values) -> str:
         """What is off, to which side, by how much."""
         change = 100.0 * (p["factor"] - 1.0)
         return f"strut {p['strut']} is about {about(change)} % too {'soft' if change < 0.0 else 'stiff'}"
