@@ -15,8 +15,10 @@ from toolpath_stiff.machine.kinematics import (
     neutral_axes,
     neutral_determinant,
     singularity_index,
+    solve_struts_at,
 )
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 # What limits bound: strut lengths, swing of the joints at frame and platform, the tool tip, the singularity index.
@@ -165,6 +167,13 @@ def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: Array
     worst = np.argmin(margins, axis=1)
     rows = np.arange(len(tip))
     return Reach(margins[rows, worst], worst, values[rows, worst], limits)
+
+
+def stand(machine: Machine, pose: ArrayLike) -> tuple[FloatArray, Struts, Reach]:
+    """A pose (6,), m and rad, the struts there, and how it stands to the limits."""
+    values = np.asarray(pose, dtype=float)
+    struts = solve_struts_at(machine, values)
+    return values, struts, reach(machine, values[:3], struts, rotation_matrices(values[None, 3:]))
 
 
 # A cosine above this is no measure of an angle: rounding moves the arc cosine by more than 1e-15 rad.

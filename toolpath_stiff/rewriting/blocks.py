@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.code import M_STATE, M_STOP, MOTION, ONCE
 from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.motion import ARCS
 from toolpath_stiff.nc.codes.registry import CODES
@@ -42,9 +41,9 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     current = begin(source, block)
     if current.flow is not Flow.NEXT:
         raise controls.refusal(SUBPROGRAM, "expand the subprograms first")
-    if M_STATE in current.groups:
+    if "M modal state" in current.groups:
         raise controls.refusal("saved modes (M70 to M73) cannot be rewritten", "write the modes out")
-    if {source.motion, current.groups.get(MOTION)} & {"G33", "G33.1"}:
+    if {source.motion, current.groups.get("motion")} & {"G33", "G33.1"}:
         raise controls.refusal("spindle-synchronised motion (G33) cannot be rewritten", "leave it out")
     if source.cutter is not None:
         raise controls.refusal(COMPENSATION, "post the program with the path of the tool centre")
@@ -64,7 +63,7 @@ def _lines(
 ) -> tuple[list[str], bool]:
     """The lines, and whether they are one move cut into pieces."""
     source = controls.source
-    once = current.groups.get(ONCE)
+    once = current.groups.get("non-modal")
     if not controls.trace:
         return [controls.emit(edit)], False
     last = controls.trace[-1]
@@ -274,7 +273,7 @@ def _one_by_one(
     pieces: Sequence[Piece],
 ) -> list[str]:
     """Straight moves, the first in the block's own line."""
-    stop = current.code(M_STOP)
+    stop = current.code("M stop")
     if stop is not None:
         raise controls.refusal(f"{stop[0]} in a block that is written as several", "give it a block of its own")
     edit.remove("IJKRPLQ")

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.code import MOTION, PLANE
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.state import CurrentBlock, Segment, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
@@ -197,7 +196,7 @@ class Controls:
 
     def plane_word(self, current: CurrentBlock, edit: LineEdit, before: str) -> str:
         """Turn the plane word of the block, if it has one; the plane that will be in force."""
-        given = current.code(PLANE)
+        given = current.code("plane")
         if given is None:
             return before
         image = self.image(given[0])
@@ -208,7 +207,7 @@ class Controls:
 
     def motion_word(self, current: CurrentBlock | None, edit: LineEdit, wanted: str) -> None:
         """Make sure that the block is executed in the motion mode wanted."""
-        given = None if current is None else current.code(MOTION)
+        given = None if current is None else current.code("motion")
         if given is None:
             if self.out.motion != wanted:
                 edit.add_code(wanted)

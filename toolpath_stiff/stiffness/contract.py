@@ -391,7 +391,14 @@ class Effect:
 
     @property
     def hooks(self) -> list[str]:
-        """Which of `HOOKS` it implements."""
+        """Which of `HOOKS` it implements.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.effects()["weak_strut"].hooks
+        ['strut_compliance']
+        """
         return [hook for hook in HOOKS if getattr(type(self), hook) is not getattr(Effect, hook)]
 
     @property
