@@ -195,7 +195,7 @@ class _Session:
 
     def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
         request = self.request
-        follower = Follower(request.name, self.lines, request.tool_table, request.posted is not None, reference)
+        follower = Follower(request.name, self.lines, request.tool_table, request.posted, reference)
         follower.follow(run.canon)
         return follower
 
