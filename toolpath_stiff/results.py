@@ -114,7 +114,6 @@ class FolderResult(Result):
 
     inputs: tuple[str, ...] = ()  # files that were read, which must not be written over
 
-    @abstractmethod
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """Name -> content, or what makes it, of every file that `save` writes; pictures and pages with `plots`.
 
@@ -124,6 +123,8 @@ class FolderResult(Result):
         >>> list(tps.map_stiffness("nist", points=5).files())
         ['map.csv', 'map.json', 'map.png', 'map.html']
         """
+        contents: Mapping[str, Content | Callable[[], Content]] = self.view.files(self, plots=plots)
+        return contents
 
     def save(
         self,

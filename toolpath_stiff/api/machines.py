@@ -8,7 +8,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from toolpath_stiff.api.inputs import Program, pose_si
+from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.options import Option, checked
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.machine.kinematics import Struts
     from toolpath_stiff.machine.limits import Reach
     from toolpath_stiff.machine.model import Machine as MachineData
+    from toolpath_stiff.nc.program import Program
     from toolpath_stiff.stiffness.contract import Conditions
     from toolpath_stiff.stiffness.model import StiffnessModel
 

@@ -21,7 +21,6 @@ from toolpath_stiff.cli.outputs import (
     written_text,
 )
 from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, Command, given, own
-from toolpath_stiff.cli.program import machine_for
 from toolpath_stiff.cli.progress import progress_line
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, hint
@@ -37,6 +36,11 @@ examples:
   tps machine from-linuxcnc programs/hexapod.hal --units mm -o hexapod.toml
   tps machine recover                               the NIST geometry from the paper's Table 1, fitted anew
 """
+
+
+def machine_for(args: Namespace) -> Machine:
+    """The machine that the options describe. Raises `InputError`."""
+    return Machine.load(**given(args, Machine.load)).under(**given(args, Machine.under))
 
 
 def pose(args: Namespace) -> int:

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from toolpath_stiff.api import correction, diagnosis
 from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.cli.outputs import check_made, check_single, destination, keep, show, written_text
 from toolpath_stiff.cli.parser import DATA, FOLDER, JSON, NO_PLOTS, REPLACE, Command, given, own
 from toolpath_stiff.cli.program import program_for
 from toolpath_stiff.cli.progress import progress_line
 from toolpath_stiff.files import write_atomically
+from toolpath_stiff.nc.program import Program
 
 
 def measured(args: Namespace) -> tuple[Measurements, Machine]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.options import Argument, Option, arguments_of
+from toolpath_stiff.options import SWITCHES, Argument, Option, arguments_of
 
 # argparse takes "-10,0,800" or "-300:300" for an option; this matches every value that begins like a negative number.
 NEGATIVE_VALUE = re.compile(r"^-(\d|\.\d|inf|nan)")
@@ -135,8 +135,6 @@ class Parser(argparse.ArgumentParser):
 
 def whole_options(words: Sequence[str]) -> list[str]:
     """`--block-delete` before anything but switches is the whole option: what follows is a program."""
-    from toolpath_stiff.api.inputs import SWITCHES
-
     return [
         f"{word}=" if word == "--block-delete" and not SWITCHES.fullmatch(after) else word
         for word, after in zip(words, [*words[1:], ""], strict=False)

@@ -6,9 +6,10 @@ from argparse import Namespace
 from pathlib import Path
 
 from toolpath_stiff.api import case_studies, placements, programs
+from toolpath_stiff.cli.machine import machine_for
 from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell_incomplete
 from toolpath_stiff.cli.parser import FOLDER, PROGRAM, Command, given, own
-from toolpath_stiff.cli.program import READ, machine_for, program_for
+from toolpath_stiff.cli.program import READ, program_for
 from toolpath_stiff.cli.progress import progress_line
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names

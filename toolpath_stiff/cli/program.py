@@ -10,13 +10,14 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.api import programs
-from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.cli.machine import machine_for
 from toolpath_stiff.cli.outputs import check_single, destination, keep, show, written_text
 from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, Command, given, own
 from toolpath_stiff.cli.progress import progress_line, say
 from toolpath_stiff.defaults import one_thread
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import Argument
 
 if TYPE_CHECKING:
@@ -36,11 +37,6 @@ CLUSTER = own(
     "(pip install 'toolpath-stiff[cluster]')",
 )
 READ = (Program.read, Machine.load, Machine.under)
-
-
-def machine_for(args: Namespace) -> Machine:
-    """The machine that the options describe. Raises `InputError`."""
-    return Machine.load(**given(args, Machine.load)).under(**given(args, Machine.under))
 
 
 def program_for(args: Namespace, file: str) -> Program:

@@ -301,7 +301,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
     if not singles or any(pair.log_evidence > least for pair in pairs):
         # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
         evidence |= {pair.names: pair.log_evidence for pair in tried}
-        triples, found = _standing(search_triples(problem, search, base, bool(pairs)), evidence, fits, passes)
+        triples, found = _standing(search_triples(search, bool(pairs)), evidence, fits, passes)
         pairs, tried = [*pairs, *triples], [*tried, *found]
     # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
     none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE

@@ -11,7 +11,7 @@ from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis, tool_poses
-from toolpath_stiff.nc.moves import RAPID, Moves, Program, ToolUse
+from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram, ToolUse
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.recovery import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
@@ -42,8 +42,8 @@ class OnThePart:
 
 
 def recovered(
-    program: Program, kinematics: PostedKinematics, tip_held: Sequence[tuple[int, bool]], origin: Pose, source: str
-) -> Program:
+    program: ReadProgram, kinematics: PostedKinematics, tip_held: Sequence[tuple[int, bool]], origin: Pose, source: str
+) -> ReadProgram:
     """A program as read for its own machine, with the moves of the tool on the part.
 
     Parameters

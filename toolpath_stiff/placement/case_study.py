@@ -23,7 +23,7 @@ from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
@@ -116,13 +116,13 @@ class CaseStudy(FolderResult):
         return cast("Mapping[str, Content]", self.view.files(self, plots=plots))
 
 
-def case_study_program() -> Program:
+def case_study_program() -> ReadProgram:
     """The packaged path."""
     text = (resources.files("toolpath_stiff") / "data" / "programs" / PROGRAM).read_text(encoding="ascii")
     return parse_program(text, PROGRAM)
 
 
-def wavy_program(amplitude_mm: float) -> Program:
+def wavy_program(amplitude_mm: float) -> ReadProgram:
     """The square with its height going up and down once along every side: a non-planar cut of the same outline."""
     lines = ["G21 G90 F1200", "G0 X-100 Y-100 Z0"]
     corners = [(-100, -100), (100, -100), (100, 100), (-100, 100), (-100, -100)]
@@ -142,7 +142,7 @@ def origin_of(x_mm: float, y_mm: float, z_mm: float, turn_deg: float) -> Pose:
 def run_case_study(
     model: StiffnessModel,
     step: float = defaults.STEP,
-    read: Callable[[Pose], Program] | None = None,
+    read: Callable[[Pose], ReadProgram] | None = None,
     regions: Mapping[str, Region] | None = None,
     inputs: tuple[str, ...] = (),
 ) -> CaseStudy:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.files import Content
 from toolpath_stiff.planning.gap_map import GapMap, gap_map, group_of, height_groups
-from toolpath_stiff.planning.next_visit import TABLES, tables_of
 from toolpath_stiff.planning.plan import RivalPlan
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.rows import plan_csv
+from toolpath_stiff.planning.tables import TABLES, tables_of
 from toolpath_stiff.planning.visits import Visits
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, picture
 from toolpath_stiff.report.words import plain, shortened
@@ -206,13 +206,13 @@ def figure(plan: Plan) -> Figure:
 def _picture_arguments(plan: Plan) -> tuple[Any, ...]:
     choice, name = plan.choice, plan.machine.name
     if isinstance(choice, RivalPlan):
-        gap = gap_map(plan.machine, choice, plan.menu, plan.effect_files)
+        gap = gap_map(plan.machine, choice, plan.effect_files)
         title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
         text = f"machine {name}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
         return choice.visits, choice.chosen, choice.kinds, gap, title, text
     clampings, readings = len(choice.visits), len(choice.visits.readings)
     text = f"machine {name}   ·   {clampings} clampings, {readings} readings; lines: where spindles lean"
-    return choice.visits, range(clampings), choice.purposes, None, "A first campaign", text
+    return choice.visits, choice.chosen, choice.kinds, None, "A first campaign", text
 
 
 def names(plots: bool = True) -> tuple[str, ...]:
@@ -224,7 +224,7 @@ def files(plan: Plan, *, plots: bool = True) -> dict[str, Content]:
     """The measurement file to fill in, the document as JSON, and with `plots` the picture."""
     contents: dict[str, Content] = {"plan.csv": plan_csv(plan.rows), "plan.json": plan.to_json()}
     if isinstance(plan.choice, RivalPlan):
-        contents[TABLES] = tables_of(plan)
+        contents[TABLES] = tables_of(plan.choice)
     return contents | ({"plan.png": plan_picture(*_picture_arguments(plan))} if plots else {})
 
 

@@ -8,12 +8,11 @@ from collections.abc import Sequence
 
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.code import M_STATE, M_STOP, MOTION, ONCE
 from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.motion import ARCS
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
-from toolpath_stiff.nc.moves import RAPID, Arc
+from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import CurrentBlock, Flow
 from toolpath_stiff.nc.words import AXES, POLAR, Block, read_block
 from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
@@ -21,7 +20,10 @@ from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, points_betw
 
 HALF_CIRCLE = 0.999  # chord over diameter, from which R magnifies a rounded end more than twenty times
 NEAR = 2.0  # units by which the centre of an arc given by R may miss its place; beyond, I, J, K are written
+Piece = tuple[str, list[float], float]  # G0 or G1, end in the set-up frame, dwell after it in s
 SLASH = re.compile(r"\s*/\d*")
+SUBPROGRAM = "a subprogram (M98, M99) cannot be rewritten: it may run at several places"
+COMPENSATION = "cutter compensation (G41, G42) cannot be rewritten"
 LINEARISE = (
     f"give {both_names('--linearise', 'MM')} to have straight moves within MM of it, "
     "or place the work without that turn"
@@ -38,18 +40,13 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     first, first_out = len(source.recorder.line), len(out.recorder.line)
     current = begin(source, block)
     if current.flow is not Flow.NEXT:
-        raise controls.refusal(
-            "a subprogram (M98, M99) cannot be rewritten: it may run at several places",
-            "expand the subprograms first",
-        )
-    if M_STATE in current.groups:
+        raise controls.refusal(SUBPROGRAM, "expand the subprograms first")
+    if "M modal state" in current.groups:
         raise controls.refusal("saved modes (M70 to M73) cannot be rewritten", "write the modes out")
-    if source.motion in ("G33", "G33.1") or current.groups.get(MOTION) in ("G33", "G33.1"):
+    if {source.motion, current.groups.get("motion")} & {"G33", "G33.1"}:
         raise controls.refusal("spindle-synchronised motion (G33) cannot be rewritten", "leave it out")
     if source.cutter is not None:
-        raise controls.refusal(
-            "cutter compensation (G41, G42) cannot be rewritten", "post the program with the path of the tool centre"
-        )
+        raise controls.refusal(COMPENSATION, "post the program with the path of the tool centre")
     axes = [letter for letter in AXES if current.has(letter)]
     plane_before = out.plane
     begin(out, block)
@@ -66,7 +63,7 @@ def _lines(
 ) -> tuple[list[str], bool]:
     """The lines, and whether they are one move cut into pieces."""
     source = controls.source
-    once = current.groups.get(ONCE)
+    once = current.groups.get("non-modal")
     if not controls.trace:
         return [controls.emit(edit)], False
     last = controls.trace[-1]
@@ -81,21 +78,20 @@ def _lines(
         _home(controls, edit, axes)
     elif source.motion in CYCLES:
         if controls.matrix[geometry.PLANES[source.plane][2], geometry.PLANES[source.plane][2]] != 1.0:
-            return _cycle_in_moves(controls, current, edit, axes, first), False
+            return _one_by_one(controls, current, edit, axes, _cycle_in_moves(controls, first)), False
         _cycle(controls, current, edit, axes, plane)
     else:
-        count = _piece_count(controls, last.motion, last.start, last.end, last.arc)
+        count = _piece_count(controls)
         if count > 1:
-            return _in_pieces(controls, current, edit, axes, count), True
+            start, end = (source.frames.to_setup(point) for point in (last.start, last.end))
+            points = points_between(start, end, last.arc, count)
+            return _one_by_one(controls, current, edit, axes, [("G1", point, 0.0) for point in points]), True
         if last.arc is None:
             controls.motion_word(current, edit, source.motion or "")
             controls.go(edit, controls.target(last.end), axes)
         else:
             _arc(controls, current, edit, axes, plane)
     return [controls.emit(edit)], False
-
-
-# -- homes -----------------------------------------------------------------------------------------------------
 
 
 def _home(controls: Controls, edit: LineEdit, axes: list[str]) -> None:
@@ -117,9 +113,6 @@ def _home(controls: Controls, edit: LineEdit, axes: list[str]) -> None:
     controls.go(edit, controls.target(controls.trace[0].end), axes, only=named)
 
 
-# -- arcs ------------------------------------------------------------------------------------------------------
-
-
 def _arc(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], plane: str) -> None:
     source = controls.source
     image, last = controls.image(source.plane), controls.trace[-1]
@@ -135,26 +128,19 @@ def _arc(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[s
     target = controls.target(last.end)
     start, end = (source.frames.to_program(point) for point in (last.start, last.end))
     chord = math.dist(*([point[axis] for axis in geometry.PLANES[source.plane][:2]] for point in (start, end)))
-    if chord < SAME:
-        _full_circle(controls, edit, target, axes, normal)
-    else:
+    if chord >= SAME:
         controls.go(edit, target, axes)
+    else:  # a circle ends on its own start to the last digit, or it is none: words that cannot say so are left out
+        here = controls.out.frames.to_program(controls.out.frames.position)
+        for axis in (axis for axis in range(3) if axis != normal and AXES[axis] in axes):
+            place = here[axis] / controls.scale(axis)
+            if controls.out.absolute and abs(round(place, controls.digits) - place) > SAME:
+                edit.remove(AXES[axis])
+            else:
+                edit.write(AXES[axis], place if controls.out.absolute else 0.0)
+        along = [normal, 3, 4, 5]
+        controls.go(edit, target, [letter for letter in axes if AXES.index(letter) in along], only=along)
     _center(controls, edit, last.arc.center, code == "G2", (first, second), chord)
-
-
-def _full_circle(controls: Controls, edit: LineEdit, target: list[float], axes: list[str], normal: int) -> None:
-    """A circle ends on its own start to the last digit, or it is none: words that cannot say so are left out."""
-    here = controls.out.frames.to_program(controls.out.frames.position)
-    for axis in range(3):
-        place = here[axis] / controls.scale(axis)
-        if axis == normal or AXES[axis] not in axes:
-            continue
-        if controls.out.absolute and abs(round(place, controls.digits) - place) > SAME:
-            edit.remove(AXES[axis])
-        else:
-            edit.write(AXES[axis], place if controls.out.absolute else 0.0)
-    along = [normal, 3, 4, 5]
-    controls.go(edit, target, [letter for letter in axes if AXES.index(letter) in along], only=along)
 
 
 def _center(
@@ -170,7 +156,8 @@ def _center(
     there = out.frames.to_program(controls.of_setup([*center, 0.0, 0.0, 0.0]))
     here = out.frames.to_program(out.frames.position)
     if edit.word("R") is not None:
-        if _radius_says(controls, edit, here, there, clockwise, plane, exact_chord):
+        by_radius = _center_by_radius(controls, edit, here, clockwise, plane, exact_chord)
+        if by_radius and math.dist(by_radius, [there[axis] for axis in plane]) <= NEAR * controls.unit:
             return
         edit.remove("R")
     letters = [geometry.CENTER_WORDS[axis] for axis in plane]
@@ -181,37 +168,30 @@ def _center(
             edit.write(letter, value)
 
 
-def _radius_says(
+def _center_by_radius(
     controls: Controls,
     edit: LineEdit,
     here: Sequence[float],
-    center: Sequence[float],
     clockwise: bool,
     plane: tuple[int, int],
     exact_chord: float,
-) -> bool:
-    """Whether R with the rounded ends puts the centre where it belongs; near half circles it does not."""
-    radius = edit.word("R")
-    assert radius is not None
-    end = list(here)
+) -> geometry.Point2 | None:
+    """The centre that R gives with the rounded ends; None near half circles, where R magnifies the rounding."""
+    end, size = list(here), 0.0
     for word in read_block(edit.render(), controls.block.line, controls.source.name).words:
         if word.letter in AXES:
             axis = AXES.index(word.letter)
-            value = word.value * controls.scale(axis)
-            end[axis] = value if controls.out.absolute else here[axis] + value
-    first, second = plane
-    size = radius.value * controls.scale(first)
-    chord = math.dist((here[first], here[second]), (end[first], end[second]))
+            end[axis] = word.value * controls.scale(axis) + (0.0 if controls.out.absolute else here[axis])
+        elif word.letter == "R":
+            size = word.value * controls.scale(plane[0])
+    first, last = ((point[plane[0]], point[plane[1]]) for point in (here, end))
+    chord = math.dist(first, last)
     if abs(chord - exact_chord) > SAME and chord > HALF_CIRCLE * 2.0 * abs(size):
-        return False
+        return None
     try:
-        found = geometry.center_from_radius((here[first], here[second]), (end[first], end[second]), size, clockwise)
+        return geometry.center_from_radius(first, last, size, clockwise)
     except geometry.ArcError:
-        return False
-    return math.dist(found, (center[first], center[second])) <= NEAR * controls.unit
-
-
-# -- cycles ----------------------------------------------------------------------------------------------------
+        return None
 
 
 def _cycle(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], plane: str) -> None:
@@ -235,46 +215,46 @@ def _cycle(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list
             edit.write(letter, height / controls.scale(normal))
 
 
-def _cycle_in_moves(
-    controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], first: int
-) -> list[str]:
-    """A cycle along an axis that is none any more: its moves, rapids and dwells, one a line."""
-    source = controls.source
+def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
+    """The moves, rapids and dwells of a cycle along an axis that is none any more."""
+    source, rows = controls.source, controls.source.recorder
     if controls.linearise is None:
         axis = AXES[geometry.PLANES[source.plane][2]]
         raise controls.refusal(
             f"{source.motion} drills along {axis}, and the placement turns the work out of it", LINEARISE
         )
     controls.note("drilling cycles are written as their single moves")
-    rows = source.recorder
-    pieces = [
-        ("G0" if rows.motion[i] == RAPID else "G1", rows.end[i], rows.dwell[i]) for i in range(first, len(rows.line))
-    ]
-    return _one_by_one(controls, current, edit, axes, pieces)
+    moves = zip(rows.motion[first:], rows.end[first:], rows.dwell[first:], strict=True)
+    return [("G0" if motion == RAPID else "G1", end, dwell) for motion, end, dwell in moves]
 
 
-# -- pieces ----------------------------------------------------------------------------------------------------
-
-
-def _piece_count(controls: Controls, motion: int, start: list[float], end: list[float], arc: Arc | None) -> int:
+def _piece_count(controls: Controls) -> int:
     """Into how many pieces a move must be cut; those that must be are refused, unless it was asked for."""
+    motion, start, end, arc = controls.trace[-1]
     off_plane = arc is not None and controls.image(controls.source.plane) is None
     leaning = 0.0
     if motion != RAPID and controls.turn.turns and start[3:] != end[3:]:
         written = controls.out.frames.position[3:], controls.target(end)[3:]
         leaning = lean(controls.turn, (start[3:], end[3:]), written)
-    if not off_plane and leaning == 0.0:
-        return 1
     if controls.linearise is None:
-        _refuse_to_cut(controls, off_plane, leaning)
+        if off_plane:
+            plane = controls.source.plane
+            raise controls.refusal(
+                f"an arc of {plane}, turned with the work, lies in none of the planes G17, G18, G19", LINEARISE
+            )
+        if leaning > LEAN:
+            raise controls.refusal(
+                f"between its ends the tool would lean {leaning:.3g} degrees away from its placed direction, as a "
+                "control interpolates A, B and C",
+                LINEARISE,
+            )
+    if controls.linearise is None or (not off_plane and leaning == 0.0):
         return 1
     tolerance = controls.linearise - controls.unit
     if tolerance < controls.unit:
-        raise controls.refusal(
-            f"{both_names('--linearise', f'{controls.linearise:g}')} is no more than the rounding to "
-            f"{controls.digits} decimals",
-            "give more of it, or more --decimals",
-        )
+        option = both_names("--linearise", f"{controls.linearise:g}")
+        found = f"{option} is no more than the rounding to {controls.digits} decimals"
+        raise controls.refusal(found, "give more of it, or more --decimals")
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
     if arc is not None and (off_plane or count > 1):
         controls.note(
@@ -285,38 +265,15 @@ def _piece_count(controls: Controls, motion: int, start: list[float], end: list[
     return count
 
 
-def _refuse_to_cut(controls: Controls, off_plane: bool, leaning: float) -> None:
-    if off_plane:
-        raise controls.refusal(
-            f"an arc of {controls.source.plane}, turned with the work, lies in none of the planes G17, G18, G19",
-            LINEARISE,
-        )
-    if leaning > LEAN:
-        raise controls.refusal(
-            f"between its ends the tool would lean {leaning:.3g} degrees away from its placed direction, as a control "
-            "interpolates A, B and C",
-            LINEARISE,
-        )
-
-
-def _in_pieces(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], count: int) -> list[str]:
-    """A cutting move as `count` straight ones."""
-    source = controls.source
-    last = controls.trace[-1]
-    start, end = (source.frames.to_setup(point) for point in (last.start, last.end))
-    points = points_between(start, end, last.arc, count)
-    return _one_by_one(controls, current, edit, axes, [("G1", point, 0.0) for point in points])
-
-
 def _one_by_one(
     controls: Controls,
     current: CurrentBlock,
     edit: LineEdit,
     axes: list[str],
-    pieces: Sequence[tuple[str, list[float], float]],
+    pieces: Sequence[Piece],
 ) -> list[str]:
-    """Straight moves (code, end in the set-up frame, dwell after it in s), the first in the block's own line."""
-    stop = current.code(M_STOP)
+    """Straight moves, the first in the block's own line."""
+    stop = current.code("M stop")
     if stop is not None:
         raise controls.refusal(f"{stop[0]} in a block that is written as several", "give it a block of its own")
     edit.remove("IJKRPLQ")

@@ -13,7 +13,7 @@ import numpy as np
 from toolpath_stiff.analysis.grid import map_stiffness
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.placement.result import Placement
+from toolpath_stiff.placement.result import Placement, Written
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
 from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.report.profile import profile_curve
@@ -241,7 +241,7 @@ def _rows(placed: Placement) -> list[tuple[str, list[str]]]:
         ("heights of the cut", f"Z {heights.min():.3f} to {heights.max():.3f} mm (machine)"),
         ("LinuxCNC", blocks.linuxcnc or blocks.linuxcnc_reason),
         ("Fanuc-style", fanuc + (f"\n{G68_NOTE}" if "G68" in blocks.fanuc else "")),
-        *([("program written", written["file"])] if written and "refused" not in written else []),
+        *([("program written", written.file)] if isinstance(written, Written) else []),
         ("mean stiffness", _both(row, before, "mean_N_per_mm")),
         ("range", _both(row, before, "range_N_per_mm")),
         ("weakest place", _both(row, before, "min_N_per_mm")),
