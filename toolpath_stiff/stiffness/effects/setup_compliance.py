@@ -7,7 +7,6 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance, setup_parameter, sizes_in_words
 
-
 EXPERIENCE = "engineering experience, no source"
 
 
@@ -23,13 +22,7 @@ class SetupCompliance(Effect):
     parameters = (
         setup_parameter("name of the set-up"),
         *(
-            compliance(
-                axis,
-                largest=200.0,
-                typical=(1.0, 10.0),
-                source=EXPERIENCE,
-                meaning=f"compliance of this set-up along {axis.upper()}",
-            )
+            compliance(axis, 200.0, (1.0, 10.0), EXPERIENCE, f"compliance of this set-up along {axis.upper()}")
             for axis in "xyz"
         ),
     )
