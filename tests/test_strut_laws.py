@@ -270,7 +270,7 @@ def test_update_refits_the_law_in_its_own_form(law, tmp_path):
     assert ends[0]["stiffness"] == pytest.approx(found.stiffness_1 / 1e6, rel=1e-4)
     if truth.constant:
         assert len(ends) == 1 and ends[0]["length_mm"] is None
-    said = update_text(update.to_dict())
+    said = update_text(update)
     assert ("N/um at every length" in said) == truth.constant
     assert ("N/um at 2561.6 mm and" in said) != truth.constant
 

@@ -28,14 +28,11 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.by_hand import Preview as Preview
     from toolpath_stiff.api.by_hand import preview as preview
     from toolpath_stiff.api.case_studies import case_study as case_study
-    from toolpath_stiff.api.correction import Update as Update
     from toolpath_stiff.api.correction import plan as plan
     from toolpath_stiff.api.correction import update as update
     from toolpath_stiff.api.diagnosis import Measurements as Measurements
     from toolpath_stiff.api.diagnosis import compare as compare
     from toolpath_stiff.api.diagnosis import diagnose as diagnose
-    from toolpath_stiff.api.effects import EffectDraft as EffectDraft
-    from toolpath_stiff.api.effects import EffectFile as EffectFile
     from toolpath_stiff.api.effects import check_effects as check_effects
     from toolpath_stiff.api.effects import draft_effect as draft_effect
     from toolpath_stiff.api.effects import effect_template as effect_template
@@ -60,6 +57,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.programs import sample_path as sample_path
     from toolpath_stiff.case.case import Case as Case
     from toolpath_stiff.comparison.compare import Comparison as Comparison
+    from toolpath_stiff.correction.draft import EffectDraft as EffectDraft
+    from toolpath_stiff.correction.result import Update as Update
     from toolpath_stiff.diagnosis.result import Diagnosis as Diagnosis
     from toolpath_stiff.errors import EffectError as EffectError
     from toolpath_stiff.errors import EffectFault as EffectFault
@@ -86,6 +85,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.stiffness.catalogue import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.stiffness.contract import Effect as Effect
     from toolpath_stiff.stiffness.contract import Parameter as Parameter
+    from toolpath_stiff.stiffness.effect_file import EffectFile as EffectFile
     from toolpath_stiff.stiffness.trial import EffectCheck as EffectCheck
 
 __version__ = _VERSION
@@ -99,9 +99,9 @@ _PUBLIC = {
     "analysis.results": ("Analysis",),
     "api.by_hand": ("Preview", "preview"),
     "api.case_studies": ("case_study",),
-    "api.correction": ("Update", "plan", "update"),
+    "api.correction": ("plan", "update"),
     "api.diagnosis": ("Measurements", "compare", "diagnose"),
-    "api.effects": ("EffectDraft", "EffectFile", "check_effects", "draft_effect", "effect_template", "effects"),
+    "api.effects": ("check_effects", "draft_effect", "effect_template", "effects"),
     "api.machines": ("Machine", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.next_visits": ("next_visit",),
@@ -110,6 +110,8 @@ _PUBLIC = {
     "api.programs": ("analyze", "check", "sample_path"),
     "case.case": ("Case",),
     "comparison.compare": ("Comparison",),
+    "correction.draft": ("EffectDraft",),
+    "correction.result": ("Update",),
     "diagnosis.result": ("Diagnosis",),
     "errors": (
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
@@ -126,6 +128,7 @@ _PUBLIC = {
     "rewriting.program": ("RewrittenProgram",),
     "stiffness.catalogue": ("EffectCatalogue",),
     "stiffness.contract": ("Effect", "Parameter"),
+    "stiffness.effect_file": ("EffectFile",),
     "stiffness.trial": ("EffectCheck",),
 }  # fmt: skip
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}
