@@ -61,6 +61,7 @@ class Update(FolderResult):
     """
 
     command: ClassVar[str] = "update"
+    shown_by: ClassVar[str] = "update.page"
 
     def __init__(self, correction: Correction, asked: Question) -> None:
         from toolpath_stiff.correction.document import document
