@@ -12,7 +12,7 @@ from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.options import checked
-from toolpath_stiff.results import Progress, Result, teller
+from toolpath_stiff.results import Progress, TextFile, teller
 
 if TYPE_CHECKING:
     from toolpath_stiff.correction.draft import Draft
@@ -67,7 +67,7 @@ def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> E
     return EffectCheck(str(file), on.name, trials)
 
 
-class EffectFile(Result):
+class EffectFile(TextFile):
     """The text of a file with an effect.
 
     Attributes
@@ -90,24 +90,9 @@ class EffectFile(Result):
 
     command: ClassVar[str] = "effects"
 
-    def __init__(self, name: str, text: str) -> None:
-        self.name, self.text = name, text
-
     def to_dict(self) -> dict[str, Any]:
         """Name and text."""
         return {"effect": self.name, "text": self.text}
-
-    def __str__(self) -> str:
-        return self.text
-
-    def _short(self) -> str:
-        return f"{self.name}, {len(self.text.splitlines())} lines"
-
-    def save(self, file: str | Path) -> Path:
-        """Write the file, whole or not at all."""
-        from toolpath_stiff.files import write_atomically
-
-        return write_atomically(file, self.text)
 
 
 class EffectDraft(EffectFile):

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si
+from toolpath_stiff.api.inputs import finite, pose_si
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.case.contents import reading_arguments
@@ -39,6 +39,7 @@ from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import FileError, InputError, TpsError
 from toolpath_stiff.files import read_bytes, reason
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import arguments_of
 
 if TYPE_CHECKING:
@@ -478,7 +479,7 @@ class Case(BlindExercise):
     def _check_effect(self, name: str, values: Mapping[str, Any], on: bool) -> None:
         from toolpath_stiff.machine.model import EffectEntry
         from toolpath_stiff.stiffness.catalogue import find_effect
-        from toolpath_stiff.stiffness.contract import read_parameters
+        from toolpath_stiff.stiffness.parameters import read_parameters
 
         effect = find_effect(name, [self.path(one) for one in self.state.effects])
         if on:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, cast
 
 from toolpath_stiff.api.by_hand import Preview, preview, with_effects
 from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.inputs import Program, Reading
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.case.files import used_name
 from toolpath_stiff.case.steps import TABLES, History
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.nc.program import Program, Reading
 
 if TYPE_CHECKING:
     from toolpath_stiff.case.steps import Step

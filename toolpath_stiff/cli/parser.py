@@ -14,7 +14,7 @@ import toolpath_stiff as tps
 from toolpath_stiff.cli.outputs import read_folders, tell_incomplete
 from toolpath_stiff.cli.progress import progress_line
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.options import Argument, Option, arguments_of
+from toolpath_stiff.options import SWITCHES, Argument, Option, arguments_of
 
 Made = TypeVar("Made")
 # argparse takes "-10,0,800" or "-300:300" for an option; this matches every value that begins like a negative number.
@@ -146,8 +146,6 @@ class Parser(argparse.ArgumentParser):
 
 def whole_options(words: Sequence[str]) -> list[str]:
     """`--block-delete` before anything but switches is the whole option: what follows is a program."""
-    from toolpath_stiff.api.inputs import SWITCHES
-
     return [
         f"{word}=" if word == "--block-delete" and not SWITCHES.fullmatch(after) else word
         for word, after in zip(words, [*words[1:], ""], strict=False)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
@@ -22,6 +22,9 @@ from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, ra
 
 if TYPE_CHECKING:
     from toolpath_stiff.readings.loops import LoopReading
+
+
+Parsed = TypeVar("Parsed")
 
 
 LOOP_COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # of a measurement file, for loops beside the tip alone
@@ -204,6 +207,18 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
     columns = {name for name in heading if name in KNOWN}
     return RowFile(tuple(rows), frozenset(columns), tuple(notes))
+
+
+def parsed_rows(table: Table, parse: Callable[[int, dict[str, str]], Parsed]) -> tuple[list[Parsed], list[InputError]]:
+    """What `parse` makes of each row's line and record, and the errors of the others."""
+    parsed: list[Parsed] = []
+    errors: list[InputError] = []
+    for line, cells in table.rows:
+        try:
+            parsed.append(parse(line, table.record(cells)))
+        except InputError as error:
+            errors.append(error.in_line(table.file, line))
+    return parsed, errors
 
 
 def _needed(heading: list[str], planned: bool) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
+from toolpath_stiff.readings.raw_rows import loop_entry
 from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.report.history import dated, history_png, history_text
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.readings.loop_figures import LoopFigures
     from toolpath_stiff.readings.raw import Reduction
-    from toolpath_stiff.readings.raw_records import Loop
 
 
 COLUMNS = 4
@@ -28,7 +28,7 @@ MOST = 60  # loops in one picture; further ones are counted in its heading
 
 
 @picture
-def loops_png(loops: Sequence[tuple[Loop, LoopFigures]], title: str) -> Figure:
+def loops_png(loops: Sequence[LoopFigures], title: str) -> Figure:
     """One small diagram a loop, in the order of the file, as PNG."""
     shown = min(len(loops), MOST)
     columns = min(COLUMNS, shown)
@@ -38,7 +38,8 @@ def loops_png(loops: Sequence[tuple[Loop, LoopFigures]], title: str) -> Figure:
         more = f"; the first {MOST} of {len(loops)} loops" if len(loops) > MOST else ""
         figure.suptitle(f"{title}: force over deflection{more}", x=0.02, ha="left", weight="bold", color=INK)
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, (loop, one) in zip(axes, loops, strict=False):
+        for ax, one in zip(axes, loops, strict=False):
+            loop = one.loop
             deflection = um_from_m(loop.deflection)
             ends = [int(np.argmin(loop.drive)), int(np.argmax(loop.drive))]
             ax.plot(deflection[ends], loop.force[ends], color=SECOND_ORANGE, linewidth=1.6, label="secant")
@@ -84,8 +85,7 @@ def reduction_pictures(reduction: Reduction, out: Path) -> dict[Path, Content]:
 
 def reduction_text(reduction: Reduction) -> str:
     """The figures of the loops and the struts' histories; rows of a table of stiffnesses say nothing themselves."""
-    pairs = zip(reduction.to_dict()["loops"], reduction.loops, strict=True)
-    recorded = [entry for entry, loop in pairs if len(loop.force)]
+    recorded = [loop_entry(figures) for figures in reduction.recorded]
     history = history_text(reduction.history, undated=not recorded)
     return "\n".join([loops_text(recorded), *history]) if recorded else "\n".join(history).lstrip("\n")
 

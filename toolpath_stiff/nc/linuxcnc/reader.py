@@ -25,7 +25,7 @@ from toolpath_stiff.nc.linuxcnc.inputs import (
     tool_numbers,
 )
 from toolpath_stiff.nc.linuxcnc.runner import StoppedError, find_rs274, message_and_line, run_rs274
-from toolpath_stiff.nc.moves import Program, Unsupported
+from toolpath_stiff.nc.moves import ReadProgram, Unsupported
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START
 from toolpath_stiff.nc.tables import tool_of
@@ -46,7 +46,7 @@ MOST_NAMED = 5  # loops, in a message
 NO_SHIFT = (0.0, 0.0, 0.0)
 
 
-def read(request: Request, limits: Limits | None = None) -> Program:
+def read(request: Request, limits: Limits | None = None) -> ReadProgram:
     """A program as `rs274` reads it, within the limits of its run.
 
     Raises
@@ -86,7 +86,7 @@ class _Session:
         self.request, self.lines, self.rs274, self.dropped, self.limits = request, lines, rs274, dropped, limits
         self.offsets = copy.deepcopy(request.offsets)
 
-    def read(self) -> Program:
+    def read(self) -> ReadProgram:
         request = self.request
         origin, default_origin = request.zero
         shift = self._shift(origin, default_origin)
@@ -104,7 +104,7 @@ class _Session:
         if not follower.recorder.cuts:
             raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
         moves = follower.recorder.moves()
-        return Program(
+        return ReadProgram(
             name=request.name,
             path=request.path,
             source=request.lines,
