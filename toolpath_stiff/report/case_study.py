@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.placement.case_study import HIGH_MM, LOW_MM, REGION_COLUMNS, CaseStudy
+from toolpath_stiff.placement.case_study import FIGURES, HIGH_MM, LOW_MM, REGION_COLUMNS, CaseStudy
 from toolpath_stiff.report.axes import colour_scale, heading, in_thousands
 from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, new_figure, picture
 from toolpath_stiff.stiffness.model import machine_words
@@ -26,7 +26,7 @@ ABOVE, LEAST_ASPECT = 0.2, 0.6  # of a path of one's own: room for words above i
 BESIDE = 1.3  # inches
 HOLDS = {True: "yes", False: "NO", None: "not tested"}
 # As in the paper's Figure 10, mean and range first.
-COLUMNS = ("region", *REGION_COLUMNS, "mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")
+COLUMNS = ("region", *REGION_COLUMNS, *FIGURES)
 NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
 
