@@ -173,7 +173,7 @@ def plan(args: Namespace) -> int:
 
 def _next(args: Namespace) -> int:
     """The next visit of a plan: say where, write its rows."""
-    from toolpath_stiff.api.next_visits import next_visit
+    from toolpath_stiff.planning.next_visit import next_visit
 
     visit = next_visit(args.next, args.data, columns=args.columns)
     written = visit.save()

@@ -168,7 +168,7 @@ def run_case_study(
     >>> [found["holds"] for found in study.summary["conclusions"]]
     [True, True, True]
     """
-    own = read is not None or regions is not None
+    custom = read is not None or regions is not None
     packaged, places = case_study_program(), dict(regions or REGIONS)
 
     def at(place: Region) -> Analysis:
@@ -180,7 +180,7 @@ def run_case_study(
         try:
             analyses[name] = at(place)
         except UnreachableError as error:
-            if not own:
+            if not custom:
                 raise
             hint = f"give regions that the machine reaches: {both_names('--region', 'NAME:X,Y,Z[,TURN]')}"
             raise UnreachableError(
@@ -189,7 +189,7 @@ def run_case_study(
     rows = [_row(name, place, analyses[name]) for name, place in places.items()]
     x, y, height, turn = next(iter(places.values()))
     heights = []
-    for z in _heights(model, height) if own else HEIGHTS_MM:
+    for z in _heights(model, height) if custom else HEIGHTS_MM:
         with suppress(UnreachableError):
             heights.append({"z_mm": z, **_figures(at((x, y, z, turn)))})
     summary = {
@@ -198,7 +198,9 @@ def run_case_study(
         "step_mm": round(mm_from_m(step), 6),
         **effects_stated(model),
         "warnings": condition_warnings(model),
-        "note": "path and regions as given" if own else "the paper does not print its path; path and regions are ours",
+        "note": "path and regions as given"
+        if custom
+        else "the paper does not print its path; path and regions are ours",
         "regions": rows,
         "conclusions": conclusions(rows),
         "heights": heights,
@@ -206,18 +208,18 @@ def run_case_study(
             "largest_mean_at_z_mm": max(heights, key=lambda row: row["mean_N_per_mm"])["z_mm"],
             "largest_range_at_z_mm": max(heights, key=lambda row: row["range_N_per_mm"])["z_mm"],
         },
-        "non_planar": [] if own else [_wave(model, amplitude, step) for amplitude in WAVES_MM],
+        "non_planar": [] if custom else [_wave(model, amplitude, step) for amplitude in WAVES_MM],
     }
     return CaseStudy(summary, analyses, inputs)
 
 
-def _heights(model: StiffnessModel, own: float) -> list[float]:
+def _heights(model: StiffnessModel, of_path: float) -> list[float]:
     """mm, whole steps over the workspace, and the height of the path itself."""
     low, high = (mm_from_m(float(end)) for end in model.machine.limits.workspace[:, 2])
-    low, high = (low if np.isfinite(low) else own - ROOM_MM), (high if np.isfinite(high) else own + ROOM_MM)
+    low, high = (low if np.isfinite(low) else of_path - ROOM_MM), (high if np.isfinite(high) else of_path + ROOM_MM)
     step = STEP_MM * max(1, math.ceil((high - low) / STEP_MM / MOST_STEPS))
     steps = range(math.ceil(low / step), math.floor(high / step) + 1)
-    return sorted({own, *(step * i for i in steps)})
+    return sorted({of_path, *(step * i for i in steps)})
 
 
 def read_regions(file: str) -> dict[str, Region]:
