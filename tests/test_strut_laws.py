@@ -17,7 +17,7 @@ from toolpath_stiff.correction.strut_law import minimise_mean_error
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor, at_both_ends, scaled_law
 from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
-from toolpath_stiff.machine.model import Machine, with_parameter
+from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.readings.measurements import Measurements, read_measurements
@@ -222,7 +222,7 @@ def test_a_parameter_of_a_constant_law():
     uncertain = f'\n[uncertainty]\nparameters = ["{name}"]\nsd = [2.0]\ncorrelation = [[1.0]]\n'
     machine = parse_machine(text_with(CONSTANT) + uncertain)
     assert machine.uncertainty.names == (name,)
-    assert set(with_parameter(machine, name, 1.0).strut_law.stiffness(np.array([2.3, 3.5])).tolist()) == {41e6}
+    assert set(machine.strut_law.moved(name, 1.0).stiffness(np.array([2.3, 3.5])).tolist()) == {41e6}
     assert with_parameter_moved(build_model(machine), name, 1.0).machine.strut_law.stiffness_1 == 41e6
     with pytest.raises(InputError, match=r"is not a parameter of this file; expected one of strut_law\.stiffness_1"):
         parse_machine(NIST + uncertain)

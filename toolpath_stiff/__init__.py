@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.poses import map_stiffness as map_stiffness
     from toolpath_stiff.api.poses import pose as pose
     from toolpath_stiff.api.poses import read_poses as read_poses
-    from toolpath_stiff.api.programs import SampledPath as SampledPath
     from toolpath_stiff.api.programs import analyze as analyze
     from toolpath_stiff.api.programs import check as check
     from toolpath_stiff.api.programs import sample_path as sample_path
@@ -74,6 +73,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
     from toolpath_stiff.nc.program import Program as Program
+    from toolpath_stiff.path import SampledPath as SampledPath
     from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
     from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
     from toolpath_stiff.placement.result import Placement as Placement
@@ -106,7 +106,7 @@ _PUBLIC = {
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.placements": ("PlacementTrial", "place", "rewrite", "try_placement"),
     "api.poses": ("map_stiffness", "pose", "read_poses"),
-    "api.programs": ("SampledPath", "analyze", "check", "sample_path"),
+    "api.programs": ("analyze", "check", "sample_path"),
     "case.case": ("Case",),
     "comparison.compare": ("Comparison",),
     "diagnosis.result": ("Diagnosis",),
@@ -115,6 +115,7 @@ _PUBLIC = {
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
     "nc.program": ("Program",),
+    "path": ("SampledPath",),
     "placement.case_study": ("CaseStudy",),
     "placement.keep_out": ("KeepOut",),
     "placement.result": ("Placement",),

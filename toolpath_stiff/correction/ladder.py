@@ -36,7 +36,7 @@ from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import Baseline, add_effect, base_fit
-from toolpath_stiff.inference.gates import Simulator, gain_threshold
+from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import Family, score_families, signatures, tables_of
 from toolpath_stiff.inference.left_out import HeldOut, error_falls, gain_in_standard_errors, held_out, of_readings
 from toolpath_stiff.inference.noise import Noise, noise_models
@@ -420,8 +420,8 @@ class _Work:
             base = problem.score_base()
             effects, _ = testable_effects(problem.predictor)
             tables = [table for effect in effects for table in tables_of(problem, effect)]
-            simulator = Simulator.of(self.noise, problem.scatter.covariance, self.seed)
-            threshold = gain_threshold(problem, base.jacobian, simulator, signatures(problem, tables))
+            draws = simulate(self.noise, problem.scatter.covariance, self.seed)
+            threshold = gain_threshold(problem, base.jacobian, draws, signatures(problem, tables))
             self.fields[key] = _Field(problem, base, effects, threshold)
         return self.fields[key]
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import EffectError, InputError, MachineFileError
+from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
 
 Derived = TypeVar("Derived")
@@ -72,6 +72,11 @@ class StrutLaw:
     def parameters(self) -> tuple[str, ...]:
         """Names of its free constants, as `[uncertainty]` of a machine file has them."""
         return CONSTANT_LAW if self.constant else STRUT_LAW
+
+    def moved(self, name: str, change: float) -> StrutLaw:
+        """The law with `change`, in the unit of the key, added to one of its `parameters`."""
+        key = "stiffness_2" if name == STRUT_LAW[1] else "stiffness_1"
+        return replace(self, **{key: getattr(self, key) + n_per_m_from_n_per_um(change)})
 
     @property
     def points(self) -> list[tuple[float, float]]:
@@ -330,24 +335,3 @@ class Uncertainty:
         correlation[:count, :count] = self.correlation
         correlation[count:, count:] = other.correlation
         return Uncertainty(self.names + other.names, np.concatenate([self.sd, other.sd]), correlation)
-
-
-def with_parameter(machine: Machine, name: str, change: float) -> Machine:
-    """The machine with `change` added to one of its fitted parameters, in the unit of the key.
-
-    Raises `InputError` if the machine has no such parameter.
-    """
-    law = machine.strut_law
-    if name in law.parameters:
-        values = [law.stiffness_1, law.stiffness_2]
-        values[law.parameters.index(name)] += n_per_m_from_n_per_um(change)
-        return machine.with_changes(strut_law=replace(law, stiffness_1=values[0], stiffness_2=values[1]))
-    owner, _, key = name.partition(".")
-    for kind in ("effects", "instruments"):
-        entries = list(getattr(machine, kind))
-        for i, entry in enumerate(entries):
-            if entry.name == owner and key in entry.parameters:
-                moved = {**entry.parameters, key: entry.parameters[key] + change}
-                entries[i] = replace(entry, parameters=moved)
-                return machine.with_changes(**{kind: tuple(entries)})
-    raise MachineFileError(f"machine {machine.name} has no parameter {name!r}")

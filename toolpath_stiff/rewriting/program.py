@@ -35,17 +35,11 @@ from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
 from toolpath_stiff.rewriting.turn import Turn
-from toolpath_stiff.units import Pose, ShopPose, deg_from_rad, mm_from_m, pose_in_mm
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, pose_in_mm
 
 LINE_END = re.compile("\r\n|\n|\r")
-
-
 FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # coarser than 0.01 mm is not machining; beyond nine a double has no more digits
-
-
 PLAIN_DIALECTS = ("generic", "linuxcnc")
-
-
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
 
@@ -55,10 +49,10 @@ class RewrittenProgram(Result):
 
     Attributes
     ----------
-    name, content, notes
-        The program's name, the new file's bytes, what the user should hear of, one sentence each.
-    text, encoding
-        The program with its line ends, and how the original was encoded.
+    name, text, encoding
+        The program's name, its text with line ends, and how the original was encoded.
+    notes
+        What the user should know, one sentence each.
 
     Examples
     --------
@@ -138,7 +132,7 @@ def rewrite_program(
     >>> from toolpath_stiff.nc.reader import parse_program
     >>> program = parse_program("G21 G90 F600 (slot)\nG0 X0 Y0 Z5\nG1 Z-1\nX40\nM30\n", "slot.nc")
     >>> rewritten = rewrite_program(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
-    >>> print(rewritten.text, end="")
+    >>> print(rewritten, end="")
     G21 G90 F600 (slot)
     G0 X100 Y0 Z5
     G1 Z-1
@@ -147,22 +141,6 @@ def rewrite_program(
     """
     check_decimals(decimals)
     check_rewritable(program)
-    _check_plain(program)
-    text, encoding = _text_of(program)
-    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
-    source, out = (_state(program.name, origin, offsets, tools) for origin in (placement, original))
-    tolerance = None if linearise is None else mm_from_m(linearise)
-    controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
-    pieces = list(_rewritten_lines(controls, text, program.name, switches_on(block_delete, UNKNOWN_CONTROL)))
-    return RewrittenProgram(program.name, "".join(pieces), encoding, list(controls.notes))
-
-
-def _state(name: str, origin: ShopPose, offsets: Offsets | None, tools: dict[int, ToolEntry] | None) -> State:
-    """A control at its start, with the work at an origin, and offsets and tools of its own."""
-    return State(name, Frames(copy.deepcopy(offsets or Offsets()), origin, origin), copy.deepcopy(tools))
-
-
-def _check_plain(program: ReadProgram) -> None:
     if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
         raise ProgramError(
             "a program is rewritten by the words of the built-in interpreter in the dialects "
@@ -170,29 +148,35 @@ def _check_plain(program: ReadProgram) -> None:
             hint="place it without --write",
             file=program.name,
         )
+    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    source, out = (
+        State(program.name, Frames(copy.deepcopy(offsets or Offsets()), origin, origin), copy.deepcopy(tools))
+        for origin in (placement, original)
+    )
+    tolerance = None if linearise is None else mm_from_m(linearise)
+    controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
+    text, encoding = read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
+    lines = list(_rewritten_lines(controls, text, program.name, switches_on(block_delete, UNKNOWN_CONTROL)))
+    return RewrittenProgram(program.name, "".join(lines), encoding, controls.notes)
 
 
 def check_rewritable(program: ReadProgram) -> None:
     """Raise `InputError` for a file that is not a program of a control, or is one of another machine's."""
     if program.kinematics:
-        raise ProgramError(
+        found = (
             f"a program posted for another kinematics ({program.kinematics}) is not rewritten: its words are those of "
-            "that machine's axes",
-            hint="place it without --write, set the work so in the CAM system, and post it for this machine",
-            file=program.name,
+            "that machine's axes"
         )
-    if program.parametric:
-        raise ProgramError(
-            "a program with variables cannot be rewritten: its numbers are worked out as it runs",
-            hint="place it without --write, and set the work offset that is printed (G10)",
-            file=program.name,
-        )
-    if program.dialect == CUTTER_LOCATION:
-        raise ProgramError(
-            "a cutter-location file is not rewritten: it is not a program that a control runs",
-            hint="place it without --write, set the work so in the CAM system, or place the posted program",
-            file=program.name,
-        )
+        hint = "place it without --write, set the work so in the CAM system, and post it for this machine"
+    elif program.parametric:
+        found = "a program with variables cannot be rewritten: its numbers are worked out as it runs"
+        hint = "place it without --write, and set the work offset that is printed (G10)"
+    elif program.dialect == CUTTER_LOCATION:
+        found = "a cutter-location file is not rewritten: it is not a program that a control runs"
+        hint = "place it without --write, set the work so in the CAM system, or place the posted program"
+    else:
+        return
+    raise ProgramError(found, hint=hint, file=program.name)
 
 
 def check_decimals(decimals: int | None) -> None:
@@ -214,68 +198,51 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
     """Lines with their ends; what follows the program's end stays as it is."""
     lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), LINE_END.findall(text)
     ends += [""] * (len(lines) - len(ends))
-    between = ends[0] or "\n"
     running, started = True, False
     for number, (line, raw, end) in enumerate(zip(lines, raw_lines, ends, strict=False), 1):
         if not running:
             yield raw + end
             continue
         block = read_block(line, number, name)
-        _refuse_parts(block, number, name)
+        left_out = block.optional and block.switch in switches
         written = [line]
+        _check_block(block, left_out, name)
         if block.percent:
             running, started = not started, True
-        elif block.optional and block.switch in switches:
-            _refuse_left_out(bool(block.words), number, name)
-        else:
+        elif not left_out:
             started = started or bool(block.words)
             written, running = rewrite_block(controls, block, line)
-            if block.optional and written != [line] and SLASHED not in controls.notes:
-                controls.notes.append(SLASHED)
-        yield raw + end if written == [line] else (end or between).join(written) + end
+            if block.optional and written != [line]:
+                controls.note(SLASHED)
+        yield raw + end if written == [line] else (end or ends[0] or "\n").join(written) + end
 
 
-def _refuse_parts(block: Block, number: int, name: str) -> None:
-    """A slash in the middle of a block, and corners that a block makes of the next one."""
+def _check_block(block: Block, left_out: bool, name: str) -> None:
+    """Raise `InputError` for a block that cannot be written on its own.
+
+    It has a slash in its middle or makes a corner of the next one; or --block-delete leaves it out: it would stay as
+    it was, and be wrong once the switch is off.
+    """
     corner = next((word for word in block.words if word.letter in CORNERS), None)
-    if block.rest is not None or corner is not None:
-        raise Place(name, number).fail(
-            "a block with a slash in its middle cannot be rewritten"
-            if corner is None
-            else f"{corner.text} makes a corner with the next block, which cannot be rewritten",
-            hint="put what follows the slash into a block of its own" if corner is None else "post the corner's moves",
-        )
-
-
-def _refuse_left_out(words: bool, number: int, name: str) -> None:
-    """A block that --block-delete leaves out would stay as it was, and be wrong once the switch is off."""
-    if words:
-        raise Place(name, number).fail(
-            "a block that --block-delete leaves out cannot be rewritten",
-            hint="take it out of the program, or do without --block-delete",
-        )
-
-
-def _text_of(program: ReadProgram) -> tuple[str, str]:
-    """The program's text with its line ends, and its encoding."""
-    if not program.path:
-        return "\n".join([*program.source, ""]), "utf-8"
-    return read_text(program.path)
+    if corner is not None:
+        found = f"{corner.text} makes a corner with the next block, which cannot be rewritten"
+        hint = "post the corner's moves"
+    elif block.rest is not None:
+        found = "a block with a slash in its middle cannot be rewritten"
+        hint = "put what follows the slash into a block of its own"
+    elif left_out and block.words and not block.percent:
+        found = "a block that --block-delete leaves out cannot be rewritten"
+        hint = "take it out of the program, or do without --block-delete"
+    else:
+        return
+    raise Place(name, block.line).fail(found, hint=hint)
 
 
 OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
-
-
 # What can hold a work offset or G10 once comments and blanks are out: tells the lines that are worth reading again.
 MAY_BE_OFFSET, COMMENTS = re.compile(r"[Gg]\+?0*[15]\d"), re.compile(r"\([^)]*\)")
-
-
 VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
-
-
 NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
-
-
 USE_WRITE = "use --write, which transforms the program itself"
 
 
@@ -319,30 +286,25 @@ def offset_blocks(program: ReadProgram, placement: Pose, *, decimals: int = 4) -
     G54: X100 Y0 Z800
     G17 G54 G68 X0 Y0 R90
     """
-    reason = _not_here(program) or _not_about_z(program, placement) or _not_g54_alone(program)
+    if program.dialect == CUTTER_LOCATION:
+        reason = NOT_POSTED
+    elif program.kinematics:
+        reason = (
+            f"the program is posted for another kinematics ({program.kinematics}), whose control its G54 belongs to: "
+            "post it for this machine"
+        )
+    else:
+        reason = _not_about_z(program, placement) or _not_g54_alone(program)
     if reason:
         return OffsetBlocks("", "", reason, reason)
     x, y, z = (_number(mm_from_m(v), decimals) for v in placement[:3])
     turn = _number(deg_from_rad(placement[5]), decimals)
-    linuxcnc = f"G21 G10 L2 P1 X{x} Y{y} Z{z} R{turn}"
+    linuxcnc, g54 = f"G21 G10 L2 P1 X{x} Y{y} Z{z} R{turn}", f"G54: X{x} Y{y} Z{z}"
     if turn == "0":
-        return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}")
-    upright = np.abs(program.moves.arc_normal[:, :2]).max(initial=0.0) < VERTICAL
-    if not upright:
+        return OffsetBlocks(linuxcnc, g54)
+    if np.abs(program.moves.arc_normal[:, :2]).max(initial=0.0) >= VERTICAL:
         return OffsetBlocks(linuxcnc, "", "", f"G68 does not turn arcs of G18 and G19: {USE_WRITE}")
-    return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}\nG17 G54 G68 X0 Y0 R{turn}")
-
-
-def _not_here(program: ReadProgram) -> str:
-    """Why the program has no G54 of this machine's control, or ""."""
-    if program.dialect == CUTTER_LOCATION:
-        return NOT_POSTED
-    if not program.kinematics:
-        return ""
-    return (
-        f"the program is posted for another kinematics ({program.kinematics}), whose control its G54 belongs to: "
-        "post it for this machine"
-    )
+    return OffsetBlocks(linuxcnc, f"{g54}\nG17 G54 G68 X0 Y0 R{turn}")
 
 
 def _not_about_z(program: ReadProgram, placement: Pose) -> str:
