@@ -293,8 +293,9 @@ def plan(
     >>> list(found.files(plots=False)), len(found.rows) == len(found.to_frame())
     (['plan.csv', 'plan.json', 'plan_tables.npz'], True)
     """
+    from toolpath_stiff.planning.menu import Costs
     from toolpath_stiff.planning.result import plan as plan_visits
-    from toolpath_stiff.planning.visits import Costs
+    from toolpath_stiff.planning.result import usual_menu
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     costs = _costs(minutes or {})
@@ -311,11 +312,8 @@ def plan(
         seed=seed or None,
     )
     own += ["--indicators"] if indicators else []
-    return plan_visits(
-        asked.model,
-        None if asked.data is None else asked.readings,
-        between=tuple(between),
-        n=n,
+    readings = None if asked.data is None else asked.readings
+    menu = usual_menu(readings).with_options(
         radius=None if radius_mm is None else m_from_mm(radius_mm),
         heights=_in_metres(heights_mm),
         max_tilt=None if max_tilt_deg is None else rad_from_deg(max_tilt_deg),
@@ -324,12 +322,10 @@ def plan(
         setups=setups,
         indicators=indicators,
         costs=Costs(**costs),
-        judgement=None if diagnosis is None else diagnosis.main,
-        names=asked.files,
-        line=asked.asked.command("plan", *own),
-        inputs=asked.inputs,
-        **asked.common,
     )
+    judgement = None if diagnosis is None else diagnosis.main
+    found = plan_visits(asked.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **asked.common)
+    return replace(found, names=asked.files, line=asked.asked.command("plan", *own), inputs=asked.inputs)
 
 
 def _cost(text: str) -> tuple[str, float]:

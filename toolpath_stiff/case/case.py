@@ -479,7 +479,7 @@ class Case(BlindExercise):
     def _check_effect(self, name: str, values: Mapping[str, Any], on: bool) -> None:
         from toolpath_stiff.machine.model import EffectEntry
         from toolpath_stiff.stiffness.catalogue import find_effect
-        from toolpath_stiff.stiffness.contract import read_parameters
+        from toolpath_stiff.stiffness.parameters import read_parameters
 
         effect = find_effect(name, [self.path(one) for one in self.state.effects])
         if on:

@@ -21,7 +21,6 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
@@ -102,18 +101,11 @@ class CaseStudy(FolderResult):
         """The path in its regions, coloured by stiffness."""
         return cast("Figure", self.view.regions_picture.figure(self))
 
-    def __str__(self) -> str:
-        return str(self.view.text(self))
-
     def _short(self) -> str:
         held = [conclusion["holds"] for conclusion in self.summary["conclusions"] if conclusion["holds"] is not None]
         on = f"{self.summary['program']} on " if self.is_own else ""
         verb = "conclusion of the paper holds" if len(held) == 1 else "conclusions of the paper hold"
         return f"{on}{self.summary['machine']}, {sum(held)} of {len(held)} {verb}"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content of each file that `save` writes."""
-        return cast("Mapping[str, Content]", self.view.files(self, plots=plots))
 
 
 def case_study_program() -> ReadProgram:
