@@ -26,8 +26,9 @@ from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
-from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath, read_parameters
+from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
+from toolpath_stiff.stiffness.parameters import read_parameters
 from toolpath_stiff.units import mm_from_m
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to

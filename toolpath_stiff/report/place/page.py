@@ -14,7 +14,8 @@ from toolpath_stiff.placement.result import Placement, Refused, Written
 from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
 from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.report.pages import render
-from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, setup_sheet, workspace_picture
+from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, workspace_picture
+from toolpath_stiff.report.place.sheet import setup_sheet
 from toolpath_stiff.report.words import machine_text, plain
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
