@@ -119,14 +119,14 @@ class EffectDraft(EffectFile):
 
     def to_dict(self) -> dict[str, Any]:
         """Names and text, the verdict and the portrait; `reason` where nothing is drafted."""
-        said = self.diagnosis.to_dict()
+        document = self.diagnosis.to_dict()
         return {
             "effect": self.name if self.text else None,
             "effects": self.effects,
             "text": self.text,
             "reason": self.reason,
-            "verdict": said["verdict"],
-            "portrait": said["portrait"],
+            "verdict": document["verdict"],
+            "portrait": document["portrait"],
             "next": self.next,
         }
 
@@ -205,20 +205,16 @@ def draft_effect(
     from toolpath_stiff.diagnosis.diagnose import diagnose
     from toolpath_stiff.stiffness.catalogue import known_effects
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    question = Question(machine, data, noise_percent, strut_spread_percent, seed)
     name = effect_name(file, ".toml")
-    if name in known_effects(asked.on.effect_files):
+    if name in known_effects(question.on.effect_files):
         raise InputError(f"effect {name} exists already", hint="give the draft another file name")
-    found = replace(
-        diagnose(
-            asked.model, asked.readings, plan_next=False, names=asked.files, progress=teller(progress), **asked.common
-        ),
-        line=asked.asked.command("diagnose", *options(seed=seed or None)),
-        asked=asked.asked,
-        inputs=asked.inputs,
-    )
-    drafted = draft(found, str(file))
-    return EffectDraft(name, drafted, found, next_of_draft(asked.asked, str(file)))
+    how = {"names": question.files, "progress": teller(progress), **question.common}
+    diagnosis = diagnose(question.model, question.readings, plan_next=False, **how)
+    line = question.asked.command("diagnose", *options(seed=seed or None))
+    diagnosis = replace(diagnosis, line=line, asked=question.asked, inputs=question.inputs)
+    drafted = draft(diagnosis, str(file))
+    return EffectDraft(name, drafted, diagnosis, next_of_draft(question.asked, str(file)))
 
 
 def effect_name(file: str | Path, ending: str = ".py") -> str:

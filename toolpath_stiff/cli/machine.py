@@ -7,7 +7,7 @@ from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from toolpath_stiff.api import machines, poses
+from toolpath_stiff.api import machine_files, poses
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.cli.outputs import (
@@ -174,7 +174,7 @@ def new_machine(args: Namespace) -> int:
     """Write a commented template."""
     target, replaced = Path(args.file), check_new(args, args.file)
     keep(replaced)
-    written = machines.machine_template(target).save(target)
+    written = machine_files.machine_template(target).save(target)
     print(f"{written_text([written])}\n{hint('edit it, then', command_line('machine', 'check', target))}")
     return 0
 
@@ -182,7 +182,7 @@ def new_machine(args: Namespace) -> int:
 def from_linuxcnc(args: Namespace) -> int:
     """Read the genhexkins pins of a LinuxCNC HAL file."""
     replaced = check_single(args, args.out)
-    machine_file = machines.machine_from_linuxcnc(args.file, args.units)
+    machine_file = machine_files.machine_from_linuxcnc(args.file, args.units)
     if args.out:
         keep(replaced)
         print(written_text([machine_file.save(args.out)]))
@@ -196,7 +196,7 @@ def from_linuxcnc(args: Namespace) -> int:
 
 def recover(args: Namespace) -> int:
     """Fit the NIST geometry to the paper's Table 1 anew."""
-    geometry = machines.recover_geometry(starts=args.starts, seed=args.seed)
+    geometry = machine_files.recover_geometry(starts=args.starts, seed=args.seed)
     sys.stdout.write(geometry.to_json() if args.json else f"{geometry}\n")
     return 0
 
@@ -238,8 +238,8 @@ COMMANDS = {
         from_linuxcnc,
         own("FILE.hal", name="file"),
         own("-o --out FILE", "machine file to write (default: standard output)"),
-        machines.machine_from_linuxcnc,
+        machine_files.machine_from_linuxcnc,
         REPLACE,
     ),
-    "machine recover": Command(recover, machines.recover_geometry, JSON),
+    "machine recover": Command(recover, machine_files.recover_geometry, JSON),
 }

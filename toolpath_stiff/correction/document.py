@@ -19,7 +19,7 @@ from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import error_falls, gain_in_standard_errors
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.contract import joined
+from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
 
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
