@@ -18,7 +18,8 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import toolpath_stiff
-from toolpath_stiff.nc.codes.registry import codes_table
+from toolpath_stiff.nc.codes.code import EVERYWHERE, Code, holds_anyway
+from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED
 from toolpath_stiff.nc.cutter_location.vocabulary import words_table
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.stiffness.catalogue import packaged_effects
@@ -46,6 +47,55 @@ def rows(*lines: Iterable[str]) -> Iterator[str]:
         yield f"| {' | '.join(row)} |"
         if number == 0:
             yield f"|{' --- |' * len(row)}"
+
+
+# Codes
+
+NOT_THERE = "has none"
+# LinuxCNC's, and in no program whose path is compared with LinuxCNC's. The others are in such programs: the random ones
+# of `benchmarks/hunt.md`, or those of the tests against rs274 (`tests/nc/test_code_registry.py` looks them up).
+WITHOUT_WITNESS = ("M7", "M19", "M53", "M71")
+
+
+def codes_table() -> str:
+    """The codes that are understood, their other names, and those that are refused, as Markdown tables."""
+    understood = [
+        (code.name, code.group, f"{code.meaning} (listed: {code.listed})" if code.listed else code.meaning,
+         _function(code), _controls(code.controls), code.source, _witness(code))
+        for code in CODES.values()
+    ] + [
+        (a.name, f"as {a.code}", a.meaning, "", _controls(a.controls), a.source, NOT_THERE) for a in ALIASES.values()
+    ]  # fmt: skip
+    refused = [(code.name, code.what, code.hint, code.source) for code in REFUSED.values()]
+    heading = ("code", "group", "meaning", "function in `nc/codes`", "dialects", "source", "against LinuxCNC")
+    others = "Refused in every dialect, with the line and what to do instead; nothing is held against LinuxCNC:"
+    tables = [*rows(heading, *_joined(understood)), "", others, ""]
+    return "\n".join([*tables, *rows(("code", "what it is", "instead", "source"), *_joined(refused)), ""])
+
+
+def _joined(cells: Iterable[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
+    """Rows of a table; those that differ in their code alone are one."""
+    names: dict[tuple[str, ...], list[str]] = {}
+    for name, *others in cells:
+        names.setdefault(tuple(others), []).append(name)
+    for others_, codes in names.items():
+        yield (" ".join(codes), *others_)
+
+
+def _witness(code: Code) -> str:
+    """Whether what the code does is held against LinuxCNC's interpreter."""
+    if "linuxcnc" not in code.controls or "LinuxCNC" not in code.source:
+        return NOT_THERE
+    return "not held" if code.name in WITHOUT_WITNESS else "same path"
+
+
+def _function(code: Code) -> str:
+    module = code.act.__module__.rsplit(".", maxsplit=1)[-1]
+    return "" if code.act is holds_anyway else f"`{module}.{code.act.__name__}`"
+
+
+def _controls(names: tuple[str, ...]) -> str:
+    return "all" if names == EVERYWHERE else ", ".join(names)
 
 
 # Effects

@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 from benchmarks.hunt import codes_of, program_of
+from docs.from_code import codes_table
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes.code import EVERYWHERE, MOTION, ONCE, STEPS, Code, holds_anyway
-from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED, code_meaning, codes_table, table
+from toolpath_stiff.nc.codes.code import EVERYWHERE, Code, holds_anyway
+from toolpath_stiff.nc.codes.groups import STEPS
+from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED, code_meaning, table
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.plain_lines import MODE_NAMES
 from toolpath_stiff.nc.reader import parse_program
@@ -43,19 +45,19 @@ def test_every_refused_code_says_what_it_is_and_what_to_do(name):
 
 def test_a_code_without_a_function_is_refused():
     with pytest.raises(TypeError, match="G1 has no function"):
-        Code("G1", MOTION, None, "feed", "LinuxCNC")  # type: ignore[arg-type]
+        Code("G1", "motion", None, "feed", "LinuxCNC")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        (("G01", MOTION, holds_anyway, "feed", "LinuxCNC"), "not the name of a code"),
-        (("X", MOTION, holds_anyway, "feed", "LinuxCNC"), "not the name of a code"),
+        (("G01", "motion", holds_anyway, "feed", "LinuxCNC"), "not the name of a code"),
+        (("X", "motion", holds_anyway, "feed", "LinuxCNC"), "not the name of a code"),
         (("G1", "no such group", holds_anyway, "feed", "LinuxCNC"), "not a step"),
-        (("G1", MOTION, holds_anyway, "", "LinuxCNC"), "its meaning and its source"),
-        (("G1", MOTION, holds_anyway, "feed", ""), "its meaning and its source"),
-        (("G1", MOTION, holds_anyway, "feed", "LinuxCNC", ()), "controls"),
-        (("G1", MOTION, holds_anyway, "feed", "LinuxCNC", ("siemens",)), "controls"),
+        (("G1", "motion", holds_anyway, "", "LinuxCNC"), "its meaning and its source"),
+        (("G1", "motion", holds_anyway, "feed", ""), "its meaning and its source"),
+        (("G1", "motion", holds_anyway, "feed", "LinuxCNC", ()), "controls"),
+        (("G1", "motion", holds_anyway, "feed", "LinuxCNC", ("siemens",)), "controls"),
     ],
 )
 def test_a_row_that_is_not_complete_is_refused(row, message):
@@ -64,7 +66,7 @@ def test_a_row_that_is_not_complete_is_refused(row, message):
 
 
 def test_a_code_that_is_there_twice_is_refused():
-    row = Code("G1", MOTION, holds_anyway, "feed", "LinuxCNC")
+    row = Code("G1", "motion", holds_anyway, "feed", "LinuxCNC")
     with pytest.raises(ValueError, match="twice"):
         table([row, row])
 
@@ -101,7 +103,7 @@ def test_groups_that_other_modules_name():
     offsets = {name for name, code in CODES.items() if code.group == "work offset"}
     assert offsets - numbered == {*WORK_OFFSETS, *ADDITIONAL_OFFSETS} and numbered <= offsets
     assert MODE_NAMES == ("G0", "G1", "G2", "G3")  # the digits that the pattern of plain lines reads
-    assert {name for name, code in CODES.items() if code.takes_axes and code.group == ONCE} == {
+    assert {name for name, code in CODES.items() if code.takes_axes and code.group == "non-modal"} == {
         "G10", "G28", "G30", "G52", "G92",
     }  # fmt: skip
 

@@ -22,11 +22,15 @@ from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path import place
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
-from toolpath_stiff.placement.evaluator import Evaluator, Keepout
+from toolpath_stiff.placement.climb import Climber
+from toolpath_stiff.placement.effort import NO_FLOORS
+from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.fronts import apart
+from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
+from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.linear_programmes import least_costs
 from toolpath_stiff.placement.paths import representative_path, work_path
-from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
+from toolpath_stiff.placement.search import search_placements
 from toolpath_stiff.stiffness.model import build_model
 
 ROOT = Path(__file__).parents[2]
@@ -135,7 +139,7 @@ def test_the_first_rapid_starts_where_the_control_stands_now():
     turn = np.eye(3)[None]
     here = anchored.placed(turn, np.array([PRESENT[:3]]))[0]
     there = anchored.placed(turn, np.array([[0.2, 0.1, 1.0]]))[0]
-    at_start = np.flatnonzero((anchored.u == 0.0) & ~anchored.follows[0].any(axis=1))
+    at_start = np.flatnonzero((anchored.u == 0.0) & ~anchored.follows[:, 0].any(axis=1))
     assert len(at_start)
     np.testing.assert_allclose(there[at_start], here[at_start])
     np.testing.assert_allclose(here[at_start], np.tile(PRESENT[:3], (len(at_start), 1)))
@@ -204,8 +208,8 @@ def test_where_two_rapids_exclude_each_other_the_error_names_what_failed():
         return parse_program(text, "slabs.nc", origin=origin)
 
     slabs = (
-        Keepout("left", (-2.0, -2.0, 1.1), (0.01, 2.0, 1.12)),
-        Keepout("right", (-0.01, -2.0, 1.2), (2.0, 2.0, 1.22)),
+        KeepOut("left", (-2000, -2000, 1100), (10, 2000, 1120)),
+        KeepOut("right", (-10, -2000, 1200), (2000, 2000, 1220)),
     )
     path = work_path(read(PRESENT), STEP, TANGENTIAL, PRESENT, read)
     bounds = Bounds(np.array([-0.2, 0, 0.8, 0, 0, 0]), np.array([0.2, 0, 0.8, 0, 0, 0]))
@@ -323,12 +327,12 @@ def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt
 
 def test_a_long_path_is_climbed_on_what_decides(monkeypatch):
     """With every path long, the recommendation is that of the climb on all samples, within two thousandths."""
-    from toolpath_stiff.placement import search
+    from toolpath_stiff.placement import ascents, search
 
     program, goal = program_of("pocket"), Goal(OBJECTIVES["balanced"], NO_FLOORS)
     bounds = Bounds(np.array([-0.1, -0.1, 0.9, 0, 0, 0.3]), np.array([0.1, 0.1, 1.2, 0, 0, 0.3]))
     whole = searched(program, bounds)
-    monkeypatch.setattr(search, "SHORT", 0)
+    monkeypatch.setattr(ascents, "SHORT", 0)
     monkeypatch.setattr(search, "WHOLE_POSES", 0)
     long = searched(program, bounds)
     value, wanted = (float(goal.value(found.best_figures)[0]) for found in (long, whole))

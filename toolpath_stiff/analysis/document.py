@@ -20,7 +20,7 @@ from toolpath_stiff.analysis.statistics import (
     share,
 )
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.stiffness.model import acting_effects, conditions_stated, effects_stated
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
 
@@ -151,7 +151,7 @@ def _higher(first: float | None, second: float | None) -> float | None:
     return None if first is None or second is None or not first else (second - first) / first * 100.0
 
 
-def words_turn_the_platform(program: Program) -> bool:
+def words_turn_the_platform(program: ReadProgram) -> bool:
     """Whether rotary words were taken for the platform's own angles."""
     own = not program.kinematics and program.dialect != CUTTER_LOCATION
     return own and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())

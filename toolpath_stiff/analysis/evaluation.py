@@ -18,7 +18,7 @@ from toolpath_stiff.analysis.loads import (
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import PoseError
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Limit, Reach, gauge_of, machine_limits, reach
+from toolpath_stiff.machine.limits import Extremes, Limit, Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
@@ -186,7 +186,7 @@ def _evaluate_fast(
         compliance, determinant, lengths, good = core.compliance_along_columns(
             machine, there, towards[:, :, some], turn, tool, route
         )
-        stand, sure = gauge_of(machine).reach(there, lengths, determinant, turn, tool)
+        stand, sure = Extremes(machine, there, lengths, determinant, turn, tool).reach()
         extrapolated = machine.strut_law.room(lengths).min(axis=0) < 0.0
         for into, (_, known), along in zip(samples, directed, compliance, strict=True):
             at = _part(into, some)

@@ -29,7 +29,7 @@ from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.nc.moves import Moves, Program
+from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.path import Samples, place, sample_moves
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.model import (
@@ -186,7 +186,7 @@ def _number(figure: float | None) -> float:
 
 def analyze(
     machine: Machine | StiffnessModel,
-    program: Program,
+    program: ReadProgram,
     *,
     origin: Pose | None = None,
     load: Load | str = defaults.LOAD,
@@ -248,7 +248,7 @@ def analyze(
     return analysis
 
 
-def _effective_origin(machine: Machine, program: Program, origin: Pose | None) -> tuple[Pose, str]:
+def _effective_origin(machine: Machine, program: ReadProgram, origin: Pose | None) -> tuple[Pose, str]:
     """The option, else the program's own word, else the machine's default."""
     if origin is not None:
         chosen, source = origin, "option"

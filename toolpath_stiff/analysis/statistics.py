@@ -22,7 +22,7 @@ from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, Tex
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.nc.moves import RAPID, Program
+from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.operations import Operations, operations
 from toolpath_stiff.path import PATH_COLUMNS, Samples, path_columns
 from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
@@ -69,7 +69,7 @@ class EvaluatedPath:
         What deserves a look, plain sentences, the program's own included.
     """
 
-    program: Program
+    program: ReadProgram
     load: Load
     force: float
     samples: Samples

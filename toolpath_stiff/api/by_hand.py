@@ -107,7 +107,7 @@ class Preview:
         from toolpath_stiff.inference.candidates import Candidate, Component
         from toolpath_stiff.inference.fits import fit_effects
         from toolpath_stiff.stiffness.catalogue import find_effect
-        from toolpath_stiff.stiffness.contract import read_parameters
+        from toolpath_stiff.stiffness.parameters import read_parameters
 
         candidates, sizes = [], []
         for entry in _entries(effects):

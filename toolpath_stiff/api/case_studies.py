@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolpath_stiff.api.inputs import Program, Step, pose_si, program_from
+from toolpath_stiff.api.inputs import Step, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import checked
 from toolpath_stiff.units import m_from_mm
 

@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from toolpath_stiff.api.inputs import Origin, Program, origin_si, origin_word, program_from
+from toolpath_stiff.api.inputs import Origin, origin_si, origin_word
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, options
+from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, numbers
 from toolpath_stiff.results import Progress, teller
 

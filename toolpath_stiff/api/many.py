@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pebble import ProcessExpired
 
-from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Program, Step
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import (
     JOBS,
@@ -31,6 +31,7 @@ from toolpath_stiff.api.programs import (
 )
 from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import checked
 from toolpath_stiff.processes import ProcessPool, death
 from toolpath_stiff.report.analysis.summary import check_table

@@ -72,21 +72,17 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
         for i, at, column in columns:
             text = cells[at] if at < len(cells) else ""
             try:
-                poses[row, i] = _coordinate(text)
+                value = float(text)
             except ValueError:
+                value = np.nan
+            if abs(value) <= FARTHEST:
+                poses[row, i] = value
+            else:
                 expected = f"a number within +-{FARTHEST:g}"
                 errors.append(InputError(f"row {row + 1}, {column}: {text!r}", expected=expected, file=name, line=line))
     if errors:
         raise InputErrors(errors)
     return poses, tuple(table.notes)
-
-
-def _coordinate(text: str) -> float:
-    """A finite number within reason. Raises `ValueError`."""
-    value = float(text)
-    if not abs(value) <= FARTHEST:
-        raise ValueError(text)
-    return value
 
 
 @checked
@@ -141,15 +137,11 @@ def pose(
     poses = np.concatenate([rows, np.zeros((len(rows), 6 - rows.shape[1]))], axis=1)
     if not np.abs(poses).max(initial=0.0) <= FARTHEST:
         raise InputError(f"a pose of {np.abs(poses).max():g} mm or degrees", expected=f"numbers within +-{FARTHEST:g}")
-    model = on.running()
-    force = force_N
-    found = evaluate_poses(model, m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force)
+    found = evaluate_poses(on.running(), m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force_N)
     found = replace(found, pose_mm_deg=poses, single=single)
     if single and not found.reach.reachable[0]:
-        raise UnreachableError(
-            f"the pose is out of reach on machine {on.name}: {found.reach.describe(0)}",
-            hint=f"`{command_line('machine', 'show', on.asked)}` lists the limits",
-        )
+        mistake = f"the pose is out of reach on machine {on.name}: {found.reach.describe(0)}"
+        raise UnreachableError(mistake, hint=f"`{command_line('machine', 'show', on.asked)}` lists the limits")
     return found
 
 
@@ -220,18 +212,8 @@ def map_stiffness(
         raise InputError(f"heights {heights}: one appears twice", expected="each height once")
     if not max(abs(v) for v in (*x_mm, *y_mm, *heights)) <= FARTHEST_MM:
         raise InputError("a map beyond 100 m", expected="mm")
-    model = on.running()
     a, b, c = (rad_from_deg(float(v)) for v in tilt_deg)
     x, y = ((m_from_mm(float(low)), m_from_mm(float(high))) for low, high in (x_mm, y_mm))
-    grid = evaluate_grid(
-        model,
-        x,
-        y,
-        [m_from_mm(z) for z in heights],
-        parse_load(load),
-        points,
-        (a, b, c),
-        force_N,
-        counter(progress, "map: poses"),
-    )
+    levels, told = [m_from_mm(z) for z in heights], counter(progress, "map: poses")
+    grid = evaluate_grid(on.running(), x, y, levels, parse_load(load), points, (a, b, c), force_N, told)
     return replace(grid, inputs=on.inputs)

@@ -259,7 +259,7 @@ def summary_of(
     noises = [NoiseFigures.of(one.noise) for one in answers]
     suspects = suspect_entries([] if last.law is None else suspect_rows(last.problem, last.law), data, left_out=None)
     doubts = [*dict.fromkeys(one.noise.remark for one in answers if one.noise.remark)]
-    doubts += [suspect["words"] for suspect in suspects]
+    doubts += [suspect.words for suspect in suspects]
     text = [asked, overall_text(baseline, noises, pattern=bool(findings))]
     text += [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in doubts]
     return ComparisonSummary(

@@ -37,10 +37,10 @@ from toolpath_stiff.inference.slips import (
     suspect_rows,
 )
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.plan import nothing_gained, plan_measurements
+from toolpath_stiff.planning.menu import Menu
+from toolpath_stiff.planning.plan import plan_measurements
 from toolpath_stiff.planning.rivals import rivals_of
 from toolpath_stiff.planning.rows import plan_rows
-from toolpath_stiff.planning.visits import Costs, Menu
 from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
 from toolpath_stiff.readings.measurements import Measurements
@@ -48,7 +48,7 @@ from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
 if TYPE_CHECKING:
-    from toolpath_stiff.nc.moves import Program
+    from toolpath_stiff.nc.moves import ReadProgram
     from toolpath_stiff.units import Pose
 
 
@@ -252,13 +252,13 @@ def next_measurements(
     noise = (float(np.sqrt(np.mean(judgement.noise.repeat**2))), judgement.noise.clamping)
     try:
         plan = plan_measurements(
-            diagnosis.machine, rivals, noise, poses, menu=Menu.of(diagnosis.data), costs=Costs(), seed=seed,
+            diagnosis.machine, rivals, noise, poses, menu=Menu.of(diagnosis.data), seed=seed,
             effect_files=diagnosis.predictor.effect_files, strut_spread=judgement.noise.strut_spread,
         )  # fmt: skip
     except InputError as error:
         return [], [f"no plan could be made: {error}"]
     if not plan.gains:
-        return [], [nothing_gained(plan)]
+        return [], [plan.nothing_gained]
     rows = plan_rows(plan.visits, plan.chosen, set(diagnosis.data.point.tolist()))
     for row in rows:
         row["why"] = plan.why[int(row["clamp"]) - 1]
@@ -272,7 +272,7 @@ def next_measurements(
 
 
 def choice_on_path(
-    diagnosis: Diagnosis, program: Program, origin: Pose | None = None, given: Conditions | None = None
+    diagnosis: Diagnosis, program: ReadProgram, origin: Pose | None = None, given: Conditions | None = None
 ) -> dict[str, Any]:
     """Mean, range and minimum along a program under each plausible explanation: how much the choice matters.
 

@@ -71,7 +71,7 @@ def document_of(found: Examination, rows: Rows) -> dict[str, Any]:
         "assumptions": assumptions(found),
         "warnings": list(found.predictor.data.warnings),
         "notes": [*found.data.notes, *doubts(found)],
-        "suspect_rows": list(found.suspects),
+        "suspect_rows": to_dict(found.suspects),
         "detectable_slips": [
             {"column": slip.column, "unit": slip.unit, "size": json_number(slip.size, 2)} for slip in found.slips
         ],

@@ -30,7 +30,7 @@ def verdict_text(found: Examination) -> str:
 def doubts(found: Examination) -> list[str]:
     """What may be wrong with the data instead of the machine: the stated noise, single rows."""
     noise = dict.fromkeys(judgement.doubt for judgement in found.judgements.values() if judgement.doubt)
-    return [*noise, *(suspect["words"] for suspect in found.suspects)]
+    return [*noise, *(suspect.words for suspect in found.suspects)]
 
 
 def _verdict_text(found: Examination) -> str:

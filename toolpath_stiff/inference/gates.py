@@ -71,29 +71,16 @@ class Gate:
     gain_threshold: float = 0.0
 
 
-@dataclass(frozen=True)
-class Simulator:
-    """Simulated scatter of ln readings, shared by all tests of one data set.
-
-    Attributes
-    ----------
-    draws
-        (DRAWS, n) scatter, each already divided by the error of its noise estimate.
-    """
-
-    draws: FloatArray
-
-    @classmethod
-    def of(cls, noise: Noise, covariance: Covariance, seed: int, draws: int = DRAWS) -> Simulator:
-        """From a noise model and its covariance."""
-        rng = np.random.default_rng(seed)
-        shape = (draws, len(covariance))
-        shared = covariance.draw(rng, draws)
-        wide = np.where(rng.random(shape) < noise.outliers, noise.outlier_width, 1.0)
-        scatter = shared + noise.repeat * wide * rng.standard_normal(shape)
-        if np.isfinite(noise.freedom):
-            scatter = scatter / np.sqrt(rng.chisquare(noise.freedom, draws) / noise.freedom)[:, None]
-        return cls(scatter)
+def simulate(noise: Noise, covariance: Covariance, seed: int, draws: int = DRAWS) -> FloatArray:
+    """(draws, n) simulated scatter of ln readings, each draw already divided by the error of its noise estimate."""
+    rng = np.random.default_rng(seed)
+    shape = (draws, len(covariance))
+    shared = covariance.draw(rng, draws)
+    wide = np.where(rng.random(shape) < noise.outliers, noise.outlier_width, 1.0)
+    scatter = shared + noise.repeat * wide * rng.standard_normal(shape)
+    if np.isfinite(noise.freedom):
+        scatter = scatter / np.sqrt(rng.chisquare(noise.freedom, draws) / noise.freedom)[:, None]
+    return np.asarray(scatter)
 
 
 @dataclass(frozen=True)
@@ -202,7 +189,7 @@ def absolute_gate(
     problem: Problem,
     residual: FloatArray,
     jacobian: FloatArray,
-    simulator: Simulator,
+    draws: FloatArray,
     forms: Forms,
     signatures: Sequence[Sequence[FloatArray]] = (),
     gain: float = 0.0,
@@ -215,7 +202,7 @@ def absolute_gate(
     projected = problem.projected(jacobian)
     # What the linearised refit leaves of the data is their residual; the law's prior pulls as in the simulation.
     observed = set_wild_aside(projected.times(residual[None]), projected, problem.scatter)
-    drawn = set_wild_aside(projected.times(simulator.draws), projected, problem.scatter)
+    drawn = set_wild_aside(projected.times(draws), projected, problem.scatter)
     squares = _quadratic(problem, drawn)
     observed_squares = float(_quadratic(problem, observed)[0])
     structure = Structure(forms, projected)
@@ -224,8 +211,8 @@ def absolute_gate(
     if not signatures and observed_squares > HOPELESS * squares.max():
         simulated = np.zeros((len(squares), seen.shape[1]))
     else:
-        known = forms.of_draws(simulator.draws)
-        simulated = structure.surprises(structure.loads(simulator.draws, drawn.taken, known))
+        known = forms.of_draws(draws)
+        simulated = structure.surprises(structure.loads(draws, drawn.taken, known))
     # Rows: the data, then every draw; columns: what may look bad, larger is worse.
     looks = [np.concatenate([[observed_squares], squares]), np.concatenate([seen, simulated]).max(axis=1)]
     if signatures:
@@ -247,11 +234,11 @@ def absolute_gate(
 
 
 def gain_threshold(
-    problem: Problem, jacobian: FloatArray, simulator: Simulator, signatures: Sequence[Sequence[FloatArray]]
+    problem: Problem, jacobian: FloatArray, draws: FloatArray, signatures: Sequence[Sequence[FloatArray]]
 ) -> float:
     """Twice-log-likelihood gain that the best of all candidates reaches by chance in one campaign of twenty."""
     projected = problem.projected(jacobian)
-    drawn = set_wild_aside(projected.times(simulator.draws), projected, problem.scatter)
+    drawn = set_wild_aside(projected.times(draws), projected, problem.scatter)
     return float(np.quantile(largest_gain(drawn.pulls, projected, signatures), 1.0 - CHANCE))
 
 

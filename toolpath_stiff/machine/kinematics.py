@@ -133,9 +133,13 @@ def neutral_axes(machine: Machine) -> tuple[FloatArray, FloatArray]:
 
     They lie along the struts at the machine's neutral pose.
     """
-    neutral = machine.limits.neutral_pose
-    directions = solve_struts_at(machine, neutral).directions[0]
-    return directions, directions @ rotation_matrices(neutral[3:])
+
+    def axes() -> tuple[FloatArray, FloatArray]:
+        neutral = machine.limits.neutral_pose
+        directions = solve_struts_at(machine, neutral).directions[0]
+        return directions, directions @ rotation_matrices(neutral[3:])
+
+    return machine.once("neutral axes", axes)
 
 
 def joint_angles(machine: Machine, struts: Struts, rotation: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
@@ -167,9 +171,17 @@ def singularity_index(machine: Machine, struts: Struts) -> FloatArray:
     The determinant of the six strut screws does not depend on the point that moments are taken about, so
     neither tool length nor the choice of units enters the ratio.
     """
-    neutral = solve_struts_at(machine, machine.limits.neutral_pose)
     with np.errstate(divide="ignore", invalid="ignore"):  # singular at the neutral pose too: nan is out of reach
-        return np.asarray(np.abs(np.linalg.det(struts.jacobian)) / np.abs(np.linalg.det(neutral.jacobian[0])))
+        return np.asarray(np.abs(np.linalg.det(struts.jacobian)) / neutral_determinant(machine))
+
+
+def neutral_determinant(machine: Machine) -> float:
+    """|det J| at the neutral pose, m^3."""
+
+    def determinant() -> float:
+        return float(np.abs(np.linalg.det(solve_struts_at(machine, machine.limits.neutral_pose).jacobian[0])))
+
+    return machine.once("neutral determinant", determinant)
 
 
 def forward_kinematics(

@@ -22,18 +22,12 @@ from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.languages import foreign_program, refused_program
 from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc.inputs import split
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
-from toolpath_stiff.nc.reader import (
-    INTERPRETERS,
-    feed_assumption,
-    foreign_program,
-    millimetre_warning,
-    parse_program,
-    refused_program,
-)
-from toolpath_stiff.nc.request import ZERO
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, ReadProgram, Unsupported
+from toolpath_stiff.nc.reader import INTERPRETERS, feed_assumption, millimetre_warning, read
+from toolpath_stiff.nc.request import ZERO, Request
 from toolpath_stiff.nc.state import Flow, State, Then
 from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
 from toolpath_stiff.nc.words import Block, looks_like_cutter_location
@@ -107,7 +101,7 @@ class Checked:
     remarks
         What the tool table says of the tools that were used, by number.
     marks, jumps
-        Where operations begin, where the run left the order of the lines; as in `Program`.
+        Where operations begin, where the run left the order of the lines; as in `ReadProgram`.
     """
 
     used: tuple[UsedCode, ...]
@@ -428,7 +422,7 @@ def check_by(
         if interpreter == "builtin" or ours.complete or not second:
             return ours, "builtin"
     try:
-        program = parse_program("\n".join([*lines, ""]), name, controller=controller, **run, **options)
+        program = read(Request(lines, name, controller=controller, **run, **options))
     except InputError as error:
         if ours is not None:
             return _refused_by_both(ours, error), "builtin"
@@ -446,7 +440,7 @@ def _refused_by_both(ours: Checked, error: InputError) -> Checked:
     return replace(ours, findings=in_order([*ours.findings, said]))
 
 
-def _checked(program: Program, lines: tuple[str, ...], ours: Checked | None) -> Checked:
+def _checked(program: ReadProgram, lines: tuple[str, ...], ours: Checked | None) -> Checked:
     """What LinuxCNC's interpreter made of a program, and why the built-in one did not read it (`ours`)."""
     findings = findings_of((), program.warnings, program.assumptions)
     if ours is not None:

@@ -17,21 +17,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes.code import (
-    FEED,
-    LENGTH,
-    MODES,
-    MOTION,
-    ONCE,
-    ROTATION,
-    SPEED,
-    STEPS,
-    TOOL,
-    Code,
-    code_name,
-)
+from toolpath_stiff.nc.codes.code import Code, code_name
 from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
+from toolpath_stiff.nc.codes.groups import LAST_MODE
 from toolpath_stiff.nc.codes.motion import homes_standing
 from toolpath_stiff.nc.codes.offsets import HOLDS_TIP, list_numbers
 from toolpath_stiff.nc.codes.points import read_numbers
@@ -49,8 +38,7 @@ if TYPE_CHECKING:
 
 
 COORDINATES = frozenset((*AXES, "@"))
-LAST_MODE = STEPS[MODES[-1]]
-WORDS_THAT_ACT = (FEED, SPEED, TOOL)
+WORDS_THAT_ACT = ("F", "S", "T")
 
 
 def execute(state: State, block: Block) -> Then:
@@ -88,13 +76,13 @@ def finish(state: State, block: CurrentBlock) -> Then:
         )
     list_numbers(state, block)
     for letter in sorted(block.free):
-        raise block.fail(block.values[letter], "is not used by any code of its block", hint="remove it")
+        raise block.fail(letter, "is not used by any code of its block", hint="remove it")
     return block.flow
 
 
 def _in_order(block: CurrentBlock, ahead: bool) -> list[Code]:
     """The codes and words of a block that set modes (`ahead`), or act after those, in the order of execution."""
-    found = [code for name in block.groups.values() if (code := CODES[name]).when != MOTION]
+    found = [code for name in block.groups.values() if (code := CODES[name]).when != "motion"]
     found += [CODES[letter] for letter in WORDS_THAT_ACT if letter in block.values]
     return sorted((code for code in found if (code.rank <= LAST_MODE) == ahead), key=lambda code: code.rank)
 
@@ -119,7 +107,7 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
     current.free = set(current.values)
     for letter in ("U", "V", "W"):
         if letter in current.values and not homes_standing(current, letter):
-            raise current.fail(current.values[letter], "moves an axis that this machine does not have", "X Y Z A B C")
+            raise current.fail(letter, "moves an axis that this machine does not have", "X Y Z A B C")
     for letter, word in current.values.items():
         if letter in COORDINATES:
             if abs(word.value) > LARGEST_MM:
@@ -147,7 +135,7 @@ def _sort_g(state: State, block: CurrentBlock, word: Word) -> None:
         state.note(block.line, word, code.listed)
     other = block.groups.get(code.group)
     if other is not None:
-        if code.group == ONCE:  # LinuxCNC's modal group 0
+        if code.group == "non-modal":  # LinuxCNC's modal group 0
             raise block.fail(word, f"and {other} both act once, in this block", "one of them in a block")
         # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
         if name == "G80" and other != "G80":
@@ -188,9 +176,11 @@ def _same_group(block: CurrentBlock, word: Word, other: str, group: str) -> Exce
 
 def _check_axis_words(block: CurrentBlock) -> None:
     """Two codes that use the axis words of their block are an error."""
-    present = [name for group in (ONCE, ROTATION, LENGTH) if (name := block.groups.get(group)) is not None]
+    present = [
+        name for group in ("non-modal", "rotation", "tool length") if (name := block.groups.get(group)) is not None
+    ]
     takers = [name for name in present if CODES[name].takes_axes]
-    moving = block.groups.get(MOTION)
+    moving = block.groups.get("motion")
     if takers in (["G28"], ["G30"]) and moving in ("G0", "G1"):  # it homes, and that motion mode holds afterwards
         return
     if len(takers) > 1 or (takers and moving and moving != "G80"):
@@ -204,7 +194,7 @@ def _check_axis_words(block: CurrentBlock) -> None:
 
 def _move(state: State, block: CurrentBlock) -> None:
     """Change the motion mode, and move as the block asks."""
-    given = block.groups.get(MOTION)
+    given = block.groups.get("motion")
     if given is not None:
         if given in (*CYCLES, "G80") and state.dialect.increments and state.motion not in CYCLES:
             state.group_01 = state.motion
@@ -213,16 +203,14 @@ def _move(state: State, block: CurrentBlock) -> None:
         state.motion = given
         if given == "G80":
             CODES[given].act(state, block, given)
-    once = block.groups.get(ONCE)
-    instead = once if once is not None and CODES[once].when == MOTION else None  # G53
+    once = block.groups.get("non-modal")
+    instead = once if once is not None and CODES[once].when == "motion" else None  # G53
     if state.motion is None:
         for letter in POINT_WORDS:
             if block.has(letter):
-                raise block.fail(
-                    block.values[letter], "has no motion mode to move in", "G0, G1, G2, G3 or a cycle before it"
-                )
+                raise block.fail(letter, "has no motion mode to move in", "G0, G1, G2, G3 or a cycle before it")
         if instead is not None:
-            raise block.fail(block.codes[instead], "without G0 or G1")
+            raise block.fail(instead, "without G0 or G1")
     else:
         mode = instead or state.motion
         CODES[mode].act(state, block, mode)

@@ -11,21 +11,17 @@ from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis, tool_poses
-from toolpath_stiff.nc.moves import RAPID, Moves, Program, ToolUse
+from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram, ToolUse
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.recovery import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
 MOST_LINES = 5  # named in one sentence
-
-
 OWN_ZERO = (
     "G54 as the program or the controller file sets it is that of the machine that the program was posted for; it does "
     "not say where the work sits here"
 )
-
-
 OWN_POINTS = (
     "G53, G28 and G30 go to points of the machine that the program was posted for, as it stands about the work; their "
     "place on this machine means nothing"
@@ -42,8 +38,8 @@ class OnThePart:
 
 
 def recovered(
-    program: Program, kinematics: PostedKinematics, tip_held: Sequence[tuple[int, bool]], origin: Pose, source: str
-) -> Program:
+    program: ReadProgram, kinematics: PostedKinematics, tip_held: Sequence[tuple[int, bool]], origin: Pose, source: str
+) -> ReadProgram:
     """A program as read for its own machine, with the moves of the tool on the part.
 
     Parameters

@@ -11,6 +11,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.nc.codes.groups import Group
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.moves import Arc, Recorder, ToolUse, Unsupported
@@ -82,7 +83,7 @@ class CurrentBlock:
     name: str
     block: Block
     codes: dict[str, Word] = field(default_factory=dict)
-    groups: dict[str, str] = field(default_factory=dict)
+    groups: dict[Group, str] = field(default_factory=dict)
     values: dict[str, Word] = field(default_factory=dict)
     free: set[str] = field(default_factory=set)
     polar_words: tuple[Word, float | None, float | None] | None = None
@@ -93,7 +94,7 @@ class CurrentBlock:
         """Its line, from 1."""
         return self.block.line
 
-    def code(self, group: str) -> tuple[str, Word] | None:
+    def code(self, group: Group) -> tuple[str, Word] | None:
         """The code of a modal group, and its word; None if the block has none."""
         name = self.groups.get(group)
         return None if name is None else (name, self.codes[name])
@@ -122,8 +123,9 @@ class CurrentBlock:
             raise self.fail(self.values[letter], f"beside {word.text} is not a count", "a whole number from 1")
         return int(value)
 
-    def fail(self, word: Word | None, found: str, expected: str = "", hint: str = "") -> InputError:
-        """An error at a word of the block, or at the block."""
+    def fail(self, at: Word | str | None, found: str, expected: str = "", hint: str = "") -> InputError:
+        """An error at a word of the block (or that of a code or letter), or at the block."""
+        word = self.codes.get(at) or self.values.get(at) if isinstance(at, str) else at
         text = f"{word.text} {found}" if word else found
         column = word.column if word else self.block.words[0].column
         return ProgramError(text, expected=expected, hint=hint, file=self.name, line=self.line, column=column)

@@ -21,9 +21,8 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
@@ -102,27 +101,20 @@ class CaseStudy(FolderResult):
         """The path in its regions, coloured by stiffness."""
         return cast("Figure", self.view.regions_picture.figure(self))
 
-    def __str__(self) -> str:
-        return str(self.view.text(self))
-
     def _short(self) -> str:
         held = [conclusion["holds"] for conclusion in self.summary["conclusions"] if conclusion["holds"] is not None]
         on = f"{self.summary['program']} on " if self.is_own else ""
         verb = "conclusion of the paper holds" if len(held) == 1 else "conclusions of the paper hold"
         return f"{on}{self.summary['machine']}, {sum(held)} of {len(held)} {verb}"
 
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content of each file that `save` writes."""
-        return cast("Mapping[str, Content]", self.view.files(self, plots=plots))
 
-
-def case_study_program() -> Program:
+def case_study_program() -> ReadProgram:
     """The packaged path."""
     text = (resources.files("toolpath_stiff") / "data" / "programs" / PROGRAM).read_text(encoding="ascii")
     return parse_program(text, PROGRAM)
 
 
-def wavy_program(amplitude_mm: float) -> Program:
+def wavy_program(amplitude_mm: float) -> ReadProgram:
     """The square with its height going up and down once along every side: a non-planar cut of the same outline."""
     lines = ["G21 G90 F1200", "G0 X-100 Y-100 Z0"]
     corners = [(-100, -100), (100, -100), (100, 100), (-100, 100), (-100, -100)]
@@ -142,7 +134,7 @@ def origin_of(x_mm: float, y_mm: float, z_mm: float, turn_deg: float) -> Pose:
 def run_case_study(
     model: StiffnessModel,
     step: float = defaults.STEP,
-    read: Callable[[Pose], Program] | None = None,
+    read: Callable[[Pose], ReadProgram] | None = None,
     regions: Mapping[str, Region] | None = None,
     inputs: tuple[str, ...] = (),
 ) -> CaseStudy:

@@ -18,7 +18,7 @@ from toolpath_stiff.readings.loops import LoopColumns
 from toolpath_stiff.readings.measurements import Measurements, with_offsets
 
 if TYPE_CHECKING:
-    from toolpath_stiff.planning.rivals import Rival
+    from toolpath_stiff.planning.forecasts import Rival
 
 
 PLACES = 40  # with an indicator: a link shows at any pose where it is loaded

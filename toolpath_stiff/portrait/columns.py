@@ -195,7 +195,7 @@ class Ground:
     """
 
     def __init__(self, predictor: Predictor, compliance: FloatArray, law: FloatArray) -> None:
-        data, path = predictor.data, predictor.full_path()
+        data, path = predictor.data, predictor.full_path
         forces = predictor.strut_forces()
         self.predictor, self.data, self.compliance = predictor, data, compliance
         self.path: LoadPath = replace(path, strut_forces=forces * data.force[:, None], direction=data.direction)

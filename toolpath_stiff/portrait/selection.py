@@ -16,7 +16,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Precision, inverse_root
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem, law_prior
-from toolpath_stiff.inference.gates import Simulator, set_wild_aside
+from toolpath_stiff.inference.gates import set_wild_aside, simulate
 from toolpath_stiff.inference.noise import Noise, Scatter, scaled_inverse
 from toolpath_stiff.portrait.columns import Ground, shapes_near
 from toolpath_stiff.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of, products
@@ -196,7 +196,7 @@ class Selection:
     def chance(self, before: Description, gain: float) -> tuple[float, float]:
         """How often the best of all terms gains as much by chance; the gain that it rarely reaches."""
         projected = self._projected(before)
-        draws = Simulator.of(self.noise, self.problem.scatter.covariance, self.seed, DRAWS).draws
+        draws = simulate(self.noise, self.problem.scatter.covariance, self.seed, DRAWS)
         pulls = set_wild_aside(projected.times(draws), projected).pulls
         best = self._gains(-pulls @ self.dictionary.columns.T, before).max(axis=-1)
         return float((1.0 + (best >= gain).sum()) / (1.0 + len(best))), float(np.quantile(best, 1.0 - JOINS))

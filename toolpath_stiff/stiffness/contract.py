@@ -22,7 +22,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.machine.model import EffectEntry, Machine
+from toolpath_stiff.machine.model import Machine
 
 if TYPE_CHECKING:
     from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
@@ -112,6 +112,11 @@ def setup_parameter(meaning: str) -> Parameter:
     return Parameter(SETUP, "", 1.0, (0, 0), (0, 0), source=source, meaning=meaning, kind="text")
 
 
+def compliance(name: str, largest: float, typical: tuple[float, float], source: str, meaning: str) -> Parameter:
+    """The parameter of a part that gives way along a line, nm/N, from 0 to the largest."""
+    return Parameter(name, "nm/N", 1e-9, (0.0, largest), typical, source=source, meaning=meaning)
+
+
 def length_error(typical: tuple[float, float], source: str, meaning: str) -> Parameter:
     """The parameter of an effect by which a length of the geometry is off, mm: the true one less the stated one."""
     return Parameter("error", "mm", 1e-3, (-60.0, 60.0), typical, source=source, meaning=meaning)
@@ -161,11 +166,16 @@ class LoadPath:
 
     def take(self, rows: IntArray) -> LoadPath:
         """Some of the poses, by index; repeated as the index says."""
-        struts = Struts(*(getattr(self.struts, one.name)[rows] for one in fields(self.struts)))
-        arrays: dict[str, Any] = {
-            name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)
-        }
+        struts = Struts(*(getattr(self.struts, field.name)[rows] for field in fields(self.struts)))
+        arrays: Any = {name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         return replace(self, struts=struts, **arrays)
+
+
+def at_the_tip(path: LoadPath, compliances: FloatArray) -> FloatArray:
+    """(n, 12, 12) quadratic form of the tip force alone: compliances (n, 3, 3) or (3, 3) m/N, base axes."""
+    form = np.zeros((len(path), 12, 12))
+    form[:, 6:9, 6:9] = compliances
+    return form
 
 
 @dataclass(frozen=True)
@@ -384,14 +394,21 @@ class Effect:
         `p`: parameter name -> value in the units of files, choices as they are.
         """
         sizes = []
-        for one in self.parameters:
-            value = p[one.name] if one.discrete else f"{float(f'{p[one.name]:.3g}'):g} {one.unit}".rstrip()
-            sizes.append(f"{one.name.replace('_', ' ')} {value}")
+        for q in self.parameters:
+            value = p[q.name] if q.discrete else f"{float(f'{p[q.name]:.3g}'):g} {q.unit}".rstrip()
+            sizes.append(f"{q.name.replace('_', ' ')} {value}")
         return f"{self.title}, {', '.join(sizes)}"
 
     @property
     def hooks(self) -> list[str]:
-        """Which of `HOOKS` it implements."""
+        """Which of `HOOKS` it implements.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.effects()["weak_strut"].hooks
+        ['strut_compliance']
+        """
         return [hook for hook in HOOKS if getattr(type(self), hook) is not getattr(Effect, hook)]
 
     @property
@@ -415,38 +432,3 @@ def sizes_in_words(sizes: Sequence[tuple[float, str]]) -> str:
 def about(size: float) -> str:
     """How large it is, to two digits and without sign: "19", "0.054"."""
     return f"{float(f'{abs(size):.2g}'):g}"
-
-
-def read_parameters(effect: Effect, entry: EffectEntry, where: str) -> dict[str, Any]:
-    """SI values of an effect's parameters from a machine file's keys; choices as they are.
-
-    Raises
-    ------
-    InputError
-        A key is unknown or missing, a value is not a number or out of bounds; at its line of the machine file, or with
-        `where` for an entry that stands in none.
-    """
-    by_key = {parameter.key: parameter for parameter in effect.parameters}
-    for key in entry.parameters:
-        if key not in by_key:
-            known = f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance"
-            raise entry.error(f"effect {effect.name}: unknown key {key}", key, expected=known, where=where)
-    values: dict[str, Any] = {}
-    for key, parameter in by_key.items():
-        if key not in entry.parameters:
-            found = f"effect {effect.name}: {key} is missing"
-            raise entry.error(found, expected=parameter.expected, where=where)
-        value = entry.parameters[key]
-        if not _is_valid(parameter, value):
-            found = f"effect {effect.name}: {key} = {value!r}"
-            raise entry.error(found, key, expected=parameter.expected, where=where)
-        values[parameter.name] = float(value) * parameter.si if parameter.kind == "real" else value
-    return values
-
-
-def _is_valid(parameter: Parameter, value: object) -> bool:
-    if parameter.kind == "text":
-        return isinstance(value, str)
-    numbers = int if parameter.kind == "integer" else int | float
-    low, high = parameter.bounds
-    return isinstance(value, numbers) and not isinstance(value, bool) and low <= value <= high

@@ -22,21 +22,21 @@ from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
-from toolpath_stiff.machine.model import EffectEntry, Machine, with_parameter
+from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
-from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath, read_parameters
+from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
+from toolpath_stiff.stiffness.parameters import read_parameters
 from toolpath_stiff.units import mm_from_m
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
 TOOL = "tool_extension_mm"
-# Condition -> what it is, how a program gets it.
 WORDS = {
-    "temperature_C": ("the temperature, which nobody gives", both_names("--temperature")),
-    "time_min": ("the time since an indicator was zeroed, which no program has", ""),
-    "direction": ("the direction of a reading, which no program has", ""),
+    "temperature_C": f"the temperature, which nobody gives ({both_names('--temperature')})",
+    "time_min": "the time since an indicator was zeroed, which no program has",
+    "direction": "the direction of a reading, which no program has",
 }
 
 
@@ -139,17 +139,14 @@ def build_model(
     acting = [_activate(machine, entry, files, instrument=False) for entry in machine.effects]
     reading = [_activate(machine, entry, files, instrument=True) for entry in machine.instruments]
     if np.isfinite(machine.platform_bar_stiffness):
-        bars = ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness})
-        acting.insert(0, bars)
+        acting.insert(0, ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness}))
     for active in extra:
         (reading if active.effect.is_instrument else acting).append(active)
     names = [active.effect.name for active in (*acting, *reading)]
     for name in names:
         if names.count(name) > 1:
-            raise EffectError(
-                f"machine {machine.name}: effect {name} is given twice",
-                hint="keep one of them (finite platform bars count as platform_flexibility)",
-            )
+            hint = "keep one of them (finite platform bars count as platform_flexibility)"
+            raise EffectError(f"machine {machine.name}: effect {name} is given twice", hint=hint)
     return _assembled(machine, acting, reading, conditions or Conditions(machine.setup, machine.temperature))
 
 
@@ -185,22 +182,20 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     """
     if model.given is None:
         raise EffectError(f"a model without its machine has no parameter {name!r}")
-    if name in model.given.strut_law.parameters:
-        moved = with_parameter(model.given, name, change)
-        return _assembled(moved, model.effects, model.instruments, model.conditions)
-    owner, _, key = name.partition(".")
-    effects = {"effects": list(model.effects), "instruments": list(model.instruments)}
-    for kind in effects.values():
-        for i, active in enumerate(kind):
-            parameter = next((p for p in active.effect.parameters if p.key == key), None)
-            if active.effect.name == owner and parameter is not None and not parameter.discrete:
-                value = active.values[parameter.name] + change * parameter.si
-                low, high = (bound * parameter.si for bound in parameter.bounds)
-                if not low <= value <= high:
-                    raise EffectError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
-                kind[i] = ActiveEffect(active.effect, {**active.values, parameter.name: value})
-                return _assembled(model.given, effects["effects"], effects["instruments"], model.conditions)
-    raise EffectError(f"machine {model.given.name} has no parameter {name!r}")
+    given, groups = model.given, (list(model.effects), list(model.instruments))
+    if name in given.strut_law.parameters:
+        return _assembled(given.with_changes(strut_law=given.strut_law.moved(name, change)), *groups, model.conditions)
+    for group in groups:
+        for i, active in enumerate(group):
+            for parameter in active.effect.parameters:
+                if name == f"{active.effect.name}.{parameter.key}" and not parameter.discrete:
+                    value = active.values[parameter.name] + change * parameter.si
+                    low, high = (bound * parameter.si for bound in parameter.bounds)
+                    if not low <= value <= high:
+                        raise EffectError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
+                    group[i] = ActiveEffect(active.effect, {**active.values, parameter.name: value})
+                    return _assembled(given, *groups, model.conditions)
+    raise EffectError(f"machine {given.name} has no parameter {name!r}")
 
 
 def _activate(machine: Machine, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
@@ -293,13 +288,12 @@ class Idle:
 
 def idle_effects(model: StiffnessModel) -> list[Idle]:
     """The effects that add nothing to a program run under the model's conditions; instruments never do."""
-    found = [*model.withheld, *(_idle(active, model) for active in model.effects)]
-    return [one for one in found if one is not None]
+    return [*model.withheld, *(idle for active in model.effects if (idle := _idle(active, model)))]
 
 
 def acting_effects(model: StiffnessModel) -> tuple[ActiveEffect, ...]:
     """The other effects: those that headers list."""
-    return tuple(active for active in model.effects if _idle(active, model) is None)
+    return tuple(active for active in model.effects if not _idle(active, model))
 
 
 def acting_names(model: StiffnessModel) -> list[str]:
@@ -308,23 +302,23 @@ def acting_names(model: StiffnessModel) -> list[str]:
 
 
 def _idle(active: ActiveEffect, model: StiffnessModel) -> Idle | None:
-    waits_for, own = active.effect.conditions(active.values), setup_of(active)
-    missing = [name for name in waits_for if name not in model.conditions.known]
-    if missing:
-        return Idle(active.effect.name, "; ".join(_missing(name, own) for name in missing), True)
-    if SETUP in waits_for and own and own != model.conditions.setup:
+    waits_for, setup = active.effect.conditions(active.values), setup_of(active)
+    reasons = []
+    for name in waits_for:
+        if name in model.conditions.known:
+            continue
+        if name == SETUP:
+            belongs = f"it belongs to set-up {setup!r}" if setup else "it needs the set-up"
+            option = f"--setup {shlex.quote(setup) if setup else 'NAME'}"
+            reasons.append(f"{belongs}, and nobody says which set-up this is ({option}, or --setup {NO_SETUP})")
+        else:
+            reasons.append(f"it needs {WORDS[name]}")
+    if reasons:
+        return Idle(active.effect.name, "; ".join(reasons), True)
+    if SETUP in waits_for and setup and setup != model.conditions.setup:
         here = f"this is {model.conditions.setup!r}" if model.conditions.setup else "that is not there"
-        return Idle(active.effect.name, f"it belongs to set-up {own!r}, and {here}", False)
+        return Idle(active.effect.name, f"it belongs to set-up {setup!r}, and {here}", False)
     return None
-
-
-def _missing(name: str, own: str) -> str:
-    if name == SETUP:
-        belongs = f"it belongs to set-up {own!r}" if own else "it needs the set-up"
-        option = f"--setup {shlex.quote(own) if own else 'NAME'}"
-        return f"{belongs}, and nobody says which set-up this is ({option}, or --setup {NO_SETUP})"
-    what, option = WORDS[name]
-    return f"it needs {what}" + (f" ({option})" if option else "")
 
 
 def setup_of(active: ActiveEffect) -> str:
@@ -402,11 +396,11 @@ def idle_on_readings(model: StiffnessModel, missing: Collection[str], setups: Co
 
 def known_setups(models: Iterable[StiffnessModel]) -> list[str]:
     """The set-ups that machine files list and effects name."""
-    found: list[str] = []
+    names: dict[str, None] = {}
     for model in models:
-        found += (model.given or model.machine).setups
-        found += [setup_of(active) for active in (*model.effects, *model.instruments)]
-    return [name for name in dict.fromkeys(found) if name]
+        names |= dict.fromkeys((model.given or model.machine).setups)
+        names |= dict.fromkeys(setup_of(active) for active in (*model.effects, *model.instruments))
+    return [name for name in names if name]
 
 
 def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:

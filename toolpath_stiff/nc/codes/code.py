@@ -1,8 +1,6 @@
-"""The codes: what a code is, in which modal group it stands, and when in its block it acts.
+"""A code: its name, its modal group (`groups`), what it does, and the manual that it follows.
 
-Each module here has a group of codes, each a function and a row; `registry` joins the rows to one table. Modal groups
-and the order of execution are LinuxCNC's (manual, "G-Code Overview", "Modal Groups" and "Order of Execution"), because
-its interpreter is what the results are compared with.
+Each module here has a group of codes, each a function and a row; `registry` joins the rows to one table.
 """
 
 from __future__ import annotations
@@ -11,56 +9,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from toolpath_stiff.nc.codes.groups import STEPS, Group
 from toolpath_stiff.nc.state import CurrentBlock, State
-
-# Modal groups. Those of M codes begin with "M ", since a G code may have a group of that name too.
-MOTION, PLANE, DISTANCE, ARC_DISTANCE = "motion", "plane", "distance", "arc distance"
-
-
-UNITS, FEED_MODE, CUTTER, LENGTH = "units", "feed mode", "cutter compensation", "tool length"
-
-
-OFFSET, RETRACT, ONCE = "work offset", "cycle return", "non-modal"
-
-
-PATH_CONTROL, SPINDLE_MODE, DIAMETER = "path control", "spindle mode", "lathe diameter"
-
-
-POLAR, ROTATION, SCALING = "polar", "rotation", "scaling"
-
-
-M_STOP, M_TOOL, M_SPINDLE, M_COOLANT = "M stop", "M tool change", "M spindle", "M coolant"
-
-
-M_SUBPROGRAM, M_OVERRIDES = "M subprogram", "M overrides"
-
-
-EXACT_STOP, SMOOTHING, DYNAMIC, CORNER = "exact stop", "look-ahead", "dynamic offset", "corner"
-
-
-MIRROR, STROKE_CHECK, SPEED_WATCH, POLAR_PLANE = "mirror image", "stroke check", "speed watch", "polar interpolation"
-
-
-M_TAPPING, M_STATE = "M rigid tapping", "M modal state"
-
-
-DWELL, FEED, SPEED, TOOL = "dwell", "F", "S", "T"  # steps of their own: G4, and words that act without a code
-
-
-# The order in which the codes and words of a block act; the moves come last. Units first, so that an F beside G20 is
-# in inches. `MODES` may be executed ahead of the rest of the block: doing so twice changes nothing but dwells.
-MODES = (
-    UNITS, FEED_MODE, FEED, SPEED, TOOL, M_TOOL, DWELL, PLANE, POLAR, LENGTH, M_SUBPROGRAM, OFFSET,
-    PATH_CONTROL, EXACT_STOP, SMOOTHING, DYNAMIC, SPINDLE_MODE, DISTANCE, ARC_DISTANCE, RETRACT, CUTTER, DIAMETER,
-    SCALING, MIRROR, STROKE_CHECK, SPEED_WATCH, POLAR_PLANE, M_SPINDLE, M_COOLANT, M_OVERRIDES, M_TAPPING, M_STATE,
-)  # fmt: skip
-
-
-ACTS = (ROTATION, ONCE, M_STOP)
-
-
-STEPS = {step: at for at, step in enumerate((*MODES, *ACTS, MOTION, CORNER))}
-
 
 EVERYWHERE = ("generic", "linuxcnc", "fanuc", "haas")
 
@@ -103,12 +53,12 @@ class Code:
     """
 
     name: str
-    group: str
+    group: Group
     act: Act
     meaning: str
     source: str
     controls: tuple[str, ...] = EVERYWHERE
-    step: str = ""
+    step: Group | None = None
     takes_axes: bool = False
     listed: str = ""
     label: str = ""
@@ -127,7 +77,7 @@ class Code:
             raise ValueError(f"{self.name} is of the controls {self.controls}: expected some of {EVERYWHERE}")
 
     @property
-    def when(self) -> str:
+    def when(self) -> Group:
         """Its step of the order of execution."""
         return self.step or self.group
 

@@ -9,25 +9,7 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.nc import compensation, geometry
-from toolpath_stiff.nc.codes.code import (
-    ARC_DISTANCE,
-    CUTTER,
-    DIAMETER,
-    DISTANCE,
-    FEED_MODE,
-    M_COOLANT,
-    M_SPINDLE,
-    M_STOP,
-    M_SUBPROGRAM,
-    M_TOOL,
-    MOTION,
-    ONCE,
-    PLANE,
-    SPINDLE_MODE,
-    UNITS,
-    Code,
-    g_codes,
-)
+from toolpath_stiff.nc.codes.code import Code, g_codes
 from toolpath_stiff.nc.compensation import Cutter, OffsetArc, Pending, Step
 from toolpath_stiff.nc.geometry import Point2
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc
@@ -37,7 +19,18 @@ LEFT, RIGHT = 1, -1
 SIDES = {"G41": LEFT, "G41.1": LEFT, "G42": RIGHT, "G42.1": RIGHT}
 # What may stand in a block while compensation is on: all that LinuxCNC allows there and that leaves its path defined.
 GROUPS = frozenset(
-    {MOTION, CUTTER, DISTANCE, ARC_DISTANCE, FEED_MODE, SPINDLE_MODE, DIAMETER, M_SPINDLE, M_COOLANT, M_SUBPROGRAM}
+    {
+        "motion",
+        "cutter compensation",
+        "distance",
+        "arc distance",
+        "feed mode",
+        "spindle mode",
+        "lathe diameter",
+        "M spindle",
+        "M coolant",
+        "M subprogram",
+    }
 )
 MOTIONS = ("G0", "G1", "G2", "G3")
 OTHER_CONTROLS = "cutter compensation, whose entry and corners differ from control to control"
@@ -57,7 +50,7 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
         raise block.fail(word, f"is {OTHER_CONTROLS}", hint=NAME_CONTROL)
     if state.cutter is not None:
         raise block.fail(word, "while cutter compensation is on", "G40 before it")
-    _check_codes(state, block, (PLANE, UNITS, M_TOOL))
+    _check_codes(state, block, ("plane", "units", "M tool change"))
     frames = state.frames
     if state.plane == "G19":
         raise block.fail(word, "in the plane G19", "G17 or G18")
@@ -85,7 +78,7 @@ def _diameter(state: State, block: CurrentBlock, code: str) -> float:
             raise block.fail(word, "without the diameter", "D")
         return number * state.length_scale
     if number is not None and (number < 0 or number != int(number)):
-        raise block.fail(block.values["D"], "is not the number of a tool", "a whole number")
+        raise block.fail("D", "is not the number of a tool", "a whole number")
     if not number and state.renamed:
         raise block.fail(word, "of the tool in the spindle after M61", f"D{state.tool}")
     tool = int(number) if number else state.tool  # D0: of the tool in the spindle
@@ -103,7 +96,7 @@ def switch_off(state: State, block: CurrentBlock, code: str) -> None:
     if cutter is None or cutter.at is None:
         return
     if cutter.entering:
-        raise block.fail(block.codes[code], "right after the first move of cutter compensation", "a contour between")
+        raise block.fail(code, "right after the first move of cutter compensation", "a contour between")
     _settle(state, block, cutter, cutter.center)
     frames = state.frames
     there, here = frames.to_setup(frames.to_control(cutter.at)), frames.to_setup(frames.position)
@@ -119,19 +112,17 @@ def check_block(state: State, block: CurrentBlock) -> None:
 def _check_codes(state: State, block: CurrentBlock, also: tuple[str, ...]) -> None:
     for group, name in block.groups.items():
         harmless = (
-            (group == PLANE and name == state.plane)
-            or (group == UNITS and name == ("G20" if state.inch else "G21"))
-            or (group == ONCE and name == "G4")
-            or (group == M_STOP and name in ("M2", "M30"))  # a stop ends the move before it, without a corner
+            (group == "plane" and name == state.plane)
+            or (group == "units" and name == ("G20" if state.inch else "G21"))
+            or (group == "non-modal" and name == "G4")
+            or (group == "M stop" and name in ("M2", "M30"))  # a stop ends the move before it, without a corner
         )
-        moves = group == MOTION and name not in MOTIONS
+        moves = group == "motion" and name not in MOTIONS
         if moves or (group not in GROUPS and group not in also and not harmless):
-            raise block.fail(
-                block.codes[name], "while cutter compensation is on (G41, G42)", "G40 in a block before it"
-            )
+            raise block.fail(name, "while cutter compensation is on (G41, G42)", "G40 in a block before it")
     polar = next((letter for letter in "@^" if block.has(letter)), None)
     if polar is not None:
-        raise block.fail(block.values[polar], "while cutter compensation is on", "X and Y")
+        raise block.fail(polar, "while cutter compensation is on", "X and Y")
 
 
 # -- moves -------------------------------------------------------------------------------------------------------------
@@ -360,9 +351,18 @@ _CUTTER, _DYNAMIC = (
 )
 _NAMED = ("linuxcnc", "fanuc", "haas")
 CUTTER_CODES = (
-    Code("G40", CUTTER, switch_off, "cutter compensation off", g_codes("G40")),
-    Code("G41", CUTTER, switch_on, "cutter compensation, tool on the left", _CUTTER, _NAMED),
-    Code("G42", CUTTER, switch_on, "cutter compensation, tool on the right", _CUTTER, _NAMED),
-    Code("G41.1", CUTTER, switch_on, "the same by the diameter in D, on the left", _DYNAMIC, ("linuxcnc",)),
-    Code("G42.1", CUTTER, switch_on, "the same by the diameter in D, on the right", _DYNAMIC, ("linuxcnc",)),
+    Code("G40", "cutter compensation", switch_off, "cutter compensation off", g_codes("G40")),
+    Code("G41", "cutter compensation", switch_on, "cutter compensation, tool on the left", _CUTTER, _NAMED),
+    Code("G42", "cutter compensation", switch_on, "cutter compensation, tool on the right", _CUTTER, _NAMED),
+    Code(
+        "G41.1", "cutter compensation", switch_on, "the same by the diameter in D, on the left", _DYNAMIC, ("linuxcnc",)
+    ),
+    Code(
+        "G42.1",
+        "cutter compensation",
+        switch_on,
+        "the same by the diameter in D, on the right",
+        _DYNAMIC,
+        ("linuxcnc",),
+    ),
 )

@@ -7,7 +7,7 @@ cycle") where a dialect follows them.
 from __future__ import annotations
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.code import MOTION, RETRACT, Code, g_codes
+from toolpath_stiff.nc.codes.code import Code, g_codes
 from toolpath_stiff.nc.codes.modes import time_word
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_polar_words
@@ -46,14 +46,14 @@ def begin_cycle(state: State, code: str) -> None:
 
 def cycle(state: State, block: CurrentBlock, code: str) -> None:
     """One block of a canned cycle: its holes, expanded."""
-    given = MOTION in block.groups
+    given = "motion" in block.groups
     if not given and not any(block.has(letter) for letter in POINT_WORDS):
         return
     if code == "G76" and not state.dialect.increments:
         if state.dialect.name == "linuxcnc":
-            raise block.fail(block.codes.get(code), "is a lathe's threading cycle on LinuxCNC", hint="this is a mill")
+            raise block.fail(code, "is a lathe's threading cycle on LinuxCNC", hint="this is a mill")
         raise block.fail(
-            block.codes.get(code),
+            code,
             "is a threading cycle on LinuxCNC, fine boring on Fanuc's and Haas' controls",
             hint="name the control with --dialect, or leave threading out",
         )
@@ -177,7 +177,7 @@ def _words_of_one_control(state: State, block: CurrentBlock, code: str) -> None:
     if code in TAPS and haas and block.take("J") is not None:
         state.note(block.line, block.values["J"], "how much faster the tap comes out")
     if code in TAPS and state.sticky.get("Q"):
-        raise block.fail(block.values.get("Q"), "is a tap in pecks, which depends on the control's parameters", "no Q")
+        raise block.fail("Q", "is a tap in pecks, which depends on the control's parameters", "no Q")
     for letter in "QIJ" if code == "G76" else "":
         block.take(letter)
         if letter in block.values:
@@ -192,7 +192,7 @@ def _shallower_pecks(state: State, block: CurrentBlock) -> None:
             state.sticky |= dict.fromkeys("IJK", 0.0)
         return
     if "Q" in block.values or "I" not in given or ("J" in given and "K" not in given):
-        raise block.fail(block.values[given[0]], "beside Q, or without I or K", "Q, or I, J and K")
+        raise block.fail(given[0], "beside Q, or without I or K", "Q, or I, J and K")
     for letter in "IJK":
         state.sticky[letter] = abs(block.take(letter) or 0.0) * state.length_scale
     state.sticky["Q"] = state.sticky["K"] or state.sticky["I"]
@@ -239,18 +239,23 @@ _FANUC = "Fanuc, operator's manuals, Canned cycle for drilling"
 
 
 DRILLING_CODES = (
-    Code("G73", MOTION, cycle, "chip-breaking drilling", g_codes("G73")),
-    Code("G81", MOTION, cycle, "drilling", g_codes("G81")),
-    Code("G82", MOTION, cycle, "drilling with dwell", g_codes("G82")),
-    Code("G83", MOTION, cycle, "peck drilling", g_codes("G83")),
-    Code("G74", MOTION, cycle, "left-hand tapping", f"{g_codes('G74')}; {_FANUC}, G74"),
-    Code("G84", MOTION, cycle, "right-hand tapping", f"{g_codes('G84')}; {_FANUC}, G84"),
+    Code("G73", "motion", cycle, "chip-breaking drilling", g_codes("G73")),
+    Code("G81", "motion", cycle, "drilling", g_codes("G81")),
+    Code("G82", "motion", cycle, "drilling with dwell", g_codes("G82")),
+    Code("G83", "motion", cycle, "peck drilling", g_codes("G83")),
+    Code("G74", "motion", cycle, "left-hand tapping", f"{g_codes('G74')}; {_FANUC}, G74"),
+    Code("G84", "motion", cycle, "right-hand tapping", f"{g_codes('G84')}; {_FANUC}, G84"),
     Code(
-        "G76", MOTION, cycle, "fine boring, rapid out", f"{_FANUC}, Fine boring cycle (G76)", controls=("fanuc", "haas")
+        "G76",
+        "motion",
+        cycle,
+        "fine boring, rapid out",
+        f"{_FANUC}, Fine boring cycle (G76)",
+        controls=("fanuc", "haas"),
     ),
-    Code("G86", MOTION, cycle, "boring, spindle stop, rapid out", g_codes("G86")),
-    Code("G85", MOTION, cycle, "boring, feed out", g_codes("G85")),
-    Code("G89", MOTION, cycle, "boring with dwell, feed out", g_codes("G89")),
-    Code("G98", RETRACT, return_level, "cycles return to their level", g_codes("G98 G99")),
-    Code("G99", RETRACT, return_level, "cycles return to R", g_codes("G98 G99")),
+    Code("G86", "motion", cycle, "boring, spindle stop, rapid out", g_codes("G86")),
+    Code("G85", "motion", cycle, "boring, feed out", g_codes("G85")),
+    Code("G89", "motion", cycle, "boring with dwell, feed out", g_codes("G89")),
+    Code("G98", "cycle return", return_level, "cycles return to their level", g_codes("G98 G99")),
+    Code("G99", "cycle return", return_level, "cycles return to R", g_codes("G98 G99")),
 )

@@ -10,25 +10,7 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.codes.code import (
-    ARC_DISTANCE,
-    DISTANCE,
-    DWELL,
-    FEED,
-    FEED_MODE,
-    M_STOP,
-    M_SUBPROGRAM,
-    ONCE,
-    PLANE,
-    SPEED,
-    SPINDLE_MODE,
-    UNITS,
-    Alias,
-    Code,
-    g_codes,
-    holds_anyway,
-    m_codes,
-)
+from toolpath_stiff.nc.codes.code import Alias, Code, g_codes, holds_anyway, m_codes
 from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated
 from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
 from toolpath_stiff.nc.frames import Numbers
@@ -48,7 +30,7 @@ def units(state: State, block: CurrentBlock, code: str) -> None:
     inch = code == "G20"
     if inch != state.inch and state.frames.tool:
         raise block.fail(
-            block.codes[code],
+            code,
             "while a tool length is in force: LinuxCNC would read its number in the new unit",
             "G49 before it",
         )
@@ -80,15 +62,15 @@ _FANUC_INCH = "Fanuc, operator's manuals, Inch/metric conversion (G20 G21, in G-
 
 
 MODE_CODES = (
-    Code("G17", PLANE, plane, "plane XY", _PLANE),
-    Code("G18", PLANE, plane, "plane ZX", _PLANE),
-    Code("G19", PLANE, plane, "plane YZ", _PLANE),
-    Code("G20", UNITS, units, "inch", _UNITS),
-    Code("G21", UNITS, units, "mm", _UNITS),
-    Code("G90", DISTANCE, distance, "absolute", _DISTANCE),
-    Code("G91", DISTANCE, distance, "incremental", _DISTANCE),
-    Code("G90.1", ARC_DISTANCE, arc_distance, "absolute arc centres", g_codes("G90.1 G91.1")),
-    Code("G91.1", ARC_DISTANCE, arc_distance, "incremental arc centres", g_codes("G90.1 G91.1")),
+    Code("G17", "plane", plane, "plane XY", _PLANE),
+    Code("G18", "plane", plane, "plane ZX", _PLANE),
+    Code("G19", "plane", plane, "plane YZ", _PLANE),
+    Code("G20", "units", units, "inch", _UNITS),
+    Code("G21", "units", units, "mm", _UNITS),
+    Code("G90", "distance", distance, "absolute", _DISTANCE),
+    Code("G91", "distance", distance, "incremental", _DISTANCE),
+    Code("G90.1", "arc distance", arc_distance, "absolute arc centres", g_codes("G90.1 G91.1")),
+    Code("G91.1", "arc distance", arc_distance, "incremental arc centres", g_codes("G90.1 G91.1")),
 )
 
 
@@ -144,7 +126,7 @@ def speed_word(state: State, block: CurrentBlock, code: str) -> None:
     speed = block.take("S")
     assert speed is not None
     if speed < 0.0:
-        raise block.fail(block.values["S"], "is a negative speed", "S of 0 or more")
+        raise block.fail("S", "is a negative speed", "S of 0 or more")
     state.speed = speed
 
 
@@ -180,7 +162,7 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
             )
         state.assume(f"the {letter} of G4 is a time in seconds, as {'Fanuc' if letter == 'X' else 'Marlin'} means it")
     if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
-        raise block.fail(block.codes[code], "needs its time", "P with the seconds, 0 or more")
+        raise block.fail(code, "needs its time", "P with the seconds, 0 or more")
     state.recorder.add_dwell(seconds)
 
 
@@ -244,17 +226,17 @@ _FEEDS, _SPINDLE = g_codes("G93 G94 G95"), g_codes("G96 G97")
 
 
 FEED_CODES = (
-    Code("F", FEED, feed_word, "feed", "LinuxCNC, Other Codes, F: Set Feed Rate"),
-    Code("S", SPEED, speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
-    Code("G4", ONCE, dwell, "dwell", f"{g_codes('G4')}; {_FANUC}, Dwell (G04); Marlin, G004", step=DWELL),
-    Code("G93", FEED_MODE, feed_mode, "inverse-time feed", _FEEDS),
-    Code("G94", FEED_MODE, feed_mode, "feed per minute", _FEEDS),
-    Code("G95", FEED_MODE, feed_mode, "feed per revolution", _FEEDS),
+    Code("F", "F", feed_word, "feed", "LinuxCNC, Other Codes, F: Set Feed Rate"),
+    Code("S", "S", speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
+    Code("G4", "non-modal", dwell, "dwell", f"{g_codes('G4')}; {_FANUC}, Dwell (G04); Marlin, G004", step="dwell"),
+    Code("G93", "feed mode", feed_mode, "inverse-time feed", _FEEDS),
+    Code("G94", "feed mode", feed_mode, "feed per minute", _FEEDS),
+    Code("G95", "feed mode", feed_mode, "feed per revolution", _FEEDS),
     Code(
-        "G96", SPINDLE_MODE, surface_speed, "constant surface speed", _SPINDLE,
+        "G96", "spindle mode", surface_speed, "constant surface speed", _SPINDLE,
         listed="constant surface speed: the spindle speed does not enter",
     ),
-    Code("G97", SPINDLE_MODE, holds_anyway, "spindle speed in revolutions", _SPINDLE, label=SPINDLE_MODE),
+    Code("G97", "spindle mode", holds_anyway, "spindle speed in revolutions", _SPINDLE, label="spindle mode"),
 )  # fmt: skip
 
 
@@ -267,13 +249,13 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
             "is Haas' call of a block by its N number",
             hint="give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)",
         )
-    if block.groups.get(ONCE) in ("G4", "G10"):
+    if block.groups.get("non-modal") in ("G4", "G10"):
         raise block.fail(word, "beside a code that uses the P word too", "two blocks")
     local = code == "M97"
     if code == "M98" and block.has("Q"):
         if state.dialect.name != "fanuc" or block.has("P"):
             raise block.fail(
-                block.values["Q"],
+                "Q",
                 "beside M98 names the block at which the call begins, as on Fanuc's controls with parameter 6005",
                 hint="make what it calls a subprogram of its own (O, M99)"
                 if block.has("P")
@@ -293,9 +275,7 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
 
 def macro_call(state: State, block: CurrentBlock, code: str) -> None:
     """G65, G66, G67: `parametric` carries them out; what comes here is of a control that has none."""
-    raise block.fail(
-        block.codes[code], "is a macro call of Fanuc's and Haas' controls", hint="name the control with --dialect"
-    )
+    raise block.fail(code, "is a macro call of Fanuc's and Haas' controls", hint="name the control with --dialect")
 
 
 def end_of_subprogram(state: State, block: CurrentBlock, code: str) -> None:
@@ -316,19 +296,19 @@ _MACROS = "Fanuc, operator's manuals, Custom macro, Macro call (G65, G66, G67)"
 
 
 FLOW_CODES = (
-    Code("M0", M_STOP, holds_anyway, "stop", m_codes("M0 M1")),
-    Code("M1", M_STOP, holds_anyway, "optional stop", m_codes("M0 M1")),
-    Code("M60", M_STOP, holds_anyway, "stop", m_codes("M60")),
-    Code("M2", M_STOP, end_of_program, "end", m_codes("M2 M30")),
-    Code("M30", M_STOP, end_of_program, "end", m_codes("M2 M30")),
+    Code("M0", "M stop", holds_anyway, "stop", m_codes("M0 M1")),
+    Code("M1", "M stop", holds_anyway, "optional stop", m_codes("M0 M1")),
+    Code("M60", "M stop", holds_anyway, "stop", m_codes("M60")),
+    Code("M2", "M stop", end_of_program, "end", m_codes("M2 M30")),
+    Code("M30", "M stop", end_of_program, "end", m_codes("M2 M30")),
     Code(
-        "M97", M_SUBPROGRAM, call, "call by line number (Haas)", "Haas, mill operator's manual, M97",
+        "M97", "M subprogram", call, "call by line number (Haas)", "Haas, mill operator's manual, M97",
         controls=("haas",),
     ),
-    Code("M98", M_SUBPROGRAM, call, "subprogram call", _CALLS),
+    Code("M98", "M subprogram", call, "subprogram call", _CALLS),
     *(
-        Code(code, ONCE, macro_call, meaning, _MACROS, controls=("generic", "fanuc", "haas"))
+        Code(code, "non-modal", macro_call, meaning, _MACROS, controls=("generic", "fanuc", "haas"))
         for code, meaning in (("G65", "macro call"), ("G66", "macro call after moves"), ("G67", "no such call"))
     ),
-    Code("M99", M_SUBPROGRAM, end_of_subprogram, "subprogram end", _CALLS),
+    Code("M99", "M subprogram", end_of_subprogram, "subprogram end", _CALLS),
 )  # fmt: skip

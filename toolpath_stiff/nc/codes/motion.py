@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.code import CORNER, DISTANCE, MOTION, ONCE, Code, g_codes
+from toolpath_stiff.nc.codes.code import Code, g_codes
 from toolpath_stiff.nc.codes.cutter import offset_move
 from toolpath_stiff.nc.codes.modes import feed_of_move
 from toolpath_stiff.nc.codes.points import (
@@ -113,9 +113,9 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
         if state.corner is not None and code == "G1":
             cut_corner(state, block, target)
         record(state, block, RAPID if code == "G0" else FEED, target, words)
-    elif MOTION in block.groups and state.beside is not None:  # to the programmed point, as LinuxCNC does
+    elif "motion" in block.groups and state.beside is not None:  # to the programmed point, as LinuxCNC does
         record(state, block, RAPID if code == "G0" else FEED, list(state.frames.position))
-    elif MOTION in block.groups and code == "G1" and state.height_lost:  # rs274 moves then
+    elif "motion" in block.groups and code == "G1" and state.height_lost:  # rs274 moves then
         find_height(state, block, FEED, named=False)
 
 
@@ -149,7 +149,7 @@ INCREMENTAL_AXES = "UVW"  # X, Y, Z in steps, on lathes and as G28 U0 W0 on mill
 
 def homes_standing(block: CurrentBlock, letter: str) -> bool:
     """Whether U, V or W is 0 beside G28 or G30: X, Y or Z goes home from where it stands."""
-    return block.groups.get(ONCE) in ("G28", "G30") and block.values[letter].value == 0.0
+    return block.groups.get("non-modal") in ("G28", "G30") and block.values[letter].value == 0.0
 
 
 def go_home(state: State, block: CurrentBlock, code: str) -> None:
@@ -157,7 +157,7 @@ def go_home(state: State, block: CurrentBlock, code: str) -> None:
     standing = {axis for axis, letter in enumerate(INCREMENTAL_AXES) if block.take(letter) is not None}
     words = axis_words(state, block)
     if code == "G30" and state.dialect.increments and block.take("P") not in (None, 2):  # P2: as G30 alone (Fanuc)
-        raise block.fail(block.values["P"], "is a reference point that nothing gives", "P2")
+        raise block.fail("P", "is a reference point that nothing gives", "P2")
     frames = state.frames
     _leave_program_coordinates(state, block, block.codes[code], {**dict.fromkeys(standing, 0.0), **words})
     if words:
@@ -199,20 +199,20 @@ _G28, _G30 = g_codes("G28 - G28.1"), g_codes("G30 - G30.1")
 
 
 STRAIGHT_CODES = (
-    Code("G0", MOTION, straight, "rapid", g_codes("G0"), many=True),
-    Code("G1", MOTION, straight, "feed", g_codes("G1"), many=True),
+    Code("G0", "motion", straight, "rapid", g_codes("G0"), many=True),
+    Code("G1", "motion", straight, "feed", g_codes("G1"), many=True),
     Code(
         "G80",
-        MOTION,
+        "motion",
         motion_off,
         "motion mode off; on Fanuc's and Haas' controls the cycle alone",
         f"{g_codes('G80')}; Fanuc, operator's manuals, Canned cycle cancel (G80)",
     ),
-    Code("G53", ONCE, machine_move, "machine coordinates", g_codes("G53"), step=MOTION),
-    Code("G28", ONCE, go_home, "to the first reference point", _G28, takes_axes=True),
-    Code("G30", ONCE, go_home, "to the second reference point", _G30, takes_axes=True),
-    Code("G28.1", ONCE, set_home, "set the first reference point", _G28, label=ONCE),
-    Code("G30.1", ONCE, set_home, "set the second reference point", _G30, label=ONCE),
+    Code("G53", "non-modal", machine_move, "machine coordinates", g_codes("G53"), step="motion"),
+    Code("G28", "non-modal", go_home, "to the first reference point", _G28, takes_axes=True),
+    Code("G30", "non-modal", go_home, "to the second reference point", _G30, takes_axes=True),
+    Code("G28.1", "non-modal", set_home, "set the first reference point", _G28, label="non-modal"),
+    Code("G30.1", "non-modal", set_home, "set the second reference point", _G30, label="non-modal"),
 )
 
 
@@ -242,7 +242,11 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     """Shorten the move before this one, and add the corner between them; the tool then stands at its end."""
     asked, frames, recorder = state.corner, state.frames, state.recorder
     assert asked is not None
-    others = block.groups.keys() - {MOTION, DISTANCE, *(group for group in block.groups if group.startswith("M "))}
+    others = block.groups.keys() - {
+        "motion",
+        "distance",
+        *(group for group in block.groups if group.startswith("M ")),
+    }
     if others or recorder.dwell[-1]:
         raise block.fail(
             None, f"the second move of a corner ({asked.letter}, line {asked.line}) beside other codes", "G1"
@@ -270,8 +274,8 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
 
 
 CORNER_CODES = (
-    Code(",C", CORNER, corner, "chamfer to the next block", _CORNER, ("generic", "fanuc", "haas")),
-    Code(",R", CORNER, corner, "rounding to the next block", _CORNER, ("generic", "fanuc", "haas")),
+    Code(",C", "corner", corner, "chamfer to the next block", _CORNER, ("generic", "fanuc", "haas")),
+    Code(",R", "corner", corner, "rounding to the next block", _CORNER, ("generic", "fanuc", "haas")),
 )
 
 
@@ -283,7 +287,7 @@ MOST_TURNS = 10_000
 
 def arc(state: State, block: CurrentBlock, code: str) -> None:
     """G2, G3: clockwise and counter-clockwise in the plane in force, to the point that the axis words name."""
-    if not (any(block.has(letter) for letter in (*POINT_WORDS, *geometry.CENTER_LETTERS)) or MOTION in block.groups):
+    if not (any(block.has(letter) for letter in (*POINT_WORDS, *geometry.CENTER_LETTERS)) or "motion" in block.groups):
         return
     if state.beside is not None:
         raise block.fail(block.block.words[0], "is an arc as the first move after cutter compensation", "G0 or G1")
@@ -330,7 +334,7 @@ def _turns(block: CurrentBlock) -> int:
     if turns is None:
         return 1
     if turns != int(turns) or not 1 <= turns <= MOST_TURNS:
-        raise block.fail(block.values["P"], "is not a number of turns", "a whole number from 1")
+        raise block.fail("P", "is not a number of turns", "a whole number from 1")
     return int(turns)
 
 
@@ -350,13 +354,13 @@ def _center(
     if block.has(off_plane) and block.values[off_plane].value == 0.0:
         block.take(off_plane)  # posts write all three
     if block.has(off_plane):
-        raise block.fail(block.values[off_plane], f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
+        raise block.fail(off_plane, f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
     offsets = [block.take(letter) for letter in in_plane]
     if state.polar is not None and offsets != [None, None]:
         raise geometry.ArcError("an arc with I, J or K in polar mode (G16)", "R")
     if radius is not None:
         if offsets != [None, None]:
-            raise block.fail(block.values["R"], "and a centre (I, J, K) are both given", "one of them")
+            raise block.fail("R", "and a centre (I, J, K) are both given", "one of them")
         if not {first, second} & words.keys():
             raise geometry.ArcError("an arc with R and without an end point", "an axis word of the plane")
         return center_by_radius(start, end, radius, state.length_scale, clockwise)
@@ -371,6 +375,6 @@ def _center(
 
 
 ARC_CODES = (
-    Code("G2", MOTION, arc, "clockwise arc", g_codes("G2 G3"), many=True),
-    Code("G3", MOTION, arc, "counter-clockwise arc", g_codes("G2 G3"), many=True),
+    Code("G2", "motion", arc, "clockwise arc", g_codes("G2 G3"), many=True),
+    Code("G3", "motion", arc, "counter-clockwise arc", g_codes("G2 G3"), many=True),
 )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from toolpath_stiff.nc.codes.code import LENGTH, M_TOOL, OFFSET, ONCE, TOOL, Alias, Code, g_codes, m_codes
+from toolpath_stiff.nc.codes.code import Alias, Code, g_codes, m_codes
 from toolpath_stiff.nc.codes.motion import know_position
 from toolpath_stiff.nc.codes.points import axis_words, forget_polar, refuse_while_rotated, zero_moved
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -106,7 +106,7 @@ def _set_offset(state: State, block: CurrentBlock, word: Word, level: float | No
     rotation = block.take("R")
     if rotation is not None:
         if level == 20:
-            raise block.fail(block.values["R"], "does not go with L20", "L2")
+            raise block.fail("R", "does not go with L20", "L2")
         if index == frames.active and rotation != offset.rotation:
             state.unsettled = "G10"
         offset.rotation = rotation
@@ -233,30 +233,30 @@ def shift_state(state: State, block: CurrentBlock, code: str) -> None:
 
 OFFSET_CODES = (
     *(
-        Code(code, OFFSET, work_offset, f"work offset {number}", g_codes("G54-G59.3"), label=OFFSET)
+        Code(code, "work offset", work_offset, f"work offset {number}", g_codes("G54-G59.3"), label="work offset")
         for number, code in enumerate(WORK_OFFSETS, 1)
     ),
     Code(
-        "G54.1", OFFSET, additional_offset, "additional work offset",
+        "G54.1", "work offset", additional_offset, "additional work offset",
         "Fanuc, operator's manuals, Additional workpiece coordinate systems (G54.1)", controls=("generic", "fanuc"),
     ),
     Code(
-        "G154", OFFSET, additional_offset, "additional work offset (Haas)", "Haas, mill operator's manual, G154",
+        "G154", "work offset", additional_offset, "additional work offset (Haas)", "Haas, mill operator's manual, G154",
         controls=("generic", "haas"),
     ),
     *(
         Code(
-            f"G{number}", OFFSET, numbered_offset, "additional work offset (Haas: G154 P1 to P20)",
-            "Haas, mill operator's manual, G110-G129", ("haas",), label=OFFSET,
+            f"G{number}", "work offset", numbered_offset, "additional work offset (Haas: G154 P1 to P20)",
+            "Haas, mill operator's manual, G110-G129", ("haas",), label="work offset",
         )
         for number in range(FIRST_NUMBERED, FIRST_NUMBERED + 20)
     ),
-    Code("G10", ONCE, set_offsets, "set offsets", g_codes("G10 L1, G10 L2, G10 L20"), takes_axes=True),
-    Code("G52", ONCE, local_shift, "local shift", g_codes("G52"), takes_axes=True),
-    Code("G92", ONCE, present_point, "shift", g_codes("G92"), takes_axes=True),
-    Code("G92.1", ONCE, shift_state, "no shift any more", g_codes("G92.1 G92.2"), label=ONCE),
-    Code("G92.2", ONCE, shift_state, "shift suspended", g_codes("G92.1 G92.2"), label=ONCE),
-    Code("G92.3", ONCE, shift_state, "shift restored", g_codes("G92.3"), label=ONCE),
+    Code("G10", "non-modal", set_offsets, "set offsets", g_codes("G10 L1, G10 L2, G10 L20"), takes_axes=True),
+    Code("G52", "non-modal", local_shift, "local shift", g_codes("G52"), takes_axes=True),
+    Code("G92", "non-modal", present_point, "shift", g_codes("G92"), takes_axes=True),
+    Code("G92.1", "non-modal", shift_state, "no shift any more", g_codes("G92.1 G92.2"), label="non-modal"),
+    Code("G92.2", "non-modal", shift_state, "shift suspended", g_codes("G92.1 G92.2"), label="non-modal"),
+    Code("G92.3", "non-modal", shift_state, "shift restored", g_codes("G92.3"), label="non-modal"),
 )  # fmt: skip
 
 
@@ -285,7 +285,7 @@ def name_tool(state: State, block: CurrentBlock, code: str) -> None:
     """M61 Q: the tool in the spindle has that number; what T has selected for the next M6 stays."""
     number = block.take("Q")
     if number is None or number < 0 or number != int(number):
-        raise block.fail(block.codes[code], "needs the tool number", "Q with a whole number")
+        raise block.fail(code, "needs the tool number", "Q with a whole number")
     state.tool, state.renamed = int(number), True
     _forget_changes(state)
 
@@ -330,13 +330,13 @@ def hold_tip(state: State, block: CurrentBlock, code: str) -> None:
 def list_numbers(state: State, block: CurrentBlock) -> None:
     """D and H beside a tool change or a tool length: numbers of offsets that nothing of the block uses."""
     present = block.groups.keys()
-    if block.has("D") and (present & {LENGTH, M_TOOL} or "T" in block.values):
+    if block.has("D") and (present & {"tool length", "M tool change"} or "T" in block.values):
         block.take("D")
         state.note(block.line, block.values["D"], "the number of a radius offset, which acts with G41 and G42 alone")
-    if not block.has("H") or not (present & {M_TOOL} or "G49" in block.codes or "T" in block.values):
+    if not block.has("H") or not (present & {"M tool change"} or "G49" in block.codes or "T" in block.values):
         return
     if not math.isnan(state.tool_length):
-        raise block.fail(block.values["H"], "without G43, while a tool length is in force", "G43 beside it")
+        raise block.fail("H", "without G43, while a tool length is in force", "G43 beside it")
     state.named_length = block.take("H")
     state.note(block.line, block.values["H"], "the number of a tool length, which acts with G43 alone")
 
@@ -389,7 +389,7 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
         if state.dialect.increments:
             return math.nan
         raise block.fail(
-            block.values["H"],
+            "H",
             "is no offset on some controls, on LinuxCNC that of the tool",
             "H or G49",
             "name the control with --dialect",
@@ -401,7 +401,7 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
     if number is None and state.renamed:
         raise block.fail(word, f"without H after M61: {differ}", f"G43 H{tool}, or T and M6")
     if number is not None and (number < 0 or number != int(number)):
-        raise block.fail(block.values["H"], "is not a tool number", "a whole number")
+        raise block.fail("H", "is not a tool number", "a whole number")
     if state.tools is None:
         raise block.fail(
             word,
@@ -414,17 +414,17 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
 
 
 TOOL_CODES = (
-    Code("T", TOOL, tool_word, "the tool of the next M6", "LinuxCNC, Other Codes, T: Select Tool"),
-    Code("M6", M_TOOL, change_tool, "tool change", m_codes("M6")),
-    Code("M61", M_TOOL, name_tool, "tool number", m_codes("M61")),
-    Code("G43", LENGTH, table_length, "tool length", g_codes("G43")),
-    Code("G43.1", LENGTH, length_of_z, "tool length in the block", g_codes("G43.1"), takes_axes=True),
+    Code("T", "T", tool_word, "the tool of the next M6", "LinuxCNC, Other Codes, T: Select Tool"),
+    Code("M6", "M tool change", change_tool, "tool change", m_codes("M6")),
+    Code("M61", "M tool change", name_tool, "tool number", m_codes("M61")),
+    Code("G43", "tool length", table_length, "tool length", g_codes("G43")),
+    Code("G43.1", "tool length", length_of_z, "tool length in the block", g_codes("G43.1"), takes_axes=True),
     Code(
-        HOLDS_TIP, LENGTH, hold_tip, "tool centre point control",
+        HOLDS_TIP, "tool length", hold_tip, "tool centre point control",
         "Fanuc, operator's manual of the series 30i, Tool center point control (G43.4)",
         controls=("generic", "linuxcnc", "fanuc"),
     ),
-    Code("G49", LENGTH, no_length, "tool length off", g_codes("G49")),
+    Code("G49", "tool length", no_length, "tool length off", g_codes("G49")),
 )  # fmt: skip
 TOOL_ALIASES = (
     Alias(

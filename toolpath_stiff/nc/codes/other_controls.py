@@ -5,16 +5,7 @@ The first are what programs begin with ("safe start"): they switch off what is r
 
 from __future__ import annotations
 
-from toolpath_stiff.nc.codes.code import (
-    MIRROR,
-    PATH_CONTROL,
-    POLAR_PLANE,
-    SPEED_WATCH,
-    STROKE_CHECK,
-    Code,
-    Refused,
-    holds_anyway,
-)
+from toolpath_stiff.nc.codes.code import Code, Refused, holds_anyway
 from toolpath_stiff.nc.codes.modes import _FANUC, _HAAS, _OURS
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 
@@ -45,27 +36,27 @@ _MIRRORED = f"{_FANUC}, Programmable mirror image (G50.1, G51.1)"
 
 OTHER_CODES = (
     Code(
-        "G13.1", POLAR_PLANE, holds_anyway, "polar interpolation off",
+        "G13.1", "polar interpolation", holds_anyway, "polar interpolation off",
         f"{_FANUC}, Polar coordinate interpolation (G12.1, G13.1)", _OURS, listed=_OFF,
     ),
-    Code("G50.1", MIRROR, holds_anyway, "mirror image off", _MIRRORED, _OURS, listed=_OFF),
-    Code("G100", MIRROR, holds_anyway, "mirror image off", f"{_HAAS}, G100", ("generic", "haas"), listed=_OFF),
+    Code("G50.1", "mirror image", holds_anyway, "mirror image off", _MIRRORED, _OURS, listed=_OFF),
+    Code("G100", "mirror image", holds_anyway, "mirror image off", f"{_HAAS}, G100", ("generic", "haas"), listed=_OFF),
     Code(
-        "G22", STROKE_CHECK, stroke_check, "stored stroke check on", _STROKE, _OURS, takes_axes=True,
+        "G22", "stroke check", stroke_check, "stored stroke check on", _STROKE, _OURS, takes_axes=True,
         listed="the zone that the tool must not enter",
     ),
     Code(
-        "G23", STROKE_CHECK, stroke_check, "stored stroke check off", _STROKE, _OURS,
+        "G23", "stroke check", stroke_check, "stored stroke check off", _STROKE, _OURS,
         listed="no zone that the tool must not enter",
     ),
-    Code("G25", SPEED_WATCH, speed_watch, "spindle speed not watched", _WATCH, _OURS, listed="the spindle's speed"),
-    Code("G26", SPEED_WATCH, speed_watch, "spindle speed watched", _WATCH, _OURS, listed="the spindle's speed"),
+    Code("G25", "speed watch", speed_watch, "spindle speed not watched", _WATCH, _OURS, listed="the spindle's speed"),
+    Code("G26", "speed watch", speed_watch, "spindle speed watched", _WATCH, _OURS, listed="the spindle's speed"),
     Code(
-        "G62", PATH_CONTROL, holds_anyway, "automatic corner override", f"{_FANUC}, Automatic corner override (G62)",
+        "G62", "path control", holds_anyway, "automatic corner override", f"{_FANUC}, Automatic corner override (G62)",
         _OURS, listed="slower feed in corners",
     ),
     Code(
-        "G63", PATH_CONTROL, holds_anyway, "tapping mode", f"{_FANUC}, Tapping mode (G63)", _OURS,
+        "G63", "path control", holds_anyway, "tapping mode", f"{_FANUC}, Tapping mode (G63)", _OURS,
         listed="no override of the feed",
     ),
 )  # fmt: skip

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.code import ONCE, PLANE, POLAR, ROTATION, SMOOTHING, UNITS, Code
+from toolpath_stiff.nc.codes.code import Code
 from toolpath_stiff.nc.controller import GENERIC, INCREMENT_DEGREE, INCREMENT_INCH, INCREMENT_MM
 from toolpath_stiff.nc.frames import Rotation
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -38,7 +38,7 @@ def rotation(state: State, block: CurrentBlock, code: str) -> None:
     else:
         new = _rotation_of(state, block, block.codes[code], here)
         if frames.rotation is not None and frames.rotation[:2] != new[:2]:
-            raise block.fail(block.codes[code], "with another centre while a rotation is in force", "G69 before it")
+            raise block.fail(code, "with another centre while a rotation is in force", "G69 before it")
         frames.rotation = new
     there = frames.to_program(frames.position)
     if math.dist(here[:2], there[:2]) > SAME_PLACE_MM:
@@ -123,8 +123,8 @@ def settle(state: State, block: CurrentBlock, words: dict[int, float]) -> None:
 
 _FANUC_ROTATION = "Fanuc, operator's manuals of the series 16 and 15i, Coordinate system rotation (G68, G69)"
 ROTATION_CODES = (
-    Code("G68", ROTATION, rotation, "rotated coordinates", _FANUC_ROTATION, takes_axes=True),
-    Code("G69", ROTATION, rotation, "rotation off", _FANUC_ROTATION),
+    Code("G68", "rotation", rotation, "rotated coordinates", _FANUC_ROTATION, takes_axes=True),
+    Code("G69", "rotation", rotation, "rotation off", _FANUC_ROTATION),
 )
 
 
@@ -251,7 +251,7 @@ def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle:
     if radius is not None:
         if not state.absolute:
             raise block.fail(
-                block.values[first],
+                first,
                 "is a polar radius in incremental mode (G91)",
                 "a radius from the program zero (G90); the angle alone may be incremental",
             )
@@ -260,7 +260,7 @@ def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle:
         polar[1] = angle if state.absolute else polar[1] + angle
     if math.isnan(polar[0]) or math.isnan(polar[1]):
         raise block.fail(
-            block.values[second if radius is None else first],
+            second if radius is None else first,
             "is half of a polar point, and nothing before it gives the other half",
             f"{first} (radius) and {second} (angle), absolute",
         )
@@ -271,8 +271,8 @@ def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle:
 
 _FANUC_POLAR = "Fanuc, operator's manuals of the series 16 and 15i, Polar coordinate command (G15, G16)"
 POLAR_CODES = (
-    Code("G15", POLAR, polar_mode, "Cartesian words", _FANUC_POLAR),
-    Code("G16", POLAR, polar_mode, "polar words", _FANUC_POLAR),
+    Code("G15", "polar", polar_mode, "Cartesian words", _FANUC_POLAR),
+    Code("G16", "polar", polar_mode, "polar words", _FANUC_POLAR),
 )
 
 
@@ -296,13 +296,13 @@ def read_numbers(state: State, block: CurrentBlock) -> None:
         if watches_points(state):
             _watch_points(state, block)
         return
-    inch = block.groups.get(UNITS, "G20" if state.inch else "G21") == "G20"
+    inch = block.groups.get("units", "G20" if state.inch else "G21") == "G20"
     angles = set(ANGLES)
-    if block.groups.get(ROTATION) == "G68":
+    if block.groups.get("rotation") == "G68":
         angles.add("R")
-    polar = block.groups[POLAR] == "G16" if POLAR in block.groups else state.polar is not None
-    if polar and ONCE not in block.groups:
-        angles.add(AXES[geometry.PLANES[block.groups.get(PLANE, state.plane)][1]])
+    polar = block.groups["polar"] == "G16" if "polar" in block.groups else state.polar is not None
+    if polar and "non-modal" not in block.groups:
+        angles.add(AXES[geometry.PLANES[block.groups.get("plane", state.plane)][1]])
     for letter, word in block.values.items():
         if "." in word.text or not word.value or not (letter in LENGTHS or letter in angles) or is_count(block, letter):
             continue
@@ -312,7 +312,7 @@ def read_numbers(state: State, block: CurrentBlock) -> None:
 
 def is_count(block: CurrentBlock, letter: str) -> bool:
     """Whether a letter of lengths is a number of something else: G5.1 Q1, M61 Q5, M98 Q5."""
-    return letter == "Q" and (SMOOTHING in block.groups or not {"M61", "M98"}.isdisjoint(block.codes))
+    return letter == "Q" and ("look-ahead" in block.groups or not {"M61", "M98"}.isdisjoint(block.codes))
 
 
 def increment(angle: bool, inch: bool) -> float:

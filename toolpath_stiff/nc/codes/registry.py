@@ -7,32 +7,10 @@ leave the path alone, and codes that are refused with the reason, have their row
 
 from __future__ import annotations
 
-import inspect
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
-from toolpath_stiff.nc.codes.code import (
-    DIAMETER,
-    DYNAMIC,
-    EVERYWHERE,
-    EXACT_STOP,
-    M_COOLANT,
-    M_OVERRIDES,
-    M_SPINDLE,
-    M_TAPPING,
-    MOTION,
-    ONCE,
-    PATH_CONTROL,
-    SCALING,
-    SMOOTHING,
-    Alias,
-    Code,
-    Refused,
-    code_name,
-    g_codes,
-    holds_anyway,
-    m_codes,
-)
+from toolpath_stiff.nc.codes.code import Alias, Code, Refused, code_name, g_codes, holds_anyway, m_codes
 from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
 from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
 from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES
@@ -55,7 +33,7 @@ def path_control(state: State, block: CurrentBlock, code: str) -> None:
 
 def m_parameters(state: State, block: CurrentBlock) -> None:
     """M codes may carry P, Q, E, R, S words, M66 an L too; unless the block moves, these are theirs."""
-    moves = MOTION in block.groups or ONCE in block.groups or any(block.has(letter) for letter in POINT_WORDS)
+    moves = "motion" in block.groups or "non-modal" in block.groups or any(block.has(letter) for letter in POINT_WORDS)
     if not moves:
         waits = any(word.letter == "M" and word.value == WAIT_FOR_INPUT for word in block.block.words)
         for letter in "PQERSL" if waits else "PQERS":
@@ -67,7 +45,7 @@ def look_ahead(state: State, block: CurrentBlock, code: str) -> None:
     letters = {word.letter for word in block.block.words} - {"G", "M", "F", "S", "T"}
     taken = PLANNING[code]
     if code in SPLINES and (letters - set(taken) or not letters):
-        raise block.fail(block.codes[code], "is a spline, which is not supported", hint=_LINES_AND_ARCS)
+        raise block.fail(code, "is a spline, which is not supported", hint=_LINES_AND_ARCS)
     for letter in taken:
         if block.take(letter) is not None and code == "G8":  # alone it is a mode of lathes that holds anyway
             state.note(block.line, block.codes[code], _PLANNING)
@@ -78,7 +56,7 @@ def scaling_off(state: State, block: CurrentBlock, code: str) -> None:
     letter = next((letter for letter in "SXYZUVW" if letter in block.values), None)
     if letter is not None:
         raise block.fail(
-            block.codes[code],
+            code,
             f"with {letter} is a lathe's code (the limit of its speed, or a shift), and a lathe's X is a diameter",
             hint=LATHE_HINT,
         )
@@ -126,54 +104,54 @@ _COOLANT = m_codes("M7 M8 M9")
 
 PASSIVE_CODES = (
     Code(
-        "G8", DIAMETER, look_ahead, "lathe radius mode; with P: look-ahead",
-        "LinuxCNC, G-Codes, G8; Fanuc, operator's manuals, Advanced preview control (G08)", label=DIAMETER,
+        "G8", "lathe diameter", look_ahead, "lathe radius mode; with P: look-ahead",
+        "LinuxCNC, G-Codes, G8; Fanuc, operator's manuals, Advanced preview control (G08)", label="lathe diameter",
     ),
     Code(
-        "G5", SMOOTHING, look_ahead, "high-speed machining, with P alone",
+        "G5", "look-ahead", look_ahead, "high-speed machining, with P alone",
         "Fanuc, operator's manuals, High speed cycle machining (G05)", listed=_PLANNING,
     ),
     Code(
-        "G5.1", SMOOTHING, look_ahead, "contour control, with Q alone",
+        "G5.1", "look-ahead", look_ahead, "contour control, with Q alone",
         "Fanuc, operator's manuals, AI contour control (G05.1)", listed=_PLANNING,
     ),
     Code(
-        "G5.4", SMOOTHING, look_ahead, "high-speed control", "Fanuc, operator's manuals, HRV3 (G05.4)",
+        "G5.4", "look-ahead", look_ahead, "high-speed control", "Fanuc, operator's manuals, HRV3 (G05.4)",
         ("generic", "fanuc"), listed=_PLANNING,
     ),
-    Code("G9", EXACT_STOP, holds_anyway, "exact stop", f"{_FANUC}, Exact stop (G09)", listed=_EXACT_STOP),
-    Code("G103", SMOOTHING, look_ahead, "limit of the look-ahead", f"{_HAAS}, G103", GENERIC_HAAS, listed=_PLANNING),
-    Code("G187", SMOOTHING, look_ahead, "smoothness", f"{_HAAS}, G187", GENERIC_HAAS, listed=_PLANNING),
+    Code("G9", "exact stop", holds_anyway, "exact stop", f"{_FANUC}, Exact stop (G09)", listed=_EXACT_STOP),
+    Code("G103", "look-ahead", look_ahead, "limit of the look-ahead", f"{_HAAS}, G103", GENERIC_HAAS, listed=_PLANNING),
+    Code("G187", "look-ahead", look_ahead, "smoothness", f"{_HAAS}, G187", GENERIC_HAAS, listed=_PLANNING),
     Code(
-        "G254", DYNAMIC, dynamic_offset, "dynamic work offset", f"{_HAAS}, G254", GENERIC_HAAS,
+        "G254", "dynamic offset", dynamic_offset, "dynamic work offset", f"{_HAAS}, G254", GENERIC_HAAS,
         listed="the work offset follows the part",
     ),
     Code(
-        "G255", DYNAMIC, dynamic_offset, "no dynamic work offset", f"{_HAAS}, G255", GENERIC_HAAS,
+        "G255", "dynamic offset", dynamic_offset, "no dynamic work offset", f"{_HAAS}, G255", GENERIC_HAAS,
         listed="the work offset follows the part no longer",
     ),
     Code(
-        "M29", M_TAPPING, holds_anyway, "rigid tapping", f"{_FANUC}, Rigid tapping (M29)", ("generic", "fanuc"),
+        "M29", "M rigid tapping", holds_anyway, "rigid tapping", f"{_FANUC}, Rigid tapping (M29)", ("generic", "fanuc"),
         listed="rigid tapping",
     ),
     Code(
-        "G50", SCALING, scaling_off, "scaling off", "Fanuc, operator's manuals, Scaling (G50, G51)", label=SCALING
+        "G50", "scaling", scaling_off, "scaling off", "Fanuc, operator's manuals, Scaling (G50, G51)", label="scaling"
     ),
-    Code("G61", PATH_CONTROL, path_control, "exact path", g_codes("G61"), listed=_EXACT_STOP),
-    Code("G61.1", PATH_CONTROL, path_control, "exact stop", g_codes("G61.1"), listed=_EXACT_STOP),
+    Code("G61", "path control", path_control, "exact path", g_codes("G61"), listed=_EXACT_STOP),
+    Code("G61.1", "path control", path_control, "exact stop", g_codes("G61.1"), listed=_EXACT_STOP),
     Code(
-        "G64", PATH_CONTROL, path_control, "path blending", g_codes("G64"),
+        "G64", "path control", path_control, "path blending", g_codes("G64"),
         listed="path blending: the path is taken as programmed, corners included",
     ),
-    Code("M3", M_SPINDLE, holds_anyway, "spindle on", m_codes("M3 M4 M5")),
-    Code("M4", M_SPINDLE, holds_anyway, "spindle on, reversed", m_codes("M3 M4 M5")),
-    Code("M5", M_SPINDLE, holds_anyway, "spindle off", m_codes("M3 M4 M5")),
-    Code("M19", M_SPINDLE, holds_anyway, "spindle orientation", m_codes("M19"), listed="spindle orientation"),
-    Code("M7", M_COOLANT, holds_anyway, "mist coolant on", _COOLANT, listed="coolant"),
-    Code("M8", M_COOLANT, holds_anyway, "flood coolant on", _COOLANT, listed="coolant"),
-    Code("M9", M_COOLANT, holds_anyway, "coolant off", _COOLANT, listed="coolant"),
+    Code("M3", "M spindle", holds_anyway, "spindle on", m_codes("M3 M4 M5")),
+    Code("M4", "M spindle", holds_anyway, "spindle on, reversed", m_codes("M3 M4 M5")),
+    Code("M5", "M spindle", holds_anyway, "spindle off", m_codes("M3 M4 M5")),
+    Code("M19", "M spindle", holds_anyway, "spindle orientation", m_codes("M19"), listed="spindle orientation"),
+    Code("M7", "M coolant", holds_anyway, "mist coolant on", _COOLANT, listed="coolant"),
+    Code("M8", "M coolant", holds_anyway, "flood coolant on", _COOLANT, listed="coolant"),
+    Code("M9", "M coolant", holds_anyway, "coolant off", _COOLANT, listed="coolant"),
     *(
-        Code(code, M_OVERRIDES, holds_anyway, "speed and feed overrides", m_codes("M48 - M53"), listed="overrides")
+        Code(code, "M overrides", holds_anyway, "speed and feed overrides", m_codes("M48 - M53"), listed="overrides")
         for code in ("M48", "M49", "M50", "M51", "M52", "M53")
     ),
 )  # fmt: skip
@@ -349,78 +327,3 @@ def would_change(text: str, listed: bool = False) -> str:
     if code[0] == "M" and code not in CODES and code not in REFUSED:
         return "what is not known: it may run anything on its control"
     return (LISTED_CHANGES if listed else BY_CODE).get(code, "")
-
-
-def codes_table() -> str:
-    r"""The codes that are understood, their other names, and those that are refused, as Markdown tables.
-
-    Examples
-    --------
-    >>> print("\n".join(codes_table().splitlines()[:3]))
-    | code | group | meaning | function in `nc/codes` | dialects | source | against LinuxCNC |
-    | --- | --- | --- | --- | --- | --- | --- |
-    | G0 | motion | rapid | `motion.straight` | all | LinuxCNC, G-Codes, G0 | same path |
-    """
-    understood = [
-        (code.name, code.group, _meaning(code), _function(code), _controls(code.controls), code.source, _witness(code))
-        for code in CODES.values()
-    ]
-    others = [
-        (a.name, f"as {a.code}", a.meaning, "", _controls(a.controls), a.source, NOT_THERE) for a in ALIASES.values()
-    ]
-    refused = [(code.name, code.what, code.hint, code.source) for code in REFUSED.values()]
-    return "\n".join(
-        [
-            *_rows(HEADING, understood + others),
-            "",
-            "Refused in every dialect, with the line and what to do instead; nothing is held against LinuxCNC:",
-            "",
-            *_rows(("code", "what it is", "instead", "source"), refused),
-            "",
-        ]
-    )
-
-
-HEADING = ("code", "group", "meaning", "function in `nc/codes`", "dialects", "source", "against LinuxCNC")
-
-
-SAME_PATH, NOT_THERE, NOT_HELD = "same path", "has none", "not held"
-
-
-# LinuxCNC's, and in no program whose path is compared with LinuxCNC's. The others are in such programs: the random ones
-# of `benchmarks/hunt.md`, or those of the tests against rs274 (`tests/nc/test_code_registry.py` looks them up).
-WITHOUT_WITNESS = ("M7", "M19", "M53", "M71")
-
-
-def _witness(code: Code) -> str:
-    """Whether what the code does is held against LinuxCNC's interpreter."""
-    if "linuxcnc" not in code.controls or "LinuxCNC" not in code.source:
-        return NOT_THERE
-    return NOT_HELD if code.name in WITHOUT_WITNESS else SAME_PATH
-
-
-def _meaning(code: Code) -> str:
-    return f"{code.meaning} (listed: {code.listed})" if code.listed else code.meaning
-
-
-def _function(code: Code) -> str:
-    if code.act is holds_anyway:
-        return ""
-    module = inspect.getmodule(code.act)
-    assert module is not None
-    return f"`{module.__name__.rsplit('.', maxsplit=1)[-1]}.{code.act.__name__}`"
-
-
-def _controls(names: tuple[str, ...]) -> str:
-    return "all" if names == EVERYWHERE else ", ".join(names)
-
-
-def _rows(heading: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Lines of a table; successive rows that differ in their code alone are one."""
-    yield f"| {' | '.join(heading)} |"
-    yield f"|{' --- |' * len(heading)}"
-    joined: dict[tuple[str, ...], list[str]] = {}
-    for name, *cells in rows:
-        joined.setdefault(tuple(cells), []).append(name)
-    for cells_, names in joined.items():
-        yield f"| {' '.join(names)} | {' | '.join(cells_)} |"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toolpath_stiff.nc.codes.code import M_STATE, Code, m_codes
+from toolpath_stiff.nc.codes.code import Code, m_codes
 from toolpath_stiff.nc.codes.offsets import take_offset
 from toolpath_stiff.nc.codes.points import forget_polar
 from toolpath_stiff.nc.state import CurrentBlock, SavedModes, State
@@ -30,10 +30,10 @@ def restore_modes(state: State, block: CurrentBlock, code: str) -> None:
     _check_block(state, block, code)
     saved = state.saved.get(state.level)
     if saved is None:
-        raise block.fail(block.codes[code], "and nothing was saved at this level of calls", "M70 or M73 before it")
+        raise block.fail(code, "and nothing was saved at this level of calls", "M70 or M73 before it")
     found = _restore(state, saved)
     if found:
-        raise block.fail(block.codes[code], f"where {found}", "G40, G49, G69 and G15 before it")
+        raise block.fail(code, f"where {found}", "G40, G49, G69 and G15 before it")
 
 
 def leave_level(state: State, level: int) -> str:
@@ -72,8 +72,8 @@ _SAVED = m_codes("M70 - M73")
 
 
 SAVED_CODES = (
-    Code("M70", M_STATE, save_modes, "modes saved", _SAVED, ("linuxcnc",)),
-    Code("M71", M_STATE, forget_modes, "saved modes forgotten", _SAVED, ("linuxcnc",)),
-    Code("M72", M_STATE, restore_modes, "saved modes restored", _SAVED, ("linuxcnc",)),
-    Code("M73", M_STATE, save_modes, "modes saved, restored at the return", _SAVED, ("linuxcnc",)),
+    Code("M70", "M modal state", save_modes, "modes saved", _SAVED, ("linuxcnc",)),
+    Code("M71", "M modal state", forget_modes, "saved modes forgotten", _SAVED, ("linuxcnc",)),
+    Code("M72", "M modal state", restore_modes, "saved modes restored", _SAVED, ("linuxcnc",)),
+    Code("M73", "M modal state", save_modes, "modes saved, restored at the return", _SAVED, ("linuxcnc",)),
 )

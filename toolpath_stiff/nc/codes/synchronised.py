@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toolpath_stiff.nc.codes.code import MOTION, Code, g_codes
+from toolpath_stiff.nc.codes.code import Code, g_codes
 from toolpath_stiff.nc.codes.modes import SLOWEST
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.points import control_point, point_words
@@ -14,7 +14,7 @@ ROTARY = (3, 4, 5)
 
 def synchronised(state: State, block: CurrentBlock, code: str) -> None:
     """G33: straight, K mm a turn of the spindle; G33.1: so to the point, and back with the spindle reversed."""
-    if not (MOTION in block.groups or any(block.has(letter) for letter in (*POINT_WORDS, "K"))):
+    if not ("motion" in block.groups or any(block.has(letter) for letter in (*POINT_WORDS, "K"))):
         return
     first = block.block.words[0]
     if state.dialect.name != "linuxcnc":
@@ -43,6 +43,6 @@ def synchronised(state: State, block: CurrentBlock, code: str) -> None:
 
 
 SYNCHRONISED_CODES = (
-    Code("G33", MOTION, synchronised, "straight, K a turn of the spindle", g_codes("G33"), ("linuxcnc",)),
-    Code("G33.1", MOTION, synchronised, "rigid tapping, in and out", g_codes("G33.1"), ("linuxcnc",)),
+    Code("G33", "motion", synchronised, "straight, K a turn of the spindle", g_codes("G33"), ("linuxcnc",)),
+    Code("G33.1", "motion", synchronised, "rigid tapping, in and out", g_codes("G33.1"), ("linuxcnc",)),
 )

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.placement.paths import DrawnPath, drawn_path
-from toolpath_stiff.placement.result import Placement
+from toolpath_stiff.placement.drawn_path import DrawnPath, drawn_path
+from toolpath_stiff.placement.result import Placement, Refused, Written
 from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
 from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.report.pages import render
-from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, setup_sheet, workspace_picture
+from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, workspace_picture
+from toolpath_stiff.report.place.sheet import setup_sheet
 from toolpath_stiff.report.words import machine_text, plain
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
@@ -46,12 +44,14 @@ def place_page(placed: Placement) -> str:
     data = {
         "front": [vars(row) for row in placed.front],
         "chosen": (placed.chosen.number or 0) - 1,
-        "recommended": placed.search["recommended"] - 1,
+        "recommended": placed.search.recommended - 1,
         "before": present.figures() if present else None,
         "before_reason": plain(placed.present_reason),
         "force": best.force,
-        "keepouts": [{"name": plain(box.name), "box": _box(box.low, box.high)} for box in placed.task.rules.keepouts],
-        "workspace": _workspace(best),
+        "keepouts": [
+            {"name": plain(box.name), "box": _corners(mm_from_m(box.corners))} for box in placed.task.rules.keepouts
+        ],
+        "workspace": _corners(mm_from_m(best.machine.limits.workspace)),
         **_drawn(path),
         **page_colours(),
     }
@@ -111,14 +111,9 @@ def _lengths(path: DrawnPath) -> FloatArray:
     return np.asarray(length if length.any() else np.ones(len(length)))
 
 
-def _workspace(best: Analysis) -> list[list[float | None]]:
+def _corners(corners: FloatArray) -> list[list[float | None]]:
     """Lower and upper corner in mm; None where the machine file sets no bound."""
-    corners = mm_from_m(best.machine.limits.workspace)
-    return [[round(float(v), 3) if np.isfinite(v) else None for v in corner] for corner in corners]
-
-
-def _box(low: Sequence[float], high: Sequence[float]) -> list[list[float]]:
-    return [[round(mm_from_m(v), 3) for v in corner] for corner in (low, high)]
+    return [[round(v, 3) if np.isfinite(v) else None for v in corner] for corner in corners.tolist()]
 
 
 def _note(path: DrawnPath) -> str:
@@ -136,7 +131,7 @@ def _note(path: DrawnPath) -> str:
 def text(placed: Placement) -> str:
     """What got worse, the placement, what it brings, what it costs."""
     best, present, count = placed.chosen, placed.present, len(placed.front)
-    first = len(placed.worse) + bool(placed.search.get("nothing_better"))
+    first = len(placed.worse) + placed.search.nothing_better
     label = "picked" if placed.picked else "recommended"
     which = f"placement {best.number} of {count}, picked" if placed.picked else f"objective {placed.objective}"
     lines = [
@@ -164,7 +159,7 @@ def text(placed: Placement) -> str:
     lines.append(f"LinuxCNC        {blocks.linuxcnc or blocks.linuxcnc_reason}")
     fanuc = (blocks.fanuc or blocks.fanuc_reason).replace("\n", "\n                ")
     lines.append(f"Fanuc-style     {fanuc}")
-    evaluated = placed.search["pose_evaluations"]
+    evaluated = placed.search.pose_evaluations
     lines.append(f"front           {count} placements, {number(evaluated)} poses evaluated")
     lines += _written(placed.written) if placed.written else []
     lines += [f"warning         {warning}" for warning in placed.warnings[first:]]
@@ -178,17 +173,17 @@ def _figures_words(row: PlacementRow) -> str:
     )
 
 
-def _written(written: dict[str, Any]) -> list[str]:
+def _written(written: Written | Refused) -> list[str]:
     """What became of the transformed program."""
-    if "refused" in written:
-        return [f"not rewritten   {written['file']}: {written['refused']}"]
-    at, apart = written["analysed_at"], written["relative_difference"]
+    if isinstance(written, Refused):
+        return [f"not rewritten   {written.file}: {written.refused}"]
+    zero, apart = written.analysed_at, written.relative_difference
     figures = ", ".join(f"{name} {value:.1e}" for name, value in apart.items())
     lines = [
-        f"rewritten       {written['file']}; at X{at['x_mm']:g} Y{at['y_mm']:g} Z{at['z_mm']:g}, "
-        f"{at['rotation_deg']:g} degrees it differs from the placed program by (relative) {figures}"
+        f"rewritten       {written.file}; at X{zero['x_mm']:g} Y{zero['y_mm']:g} Z{zero['z_mm']:g}, "
+        f"{zero['rotation_deg']:g} degrees it differs from the placed program by (relative) {figures}"
     ]
-    return lines + [f"                {note}" for note in written["notes"]]
+    return lines + [f"                {note}" for note in written.notes]
 
 
 def names(plots: bool = True) -> tuple[str, ...]:
@@ -201,7 +196,7 @@ def files(placed: Placement, *, plots: bool = True) -> dict[str, Content]:
     """The front as a table, everything as JSON, and with `plots` page, pictures and set-up sheet."""
     contents: dict[str, Content] = {
         "placements.csv": csv_text(COLUMNS, ([_cell(value) for value in vars(row).values()] for row in placed.front)),
-        "placement.json": json.dumps(placed.to_dict(), indent=2) + "\n",
+        "placement.json": placed.to_json(),
     }
     if plots:
         contents["report.html"] = place_page(placed)

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, compliance, sizes_in_words
 
 EXPERIENCE = "engineering experience, no source: stiff machine frames are built for 100 to 500 N/um"
 
@@ -35,24 +35,8 @@ class FrameCompliance(Effect):
             meaning="which vertex; 0 is all three",
             kind="integer",
         ),
-        Parameter(
-            name="radial",
-            unit="nm/N",
-            si=1e-9,
-            bounds=(0.0, 200.0),
-            typical=(2.0, 10.0),
-            source=EXPERIENCE,
-            meaning="compliance of a vertex towards the machine's axis",
-        ),
-        Parameter(
-            name="vertical",
-            unit="nm/N",
-            si=1e-9,
-            bounds=(0.0, 200.0),
-            typical=(2.0, 10.0),
-            source=EXPERIENCE,
-            meaning="compliance of a vertex up and down",
-        ),
+        compliance("radial", 200.0, (2.0, 10.0), EXPERIENCE, "compliance of a vertex towards the machine's axis"),
+        compliance("vertical", 200.0, (2.0, 10.0), EXPERIENCE, "compliance of a vertex up and down"),
     )
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
