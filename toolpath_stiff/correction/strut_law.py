@@ -22,7 +22,7 @@ from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import Baseline
+from toolpath_stiff.inference.fits import baseline
 from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import NO_CHANGE, Predictor, at_both_ends, scaled_law
@@ -309,8 +309,7 @@ def update_by_mean_error(
     worst = max(noise_models(data, noise, strut_spread), key=lambda one: one.typical)
     problem = Problem.of(Predictor(machine, data, effect_files), worst)
     predictor = problem.predictor
-    baseline = Baseline.of(problem)
-    given = baseline.as_given
+    given, law_refitted = baseline(problem)
     say("leaving points out, drawing points anew")
     last = Fit(
         (), (), (), found.law, problem.observed - predictor.log_stiffness(found.law),
@@ -322,7 +321,7 @@ def update_by_mean_error(
         Step.of(AS_GIVEN, given, data),
         Step("strut law by mean error", last, left_out, data.tip),
     )
-    refitted = Step.of(LAW_REFITTED, baseline.refitted, data)
+    refitted = Step.of(LAW_REFITTED, law_refitted, data)
     return Update(
         machine, data, worst, problem, steps, refitted, (), (), force, False, law_asked=True, objective="mean-error",
         question=question(predictor),
