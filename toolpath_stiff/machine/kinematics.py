@@ -57,12 +57,12 @@ class Struts:
     def jacobian(self) -> FloatArray:
         """(n, 6, 6) rows [u_i, r_i x u_i]: strut elongation rates per twist of the tip."""
         r, u = self.arms, self.directions
-        found = np.empty((*u.shape[:-1], 6))
-        found[..., :3] = u
+        rows = np.empty((*u.shape[:-1], 6))
+        rows[..., :3] = u
         # On a few poses `np.cross` takes several times as long; the digits are the same.
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            found[..., 3 + i] = r[..., j] * u[..., k] - r[..., k] * u[..., j]
-        return found
+            rows[..., 3 + i] = r[..., j] * u[..., k] - r[..., k] * u[..., j]
+        return rows
 
 
 def solve_struts(

@@ -67,17 +67,17 @@ def _all_limits(machine: Machine) -> list[Limit]:
     limits = machine.limits
     low, high = limits.strut_length
     span = high - low if np.isfinite(high) else max(low, 1.0)
-    found: list[Limit] = []
+    bounds: list[Limit] = []
     for i in range(1, 7):
-        found.append(Limit(f"strut{i} min length", STRUT, low, True, span, "mm"))
-        found.append(Limit(f"strut{i} max length", STRUT, high, False, span, "mm"))
+        bounds.append(Limit(f"strut{i} min length", STRUT, low, True, span, "mm"))
+        bounds.append(Limit(f"strut{i} max length", STRUT, high, False, span, "mm"))
     for quantity, angle in ((FRAME, limits.frame_joint_angle), (PLATFORM, limits.platform_joint_angle)):
-        found += [Limit(f"{quantity} joint{i} angle", quantity, angle, False, angle, "deg") for i in range(1, 7)]
+        bounds += [Limit(f"{quantity} joint{i} angle", quantity, angle, False, angle, "deg") for i in range(1, 7)]
     for axis, lo, hi in zip(AXES, *limits.workspace.tolist(), strict=True):
         both = hi - lo if np.isfinite(hi - lo) else 1.0
-        found.append(Limit(f"workspace {axis} min", axis, lo, True, both, "mm"))
-        found.append(Limit(f"workspace {axis} max", axis, hi, False, both, "mm"))
-    return [*found, Limit("singularity", SINGULARITY, limits.singularity, True, 1.0 - limits.singularity, "")]
+        bounds.append(Limit(f"workspace {axis} min", axis, lo, True, both, "mm"))
+        bounds.append(Limit(f"workspace {axis} max", axis, hi, False, both, "mm"))
+    return [*bounds, Limit("singularity", SINGULARITY, limits.singularity, True, 1.0 - limits.singularity, "")]
 
 
 @dataclass(frozen=True)

@@ -152,15 +152,15 @@ class StrutLaw:
         return np.asarray(self.room(length) < 0.0)
 
 
-def _piecewise(at: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
+def _piecewise(position: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
     """Linear between values (p,) at rising knots (p,), at positions of any shape; the end pieces go on outside."""
-    i = _segment(at, knots)
+    i = _segment(position, knots)
     slope = (values[1:] - values[:-1]) / (knots[1:] - knots[:-1])
-    return np.asarray(values[i] + slope[i] * (at - knots[i]))
+    return np.asarray(values[i] + slope[i] * (position - knots[i]))
 
 
-def _segment(at: FloatArray, knots: FloatArray) -> IntArray:
-    return np.asarray(np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2))
+def _segment(position: FloatArray, knots: FloatArray) -> IntArray:
+    return np.asarray(np.clip(np.searchsorted(knots, position, side="right") - 1, 0, len(knots) - 2))
 
 
 @dataclass(frozen=True)

@@ -225,15 +225,15 @@ class Program:
         >>> len(read.moves), read.unsupported
         (1, ())
         """
-        from toolpath_stiff.nc.reader import read_source
+        from toolpath_stiff.nc.reader import read
+        from toolpath_stiff.nc.request import Request
 
         key = (origin, tuple(default_origin))
         if self._last.get("key") != key:
-            origins: dict[str, Any] = {"origin": origin, "default_origin": default_origin}
-            options = {**origins, "controller": self.controller, **self.options}
-            self._last.update(key=key, program=read_source(self.lines, self.name, self.file or "", **options))
-        read: ReadProgram = self._last["program"]
-        return read
+            place = (self.lines, self.name, self.file or "", origin, default_origin)
+            self._last.update(key=key, program=read(Request(*place, controller=self.controller, **self.options)))
+        last: ReadProgram = self._last["program"]
+        return last
 
     def to_frame(self) -> pd.DataFrame:
         r"""The moves, one a row: line, motion, tool, start and end in program coordinates of G54, feed.

@@ -268,9 +268,9 @@ class Placement(FolderResult, SearchedFront):
 
     def _binding_limits(self) -> list[str]:
         """The limits that the cuts come nearest to, at most three."""
-        at, cutting = self.best.at, self.best.samples.cutting
-        near = np.argsort(at.margin + np.where(cutting, 0.0, np.inf), kind="stable")[:200]
-        return list(dict.fromkeys(at.limits[int(at.limit[i])].name for i in near))[:3]
+        poses, cutting = self.best.at, self.best.samples.cutting
+        near = np.argsort(poses.margin + np.where(cutting, 0.0, np.inf), kind="stable")[:200]
+        return list(dict.fromkeys(poses.limits[int(poses.limit[i])].name for i in near))[:3]
 
     def to_frame(self) -> pd.DataFrame:
         """The front, one placement a row, as in `placements.csv`."""

@@ -204,10 +204,10 @@ def _evolved(
         if generation % GENERATIONS == 0:
             search.heed(np.vstack([archive[search.ranked(goal, figures)[:1]] for goal in ENDS]))
             archive, figures = _survivors(search, archive, search.few.figures(archive))
-        parents, one, other = (bounds.unit(archive[rng.integers(len(archive), size=CHILDREN)]) for _ in range(3))
+        parents, first, second = (bounds.unit(archive[rng.integers(len(archive), size=CHILDREN)]) for _ in range(3))
         step = spread * rng.normal(size=parents.shape) * (rng.uniform(size=parents.shape) < 0.7)
         along = np.where(rng.uniform(size=(CHILDREN, 1)) < 0.5, 0.5, 0.0)
-        children = bounds.placements(parents + step + along * (one - other))
+        children = bounds.placements(parents + step + along * (first - second))
         met = PlacementFigures.joined([figures, search.few.figures(children)])
         archive, figures = _survivors(search, np.vstack([archive, children]), met)
     return archive, figures

@@ -93,10 +93,10 @@ def measuring_loop(text: str) -> MeasuringLoop | None:
     words = " ".join(text.lower().split())
     if not words:
         return TIP
-    found = _WORD.fullmatch(words)
-    if found is None:
+    match = _WORD.fullmatch(words)
+    if match is None:
         return None
-    plain, strut, strut_number, alone, joint, joint_number, end, frame, vertex, axis = found.groups()
+    plain, strut, strut_number, alone, joint, joint_number, end, frame, vertex, axis = match.groups()
     if plain:
         return MeasuringLoop(plain)
     if strut:

@@ -91,9 +91,9 @@ def _free_flexibility(joints: bytes) -> FloatArray:
     resultants = rigid[loaded].T  # (6, 21): total force and moment about the tip
     arms = rigid[:18]  # (18, 6)
     balance[:18] -= arms @ np.linalg.solve(arms.T @ arms, resultants)
-    found = np.asarray(balance.T @ flexibility @ balance)
-    found.flags.writeable = False
-    return found
+    loaded_flexibility = np.asarray(balance.T @ flexibility @ balance)
+    loaded_flexibility.flags.writeable = False
+    return loaded_flexibility
 
 
 def _rigid_motions(nodes: FloatArray) -> FloatArray:

@@ -60,10 +60,10 @@ def read(request: Request) -> ReadProgram:
     >>> parse_program("UNITS/MM\nFEDRAT/600,MMPM\nFROM/0,0,50\nGOTO/0,0,0\nGOTO/40,0,0\nFINI\n", "part.apt")
     <ReadProgram part.apt: 2 moves, read as cutter-location file>
     """
-    state = State(request.name, copy.deepcopy(request.tools), request.controller.feed)
+    state = State(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
     for error in run(state, request.lines):
         raise error
-    warnings = not_for(request.controller, request.offsets, request.block_delete)
+    warnings = not_for(request.controller, request.work_offsets, request.block_delete)
     return ReadProgram(
         name=request.name,
         path=request.path,
