@@ -131,7 +131,7 @@ def diagnose(
     likeliest = fits.get(max(main.probability, key=lambda name: main.probability[name], default=NONE), main.base)
     log_model, tip = main.problem.observed - likeliest.residual, data.tip
     verdict, plausible = common_verdict(list(judgements.values()))
-    found = Diagnosis(
+    diagnosis = Diagnosis(
         verdict, list(plausible), judgements, main, data.of_tip, machine, cannot,
         of_readings(as_given, tip), of_readings(refitted, tip),
         {name: of_readings(fit, tip) for name, fit in fits.items()},
@@ -144,12 +144,12 @@ def diagnose(
         slips=slips,
         loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
     )  # fmt: skip
-    found = replace(found, portrait=portrait_of(found, progress), alike=alike_of(found))
-    if not plan_next or found.verdict not in ("ambiguous", "described"):
-        return found
+    diagnosis = replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis))
+    if not plan_next or diagnosis.verdict not in ("ambiguous", "described"):
+        return diagnosis
     progress("planning the next measurements")
-    rows, remarks = next_measurements(found, seed=seed)
-    return replace(found, next_measurements=tuple(rows), remarks=tuple(remarks))
+    rows, remarks = next_measurements(diagnosis, seed=seed)
+    return replace(diagnosis, next_measurements=tuple(rows), remarks=tuple(remarks))
 
 
 Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise model; the one that is written out
@@ -214,8 +214,8 @@ def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portra
         problem = Problem.of(Predictor(diagnosis.machine, diagnosis.data, diagnosis.predictor.effect_files), noise)
         base = problem.score_base()
     progress("describing what is missing")
-    found = draw_portrait(problem, base, noise, diagnosis.seed, main.base_gate.worst)
-    return found if found.terms or verdict == "unexplained" else None
+    portrait = draw_portrait(problem, base, noise, diagnosis.seed, main.base_gate.worst)
+    return portrait if portrait.terms or verdict == "unexplained" else None
 
 
 def alike_of(diagnosis: Diagnosis) -> Alike | None:
