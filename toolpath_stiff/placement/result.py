@@ -20,7 +20,7 @@ from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
 from toolpath_stiff.placement.task import SearchedFront, SearchRecord, Task
 from toolpath_stiff.results import FolderResult
-from toolpath_stiff.rewriting.program import OffsetBlocks, offset_blocks
+from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
 from toolpath_stiff.stiffness.model import effects_stated
 from toolpath_stiff.units import ShopPose, deg_from_rad, mm_from_m, number
 
