@@ -9,7 +9,7 @@ import numpy as np
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.planning.plan import INDICATORS
-from toolpath_stiff.stiffness.contract import joined
+from toolpath_stiff.stiffness.sizes import joined
 
 MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has all
 

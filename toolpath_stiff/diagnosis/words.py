@@ -17,7 +17,7 @@ from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.unexcluded import MATTERS
 from toolpath_stiff.portrait.words import alike_text
-from toolpath_stiff.stiffness.contract import joined
+from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
 
 
