@@ -199,6 +199,7 @@ NO_EXAMPLE = {
     "Diagnosis": {
         "document",
         "likeliest",
+        "rows",
         "noise",
         "unconfirmed",
         "predictor",
@@ -216,19 +217,22 @@ NO_EXAMPLE = {
     },
     "Case": {
         *(
-            "analyze_in",
             "compare",
             "diagnose",
             "draft",
-            "draft_in",
+            "find",
             "place",
             "plan",
             "preview",
+            "program_line",
             "record",
             "set_up",
-            "set_up_in",
         ),
         "update",
+    },
+    "Update": {  # steps and fits in SI, and what follows from them
+        *("described", "last", "changed", "worse", "supported", "verdict", "widening", "corrected", "fitted"),
+        "document",
     },
     "Machine": {"picture"},
     "MachineCheck": {"picture"},

@@ -24,7 +24,7 @@ from toolpath_stiff.readings.measurements import Measurements, read_measurements
 from toolpath_stiff.report.compare.page import text as compare_text
 from toolpath_stiff.report.machine import machine_figures
 from toolpath_stiff.report.update.page import text as update_text
-from toolpath_stiff.rig import case, exercise
+from toolpath_stiff.rig import campaigns, case, exercise
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import parse_nominal
 from toolpath_stiff.rotations import rotation_matrices
@@ -246,7 +246,7 @@ def campaign(law: str) -> tuple[str, Measurements]:
 def test_the_rig_reads_the_law_by_itself(law):
     """Readings of the nominal machine are those of the model: two programs that share no stiffness code."""
     machine, (data, nominal) = machine_with(law), (campaign(law)[1], parse_nominal(text_with(law), "mine.toml"))
-    rows = case.rows_of(case.paper_campaign())
+    rows = case.rows_of(campaigns.paper_campaign())
     plain = readings(nominal, HiddenMachine(), rows)
     modelled = np.exp(Predictor(machine, data).log_stiffness())
     np.testing.assert_allclose(plain, modelled, rtol=1e-9)
@@ -270,7 +270,7 @@ def test_update_refits_the_law_in_its_own_form(law, tmp_path):
     assert ends[0]["stiffness"] == pytest.approx(found.stiffness_1 / 1e6, rel=1e-4)
     if truth.constant:
         assert len(ends) == 1 and ends[0]["length_mm"] is None
-    said = update_text(update.to_dict())
+    said = update_text(update)
     assert ("N/um at every length" in said) == truth.constant
     assert ("N/um at 2561.6 mm and" in said) != truth.constant
 

@@ -13,7 +13,7 @@ from toolpath_stiff.inference import candidates
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.doubts import noise_doubt
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate
+from toolpath_stiff.inference.gates import Forms, absolute_gate, simulate
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import from_repeats, repeat_groups
@@ -173,9 +173,7 @@ def test_a_stated_noise_that_nothing_but_the_misfit_contradicts(factor: float, v
     problem = Problem.of(Predictor(nist(), data), noise)
     base = problem.score_base()
     forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
-    gate = absolute_gate(
-        problem, base.residual, base.jacobian, Simulator.of(noise, problem.scatter.covariance, 0), forms
-    )
+    gate = absolute_gate(problem, base.residual, base.jacobian, simulate(noise, problem.scatter.covariance, 0), forms)
     words, times = noise_doubt(problem, noise, gate, verdict, 0)
     assert said in words and bool(words) == bool(said)
     # What was stated times what is said comes to what is there: squares of 42 readings tell it within 11 %.

@@ -9,7 +9,6 @@ from scipy.stats import multivariate_normal
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.comparison.compare import compare
-from toolpath_stiff.correction.document import document as update_document
 from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import diagnose
@@ -258,14 +257,14 @@ def test_compare_shows_loops_in_a_section_of_their_own(joints):
 def test_update_counts_errors_over_the_tip_as_compare_does(joints):
     data = read_measurements(list(joints), nist())
     compared, found = compare(nist(), data, draws=20).document, update(nist(), data, strut_law=True)
-    written = update_document(found)
-    assert written["readings"] == compared["readings"] == 42 < len(found.update.data)
+    written = found.document
+    assert written["readings"] == compared["readings"] == 42 < len(found.data)
     step, given = compared["baseline"], written["steps"][0]
     for name in ("mean_abs_error_percent", "bias_percent", "rms_percent"):
         assert given[name] == pytest.approx(step[name], abs=1e-3)
     assert sum(one["readings"] for one in given["by_direction"].values()) == 42
     assert found.provenance["mean_error_before_percent"] == pytest.approx(step["mean_abs_error_percent"], abs=1e-3)
-    assert len(residuals_csv(found.update).splitlines()) == 1 + 42
+    assert len(residuals_csv(found).splitlines()) == 1 + 42
 
 
 def test_a_plan_sets_an_indicator_where_the_tip_tells_less():

@@ -123,8 +123,8 @@ def recover_geometry(
     >>> found.to_dict()["starts"]
     1
     """
-    from toolpath_stiff.correction.machines import recover_geometry as recover
-    from toolpath_stiff.correction.machines import recovery_text
+    from toolpath_stiff.correction.geometry import recover_geometry as recover
+    from toolpath_stiff.correction.geometry import recovery_text
 
     recovery = recover(starts=starts, seed=seed)
     return TextResult(recovery_text(recovery), recovery, f"the NIST geometry from {starts} starts")

@@ -189,7 +189,7 @@ def _bounds(
     for i, (low, high) in enumerate(workspace):
         if sides[i] is None and not np.isfinite(high - low):
             raise InputError(f"the machine file bounds no workspace in {'xyz'[i]}", hint=f"give --{'xyz'[i]} LO:HI")
-    lengths = np.array([side or own for side, own in zip(sides, workspace, strict=True)])
+    lengths = np.array([side or reach for side, reach in zip(sides, workspace, strict=True)])
     angles = np.array([_pair(turn) for turn in turns])
     if not np.abs(lengths).max() <= FARTHEST_MM:
         raise InputError("bounds beyond 100 m", expected="mm")

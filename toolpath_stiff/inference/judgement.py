@@ -38,7 +38,7 @@ from toolpath_stiff.inference.doubts import noise_doubt
 from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import refine
-from toolpath_stiff.inference.gates import Forms, Gate, Simulator, absolute_gate
+from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.question import question
@@ -272,19 +272,19 @@ class Gates:
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
     """The model alone, then single effects, then all pairs, then triples where no single effect is enough."""
-    simulator = Simulator.of(noise, problem.scatter.covariance, seed)
+    draws = simulate(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     signs = signatures(problem, (table for family in families for table in family.tables))
     # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
-    alone = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signs, gain)
+    alone = absolute_gate(problem, base.residual, base.jacobian, draws, forms, signs, gain)
     if alone.probability > FALSE_ALARM:
         return Gates(alone, none_stands=True)
     by_name: dict[str, Gate] = {}
 
     def passes(name: str, found: Fit) -> bool:
         fit = fits.of(name, found)
-        by_name[name] = absolute_gate(problem, fit.residual, fit.jacobian, simulator, forms)
+        by_name[name] = absolute_gate(problem, fit.residual, fit.jacobian, draws, forms)
         return by_name[name].probability > ADEQUATE
 
     singles: list[Family] = []

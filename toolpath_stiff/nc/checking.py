@@ -26,8 +26,8 @@ from toolpath_stiff.nc.languages import foreign_program, refused_program
 from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, ReadProgram, Unsupported
-from toolpath_stiff.nc.reader import INTERPRETERS, feed_assumption, millimetre_warning, read_source
-from toolpath_stiff.nc.request import ZERO
+from toolpath_stiff.nc.reader import INTERPRETERS, feed_assumption, millimetre_warning, read
+from toolpath_stiff.nc.request import ZERO, Request
 from toolpath_stiff.nc.state import Flow, State, Then
 from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
 from toolpath_stiff.nc.words import Block, looks_like_cutter_location
@@ -422,7 +422,7 @@ def check_by(
         if interpreter == "builtin" or ours.complete or not second:
             return ours, "builtin"
     try:
-        program = read_source(lines, name, controller=controller, **run, **options)
+        program = read(Request(lines, name, controller=controller, **run, **options))
     except InputError as error:
         if ours is not None:
             return _refused_by_both(ours, error), "builtin"

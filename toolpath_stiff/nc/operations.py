@@ -302,10 +302,8 @@ class _Way:
         """From move `last` (-1: from the start of the file) to a later one."""
         start, end = int(self.line[last + 1]), int(self.line[move + 1])
         if self.jumps is None:  # up to where the run leaves for a call or a loop, and from where it arrives
-            leaves, arrive = (
-                self.leaves[self.leaves >= start][:1].tolist(),
-                self.enters[self.enters < end][-1:].tolist(),
-            )
+            leaves = self.leaves[np.searchsorted(self.leaves, start) :][:1].tolist()
+            arrive = self.enters[: np.searchsorted(self.enters, end)][-1:].tolist()
             stop = leaves[0] if leaves else len(self.lines) + 1
             return [(start, end)] if start <= end <= stop else [(start, stop), (arrive[0] if arrive else 0, end)]
         first, stop = np.searchsorted(self.jump_moves, [last + 1, move + 1]).tolist()
@@ -329,45 +327,45 @@ def _beginnings(
     next_cut = np.searchsorted(cuts, events)
     tool = int(moves.tool[cuts[0]])
     change = _tool_change(way.lines, way.passed(-1, int(cuts[0]))) if tool else None
-    found = [_Beginning(0, [], tool, change)]
+    begins = [_Beginning(0, [], tool, change)]
     # Cuts (rows of `cuts`) that the running operation, and what stands before the next cut, begin with.
     current = gap = 0
-    said: set[int] = set()  # headings passed where the running operation began: passed again, they begin none
-    before, passed = said, set[int]()
+    known: set[int] = set()  # headings passed where the running operation began: passed again, they begin none
+    before, passed = known, set[int]()
     for event, ordinal in zip(events, next_cut.tolist(), strict=True):
         if ordinal == len(cuts):
             break  # nothing is cut after it
-        if len(found) > most:
+        if len(begins) > most:
             return []
         rows = seen.get(event, [])
         if ordinal != gap:
-            gap, before, passed = ordinal, said, set()
+            gap, before, passed = ordinal, known, set()
         passed.update(rows)
         fresh = [heads[row] for row in rows if row not in before]
         if ordinal == current:
-            found[-1].heads += fresh
-            said = passed
+            begins[-1].heads += fresh
+            known = passed
             continue
         tool, last = int(moves.tool[cuts[ordinal]]), int(moves.tool[cuts[ordinal - 1]])
         if not fresh and tool == last:
             continue
         stretches = [] if tool == last else way.passed(int(cuts[ordinal - 1]), int(cuts[ordinal]))
         change = _tool_change(way.lines, stretches) if stretches else None
-        found.append(_Beginning(event, fresh, tool, change))
-        current, said = ordinal, passed
-    return found if len(found) <= most else []
+        begins.append(_Beginning(event, fresh, tool, change))
+        current, known = ordinal, passed
+    return begins if len(begins) <= most else []
 
 
 def _headings_passed(way: _Way, heads: list[Heading]) -> dict[int, Sequence[int]]:
     """Move -> headings (rows of `heads`) passed right before it."""
-    at = np.array([head.line for head in heads], dtype=np.int64)
+    lines = np.array([head.line for head in heads], dtype=np.int64)
     seen: dict[int, Sequence[int]] = {}
-    below, odd = np.searchsorted(at, way.line, side="right"), way.turns()
+    below, odd = np.searchsorted(lines, way.line, side="right"), way.turns()
     straight = np.flatnonzero(~odd & (np.diff(below) != 0))
     for move, low, high in zip(straight.tolist(), below[straight].tolist(), below[straight + 1].tolist(), strict=True):
         seen[move] = range(low, high)
     for move in np.flatnonzero(odd).tolist() if heads else ():
-        spans = [np.searchsorted(at, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
+        spans = [np.searchsorted(lines, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
         between = [row for low, high in spans for row in range(low, high)]
         if between:
             seen[move] = between

@@ -18,14 +18,10 @@ from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
 MOST_LINES = 5  # named in one sentence
-
-
 OWN_ZERO = (
     "G54 as the program or the controller file sets it is that of the machine that the program was posted for; it does "
     "not say where the work sits here"
 )
-
-
 OWN_POINTS = (
     "G53, G28 and G30 go to points of the machine that the program was posted for, as it stands about the work; their "
     "place on this machine means nothing"

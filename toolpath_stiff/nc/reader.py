@@ -12,7 +12,7 @@ from typing import TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.points import increments_hint
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain
+from toolpath_stiff.nc.controller import Controller, Switches, check_plain, plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
@@ -25,7 +25,7 @@ from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.parametric.statements import uses_variables
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
-from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
+from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
 from toolpath_stiff.nc.words import looks_like_cutter_location, read_lines, split_lines
@@ -35,7 +35,7 @@ INTERPRETERS = ("builtin", "linuxcnc", "auto")
 
 
 class Options(TypedDict, total=False):
-    """How a program is read; see `read_source`."""
+    """How a program is read; see `Request`."""
 
     origin: Pose | None
     default_origin: Pose
@@ -70,7 +70,7 @@ def read_program(
         options["offsets"] = read_offsets(offsets_file)
     if tool_table:
         options["tools"] = read_tool_table(tool_table)
-    return read_source(read_lines(path), Path(path).name, str(path), **options)
+    return read(Request(read_lines(path), Path(path).name, str(path), **options))
 
 
 def parse_program(text: str, name: str = "program", **options: Unpack[Options]) -> ReadProgram:
@@ -91,73 +91,17 @@ def parse_program(text: str, name: str = "program", **options: Unpack[Options]) 
         ...
     toolpath_stiff.errors.ProgramError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0, ...
     """
-    return read_source(split_lines(text, name), name, **options)
+    return read(Request(split_lines(text, name), name, **options))
 
 
-def read_source(
-    lines: tuple[str, ...],
-    name: str,
-    path: str = "",
-    *,
-    origin: Pose | None = None,
-    default_origin: Pose = ZERO,
-    offsets: Offsets | None = None,
-    tools: dict[int, ToolEntry] | None = None,
-    block_delete: Switches = False,
-    interpreter: str = "builtin",
-    rs274: str | None = None,
-    unconfined: bool = False,
-    controller: Controller = UNKNOWN_CONTROL,
-) -> ReadProgram:
-    """Read the lines of an NC program to its moves in the set-up frame.
-
-    Parameters
-    ----------
-    lines, name, path
-        The program, what messages call it, and its file, "" for text.
-    origin, default_origin
-        Where program zero (G54) sits in machine coordinates, x, y, z in m, A, B, C in rad: as asked for, and
-        where neither the caller nor the program says so. Only moves in machine coordinates (G53, G28, G30) depend on
-        it.
-    offsets, tools
-        Work offsets and tool table, instead of the controller's.
-    block_delete
-        Leave out blocks that begin with a slash: True, all of them; switches 1 to 9, those of theirs (`/` is `/1`);
-        False, those of the controller file's.
-    interpreter
-        "builtin"; "linuxcnc", LinuxCNC's own (`rs274`); "auto", the first and, where it refuses, the second.
-    rs274
-        Path of the program `rs274`, if it is not on PATH.
-    unconfined
-        Run it even where bubblewrap, which keeps it from all files but its own, cannot be used.
-    controller
-        Dialect, block-delete switches, work offsets and tools of the control, and the kinematics that the program was
-        posted for.
+def read(request: Request) -> ReadProgram:
+    """A program by the interpreter that is asked for: the built-in one, LinuxCNC's, or that where the first refuses.
 
     Raises
     ------
     InputError
         With file, line and column, what was found and what was expected.
     """
-    request = Request(
-        lines,
-        name,
-        path,
-        origin,
-        default_origin,
-        offsets or controller.offsets or Offsets(),
-        controller.tools if tools is None else tools,
-        block_delete,
-        interpreter,
-        rs274,
-        unconfined,
-        controller,
-    )
-    return _read(request)
-
-
-def _read(request: Request) -> ReadProgram:
-    """By the interpreter that is asked for: the built-in one, LinuxCNC's, or that where the first refuses."""
     lines, name = request.lines, request.name
     if request.interpreter not in INTERPRETERS:
         raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
@@ -166,8 +110,8 @@ def _read(request: Request) -> ReadProgram:
     native = request.interpreter == "linuxcnc"
     if looks_like_cutter_location(lines, name):
         if native:
-            found = "LinuxCNC's interpreter reads no cutter-location files"
-            raise ProgramError(found, expected="--interpreter builtin", file=name)
+            problem = "LinuxCNC's interpreter reads no cutter-location files"
+            raise ProgramError(problem, expected="--interpreter builtin", file=name)
         return _with_feed(cutter_location.read(request), request)
     refused = foreign_program(lines, name) if native else refused_program(lines, name, request.controller.dialect)
     if refused is not None:
@@ -218,14 +162,14 @@ def _read_built_in(request: Request) -> ReadProgram:
 def _run_built_in(
     request: Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
 ) -> ReadProgram:
-    frames = Frames(copy.deepcopy(request.offsets), *request.zero, posted=request.posted)
-    state = State(request.name, frames, copy.deepcopy(request.tools), request.controller.dialect)
+    frames = Frames(copy.deepcopy(request.work_offsets), *request.zero, posted=request.posted)
+    state = State(request.name, frames, copy.deepcopy(request.tool_table), request.controller.dialect)
     state.feed = request.controller.feed
     run = begin(state, request.lines, request.name, request.switches)
     warnings = run.run()
     if not state.recorder.cuts:
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
-    if frames.source == "option" and (request.offsets.table[0].given or frames.offsets.table[0].given):
+    if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
         warnings.append(ORIGIN_WINS)
     moves = state.recorder.moves()
     warnings += [*state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, run.lines)]
@@ -261,7 +205,7 @@ def _on_the_part(
     program = _with_feed(program, request)
     if request.posted is None:
         return program
-    check_rotary_offsets(offsets or request.offsets, request.posted, program.name)
+    check_rotary_offsets(offsets or request.work_offsets, request.posted, program.name)
     if request.origin is None:
         return recovered(program, request.posted, tip_held, request.default_origin, "default")
     return recovered(program, request.posted, tip_held, request.origin, "option")

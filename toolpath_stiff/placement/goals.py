@@ -9,6 +9,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.keep_out import KeepOut
 
@@ -135,3 +136,7 @@ class SearchRules:
     keepouts: tuple[KeepOut, ...] = ()
     seed: int = defaults.PLACEMENT_SEED
     points: int = defaults.FRONT_POINTS
+
+    def __post_init__(self) -> None:
+        if self.objective not in defaults.OBJECTIVES:
+            raise InputError(f"objective {self.objective!r}", expected=f"one of {', '.join(defaults.OBJECTIVES)}")

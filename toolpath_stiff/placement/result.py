@@ -20,7 +20,7 @@ from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
 from toolpath_stiff.placement.task import SearchedFront, SearchRecord, Task
 from toolpath_stiff.results import FolderResult
-from toolpath_stiff.rewriting.program import OffsetBlocks, offset_blocks
+from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
 from toolpath_stiff.stiffness.model import effects_stated
 from toolpath_stiff.units import ShopPose, deg_from_rad, mm_from_m, number
 
@@ -268,9 +268,9 @@ class Placement(FolderResult, SearchedFront):
 
     def _binding_limits(self) -> list[str]:
         """The limits that the cuts come nearest to, at most three."""
-        at, cutting = self.best.at, self.best.samples.cutting
-        near = np.argsort(at.margin + np.where(cutting, 0.0, np.inf), kind="stable")[:200]
-        return list(dict.fromkeys(at.limits[int(at.limit[i])].name for i in near))[:3]
+        poses, cutting = self.best.at, self.best.samples.cutting
+        near = np.argsort(poses.margin + np.where(cutting, 0.0, np.inf), kind="stable")[:200]
+        return list(dict.fromkeys(poses.limits[int(poses.limit[i])].name for i in near))[:3]
 
     def to_frame(self) -> pd.DataFrame:
         """The front, one placement a row, as in `placements.csv`."""

@@ -18,6 +18,7 @@ from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.paths import Read
 from toolpath_stiff.placement.rows import PlacementRow
+from toolpath_stiff.placement.unreachable import LeftOutRapid
 from toolpath_stiff.rewriting.program import check_decimals, check_rewritable
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import Pose, mm_from_m
@@ -31,14 +32,6 @@ class Rewriting:
     decimals: int | None
     linearise: float | None
     reading: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class LeftOutRapid:
-    """A rapid that no placement keeps within reach: its line, and what it breaks."""
-
-    line: int
-    reason: str
 
 
 @dataclass(frozen=True)

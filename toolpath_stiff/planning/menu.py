@@ -155,5 +155,5 @@ def _by_last_use(values: Iterable[T]) -> tuple[T, ...]:
 
 def _lowest(data: Measurements, setup: str) -> float:
     """Lowest tool tip measured in a set-up; in one that was never used, the lowest of all."""
-    own = data.setup == setup
-    return float(data.position[own if own.any() else slice(None), 2].min())
+    there = data.setup == setup
+    return float(data.position[there if there.any() else slice(None), 2].min())

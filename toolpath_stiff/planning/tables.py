@@ -44,11 +44,11 @@ def _canonical(columns: FloatArray) -> FloatArray:
     least = INDEPENDENT * float(np.linalg.norm(columns, axis=1).max(initial=0.0))
     basis = np.zeros((0, columns.shape[1]))
     for row in columns:
-        own = row - (row @ basis.T) @ basis
-        own -= (own @ basis.T) @ basis  # once more, against rounding
-        length = float(np.linalg.norm(own))
+        direction = row - (row @ basis.T) @ basis
+        direction -= (direction @ basis.T) @ basis  # once more, against rounding
+        length = float(np.linalg.norm(direction))
         if length > least:
-            basis = np.concatenate([basis, own[None] / length])
+            basis = np.concatenate([basis, direction[None] / length])
         if len(basis) == columns.shape[1]:
             break
     return np.asarray(columns @ basis.T)

@@ -199,11 +199,7 @@ def _leading_first(selection: Selection, description: Description) -> Descriptio
     """Terms by what their absence would cost."""
     if len(description.terms) < 2:
         return description
-    rows = np.argsort(-_costs(selection, description), kind="stable").tolist()
-    return selection.described(
-        [description.terms[k] for k in rows], description.columns[rows], description.scale[rows],
-        description.fit.law, description.fit.scatter,
-    )  # fmt: skip
+    return selection.only(description, np.argsort(-_costs(selection, description), kind="stable").tolist())
 
 
 def _held(selection: Selection, description: Description) -> HeldOut:

@@ -15,7 +15,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
-from toolpath_stiff.inference.gates import Simulator
+from toolpath_stiff.inference.gates import simulate
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
@@ -213,7 +213,7 @@ def _explained(selection: Selection, start: Description, found: Description) -> 
 
 def noise_floor(selection: Selection, description: Description) -> float:
     """Rms at left-out points that noise alone leaves: simulated campaigns through the same fit."""
-    draws = Simulator.of(selection.noise, selection.problem.scatter.covariance, selection.seed, FLOOR_DRAWS).draws
+    draws = simulate(selection.noise, selection.problem.scatter.covariance, selection.seed, FLOOR_DRAWS)
     jacobian, precision = description.fit.jacobian, description.fit.scatter.precision
     weighted = precision.times(jacobian.T)
     inverse = np.linalg.pinv(weighted @ jacobian + law_prior(len(weighted)), hermitian=True)

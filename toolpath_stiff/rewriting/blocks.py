@@ -13,7 +13,7 @@ from toolpath_stiff.nc.codes.motion import ARCS
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
 from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.nc.state import CurrentBlock, Flow
+from toolpath_stiff.nc.state import Flow
 from toolpath_stiff.nc.words import AXES, POLAR, Block, read_block
 from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
 from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, points_between
@@ -38,7 +38,7 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     controls.block = block
     controls.trace.clear()
     first, first_out = len(source.recorder.line), len(out.recorder.line)
-    current = begin(source, block)
+    controls.current = current = begin(source, block)
     if current.flow is not Flow.NEXT:
         raise controls.refusal(SUBPROGRAM, "expand the subprograms first")
     if "M modal state" in current.groups:
@@ -47,25 +47,22 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
         raise controls.refusal("spindle-synchronised motion (G33) cannot be rewritten", "leave it out")
     if source.cutter is not None:
         raise controls.refusal(COMPENSATION, "post the program with the path of the tool centre")
-    axes = [letter for letter in AXES if current.has(letter)]
+    controls.axes = [letter for letter in AXES if current.has(letter)]
     plane_before = out.plane
     begin(out, block)
     goes_on = finish(source, current) is Flow.NEXT
-    edit = LineEdit(text, block, controls.digits)
-    plane = controls.plane_word(current, edit, plane_before)
-    lines, pieces = _lines(controls, current, edit, axes, plane, first)
+    controls.edit = LineEdit(text, block, controls.digits)
+    plane = controls.plane_word(plane_before)
+    lines, pieces = _lines(controls, current.groups.get("non-modal"), plane, first)
     controls.check(first, first_out, pieces)
     return lines, goes_on
 
 
-def _lines(
-    controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], plane: str, first: int
-) -> tuple[list[str], bool]:
+def _lines(controls: Controls, once: str | None, plane: str, first: int) -> tuple[list[str], bool]:
     """The lines, and whether they are one move cut into pieces."""
     source = controls.source
-    once = current.groups.get("non-modal")
     if not controls.trace:
-        return [controls.emit(edit)], False
+        return [controls.emit()], False
     last = controls.trace[-1]
     if source.polar is not None or any(word.letter in POLAR for word in controls.block.words):
         raise controls.refusal(
@@ -75,27 +72,28 @@ def _lines(
         controls.note("moves of G53 keep their machine coordinates")
     elif once is not None and CODES[once].takes_axes:
         controls.note("the reference points of G28 and G30 stay where they are; intermediate points move with the work")
-        _home(controls, edit, axes)
+        _home(controls)
     elif source.motion in CYCLES:
         if controls.matrix[geometry.PLANES[source.plane][2], geometry.PLANES[source.plane][2]] != 1.0:
-            return _one_by_one(controls, current, edit, axes, _cycle_in_moves(controls, first)), False
-        _cycle(controls, current, edit, axes, plane)
+            return _one_by_one(controls, _cycle_in_moves(controls, first)), False
+        _cycle(controls, plane)
     else:
         count = _piece_count(controls)
         if count > 1:
             start, end = (source.frames.to_setup(point) for point in (last.start, last.end))
             points = points_between(start, end, last.arc, count)
-            return _one_by_one(controls, current, edit, axes, [("G1", point, 0.0) for point in points]), True
+            return _one_by_one(controls, [("G1", point, 0.0) for point in points]), True
         if last.arc is None:
-            controls.motion_word(current, edit, source.motion or "")
-            controls.go(edit, controls.target(last.end), axes)
+            controls.motion_word(source.motion or "")
+            controls.go(controls.target(last.end), controls.axes)
         else:
-            _arc(controls, current, edit, axes, plane)
-    return [controls.emit(edit)], False
+            _arc(controls, plane)
+    return [controls.emit()], False
 
 
-def _home(controls: Controls, edit: LineEdit, axes: list[str]) -> None:
+def _home(controls: Controls) -> None:
     """G28, G30: the intermediate point moves with the work, the reference point does not."""
+    axes = controls.axes
     if not axes:
         return
     mixed = controls.matrix != 0.0
@@ -110,11 +108,11 @@ def _home(controls: Controls, edit: LineEdit, axes: list[str]) -> None:
             f"G28 or G30 of {', '.join(axes)} without {', '.join(missing)}: the turned work has no such axis alone",
             f"name {', '.join(missing)} too",
         )
-    controls.go(edit, controls.target(controls.trace[0].end), axes, only=named)
+    controls.go(controls.target(controls.trace[0].end), axes, only=named)
 
 
-def _arc(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], plane: str) -> None:
-    source = controls.source
+def _arc(controls: Controls, plane: str) -> None:
+    source, edit, axes = controls.source, controls.edit, controls.axes
     image, last = controls.image(source.plane), controls.trace[-1]
     assert image is not None
     assert last.arc is not None
@@ -123,13 +121,13 @@ def _arc(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[s
         edit.add_code(name)
     code = source.motion or ""
     code = code if sign > 0.0 else ARCS[1 - ARCS.index(code)]
-    controls.motion_word(current, edit, code)
+    controls.motion_word(code)
     first, second, normal = geometry.PLANES[name]
     target = controls.target(last.end)
     start, end = (source.frames.to_program(point) for point in (last.start, last.end))
     chord = math.dist(*([point[axis] for axis in geometry.PLANES[source.plane][:2]] for point in (start, end)))
     if chord >= SAME:
-        controls.go(edit, target, axes)
+        controls.go(target, axes)
     else:  # a circle ends on its own start to the last digit, or it is none: words that cannot say so are left out
         here = controls.out.frames.to_program(controls.out.frames.position)
         for axis in (axis for axis in range(3) if axis != normal and AXES[axis] in axes):
@@ -139,24 +137,19 @@ def _arc(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[s
             else:
                 edit.write(AXES[axis], place if controls.out.absolute else 0.0)
         along = [normal, 3, 4, 5]
-        controls.go(edit, target, [letter for letter in axes if AXES.index(letter) in along], only=along)
-    _center(controls, edit, last.arc.center, code == "G2", (first, second), chord)
+        controls.go(target, [letter for letter in axes if AXES.index(letter) in along], only=along)
+    _center(controls, last.arc.center, code == "G2", (first, second), chord)
 
 
 def _center(
-    controls: Controls,
-    edit: LineEdit,
-    center: Sequence[float],
-    clockwise: bool,
-    plane: tuple[int, int],
-    exact_chord: float,
+    controls: Controls, center: Sequence[float], clockwise: bool, plane: tuple[int, int], exact_chord: float
 ) -> None:
     """I, J, K of a centre (set-up frame of the untouched program); R stays where it says the same."""
-    out = controls.out
+    out, edit = controls.out, controls.edit
     there = out.frames.to_program(controls.of_setup([*center, 0.0, 0.0, 0.0]))
     here = out.frames.to_program(out.frames.position)
     if edit.word("R") is not None:
-        by_radius = _center_by_radius(controls, edit, here, clockwise, plane, exact_chord)
+        by_radius = _center_by_radius(controls, here, clockwise, plane, exact_chord)
         if by_radius and math.dist(by_radius, [there[axis] for axis in plane]) <= NEAR * controls.unit:
             return
         edit.remove("R")
@@ -169,16 +162,11 @@ def _center(
 
 
 def _center_by_radius(
-    controls: Controls,
-    edit: LineEdit,
-    here: Sequence[float],
-    clockwise: bool,
-    plane: tuple[int, int],
-    exact_chord: float,
+    controls: Controls, here: Sequence[float], clockwise: bool, plane: tuple[int, int], exact_chord: float
 ) -> geometry.Point2 | None:
     """The centre that R gives with the rounded ends; None near half circles, where R magnifies the rounding."""
     end, size = list(here), 0.0
-    for word in read_block(edit.render(), controls.block.line, controls.source.name).words:
+    for word in read_block(controls.edit.render(), controls.block.line, controls.source.name).words:
         if word.letter in AXES:
             axis = AXES.index(word.letter)
             end[axis] = word.value * controls.scale(axis) + (0.0 if controls.out.absolute else here[axis])
@@ -194,17 +182,17 @@ def _center_by_radius(
         return None
 
 
-def _cycle(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], plane: str) -> None:
+def _cycle(controls: Controls, plane: str) -> None:
     """The hole's place turns and moves, bottom and R plane (in G90) move along the drilling axis."""
-    source, out = controls.source, controls.out
+    source, out, edit = controls.source, controls.out, controls.edit
     first, second, normal = geometry.PLANES[source.plane]
     if source.plane != plane:
         edit.add_code(source.plane)
-    controls.motion_word(current, edit, source.motion or "")
+    controls.motion_word(source.motion or "")
     repeats = edit.word("L")
-    holes = [letter for letter in axes if AXES.index(letter) != normal]
+    holes = [letter for letter in controls.axes if AXES.index(letter) != normal]
     target = controls.target(controls.trace[-1].end)
-    controls.go(edit, target, holes, only=[first, second], parts=int(repeats.value) if repeats else 1)
+    controls.go(target, holes, only=[first, second], parts=int(repeats.value) if repeats else 1)
     for key, letter in (("Z", AXES[normal]), ("R", "R")):
         height = source.sticky[key]
         if source.absolute:
@@ -253,8 +241,8 @@ def _piece_count(controls: Controls) -> int:
     tolerance = controls.linearise - controls.unit
     if tolerance < controls.unit:
         option = both_names("--linearise", f"{controls.linearise:g}")
-        found = f"{option} is no more than the rounding to {controls.digits} decimals"
-        raise controls.refusal(found, "give more of it, or more --decimals")
+        problem = f"{option} is no more than the rounding to {controls.digits} decimals"
+        raise controls.refusal(problem, "give more of it, or more --decimals")
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
     if arc is not None and (off_plane or count > 1):
         controls.note(
@@ -265,33 +253,28 @@ def _piece_count(controls: Controls) -> int:
     return count
 
 
-def _one_by_one(
-    controls: Controls,
-    current: CurrentBlock,
-    edit: LineEdit,
-    axes: list[str],
-    pieces: Sequence[Piece],
-) -> list[str]:
+def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
     """Straight moves, the first in the block's own line."""
-    stop = current.code("M stop")
-    if stop is not None:
+    stop, edit = controls.current and controls.current.code("M stop"), controls.edit
+    if stop:
         raise controls.refusal(f"{stop[0]} in a block that is written as several", "give it a block of its own")
     edit.remove("IJKRPLQ")
     feed = edit.word("F") if controls.out.feed_mode == "G93" else None
     slash = SLASH.match(edit.render()) if edit.block.optional else None
+    lead = slash[0] if slash else ""
     lines = []
     for number, (code, point, dwell) in enumerate(pieces):
         if number:
-            edit = edit.next_line(slash[0] if slash else "")
-        controls.motion_word(None if number else current, edit, code)
-        controls.go(edit, controls.of_setup(point), [] if number else axes)
+            controls.edit, controls.current = edit.next_line(lead), None
+        controls.motion_word(code)
+        controls.go(controls.of_setup(point), [] if number else controls.axes)
         if feed is not None:  # of each piece, as G93 counts the moves
-            edit.write("F", feed.value * len(pieces), FEED_DECIMALS)
-        if number == 0 or edit.moves:
-            lines.append(controls.emit(edit))
+            controls.edit.write("F", feed.value * len(pieces), FEED_DECIMALS)
+        if number == 0 or controls.edit.moves:
+            lines.append(controls.emit())
         if dwell:
-            pause = edit.next_line(slash[0] if slash else "")
-            pause.add_code("G4")
-            pause.write("P", dwell, FEED_DECIMALS)
-            lines.append(controls.emit(pause))
+            controls.edit = edit.next_line(lead)
+            controls.edit.add_code("G4")
+            controls.edit.write("P", dwell, FEED_DECIMALS)
+            lines.append(controls.emit())
     return lines

@@ -125,8 +125,6 @@ class LineEdit:
 
 
 DECIMALS_MM, DECIMALS_INCH = 4, 5
-
-
 # Of the last decimal: an axis that its block does not name gets a word where it is off by more than rounding.
 OFF = 0.75
 
@@ -138,8 +136,10 @@ class Controls:
     ----------
     known
         Axes that the program has put somewhere; of the others only the control knows where they stand.
-    block
-        The current one.
+    block, edit, axes
+        The current one, its line as it will be, the letters of the axes that it names.
+    current
+        The words of the block by what they do; None for a further line in its place.
     trace
         The moves of that block as the untouched program makes them.
     notes
@@ -151,7 +151,9 @@ class Controls:
         self.decimals, self.linearise = decimals, linearise
         self.known = [False, False, False, True, True, True]
         self.notes: list[str] = []
-        self.block = Block(0, ())
+        self.block, self.edit = Block(0, ()), LineEdit("", Block(0, ()), 0)
+        self.current: CurrentBlock | None = None
+        self.axes: list[str] = []
         self.trace: list[Segment] = []
         source.trace = self.trace
         self._coarsest = 0.0  # mm, the last decimal of any block so far: inches round coarser than mm
@@ -194,25 +196,25 @@ class Controls:
                 return name, float(column[normal])
         return None
 
-    def plane_word(self, current: CurrentBlock, edit: LineEdit, before: str) -> str:
+    def plane_word(self, before: str) -> str:
         """Turn the plane word of the block, if it has one; the plane that will be in force."""
-        given = current.code("plane")
+        given = self.current.code("plane") if self.current else None
         if given is None:
             return before
         image = self.image(given[0])
         plane = image[0] if image else given[0]
         if plane != given[0]:
-            edit.replace(given[1], given[1].text[0] + plane[1:])
+            self.edit.replace(given[1], given[1].text[0] + plane[1:])
         return plane
 
-    def motion_word(self, current: CurrentBlock | None, edit: LineEdit, wanted: str) -> None:
+    def motion_word(self, wanted: str) -> None:
         """Make sure that the block is executed in the motion mode wanted."""
-        given = None if current is None else current.code("motion")
+        given = self.current.code("motion") if self.current else None
         if given is None:
             if self.out.motion != wanted:
-                edit.add_code(wanted)
+                self.edit.add_code(wanted)
         elif given[0] != wanted:
-            edit.replace(given[1], given[1].text[0] + wanted[1:])
+            self.edit.replace(given[1], given[1].text[0] + wanted[1:])
 
     def target(self, control: Sequence[float]) -> list[float]:
         """Control coordinates of `out` for a point of `source` in its control coordinates."""
@@ -224,9 +226,7 @@ class Controls:
         point = [p + r for p, r in zip(self.turn.point(setup[:3]), reference, strict=True)]
         return [*point, *self.turn.angles(setup[3:], self.out.frames.position[3:])]
 
-    def go(
-        self, edit: LineEdit, target: list[float], axes: Sequence[str], only: Sequence[int] = range(6), parts: int = 1
-    ) -> None:
+    def go(self, target: list[float], axes: Sequence[str], only: Sequence[int] = range(6), parts: int = 1) -> None:
         """Words of the axes `only`, so that `out` goes to a point in control coordinates, in `parts` equal steps.
 
         `axes` are those that the untouched block names; another one gets a word only where it has to move too.
@@ -243,11 +243,11 @@ class Controls:
                 if not off or not (self.known[axis] or coupled):
                     continue
             goal = there[axis] if out.absolute else (there[axis] - here[axis]) / parts
-            edit.write(letter, goal / scale)
+            self.edit.write(letter, goal / scale)
 
-    def emit(self, edit: LineEdit) -> str:
+    def emit(self) -> str:
         """Have `out` execute the edited line; its text."""
-        text = edit.render()
+        text = self.edit.render()
         try:
             block = read_block(text, self.block.line, self.source.name)
             execute(self.out, block)

@@ -130,9 +130,9 @@ def at_strength(name: str, shape: Mapping[str, Any], strength: float) -> Paramet
         case "thermal_drift":
             return {"rate": 20.0 * strength * sign}
         case _:
-            own = {key: value for key, value in shape.items() if key != "sign"}
+            drawn = {key: value for key, value in shape.items() if key != "sign"}
             limit = UNKNOWNS[name].limit if name in UNKNOWNS else ODDITY_LIMITS[name]
-            return {**own, "size": limit * strength * sign}
+            return {**drawn, "size": limit * strength * sign}
 
 
 def _gauge_target(target: str) -> Parameters:
@@ -224,8 +224,8 @@ class Scale:
             for key, value in at_strength(name, shape, strength).items()
         }
         # The digits beyond are the processor's.
-        found = {"size": _rms(change), "detectability": self._detectability(change)}
-        return parameters, {key: float(f"{value:.6g}") for key, value in found.items()}
+        figures = {"size": _rms(change), "detectability": self._detectability(change)}
+        return parameters, {key: float(f"{value:.6g}") for key, value in figures.items()}
 
     def _reach(self, name: str, shape: Mapping[str, Any], size: float, start: float = 0.02) -> tuple[float, FloatArray]:
         """Strength in (0, 1] at which the rms change is `size` within 2 %, and that change; 1 if no strength does.
@@ -256,7 +256,7 @@ SCALES_KEPT = 8
 def scale_of(nominal: Nominal, rows: Rows, clamps: IntArray, nuisances: Nuisances) -> Scale:
     """The scale of a campaign; those used last are kept, for many cases are drawn on one campaign."""
     parts = [clamps, *vars(nominal).values(), *vars(rows).values()]
-    key = (nuisances, *((one.dtype.str, one.tobytes()) if isinstance(one, np.ndarray) else one for one in parts))
+    key = (nuisances, *((part.dtype.str, part.tobytes()) if isinstance(part, np.ndarray) else part for part in parts))
     if key not in _SCALES:
         while len(_SCALES) >= SCALES_KEPT:
             _SCALES.pop(next(iter(_SCALES)))
@@ -307,9 +307,9 @@ def _spread(scale: Scale, nuisances: Nuisances) -> FloatArray:
     for strut in range(6):
         factors = np.where(np.arange(6) == strut, 1.0 + step, 1.0)
         columns.append(nuisances.strut_spread * scale.change(HiddenMachine(strut_factors=factors)) / step)
-    (first, last), at = scale.nominal.law_ends, scale.nominal.law_lengths
-    toward = (at - first) / (last - first)
-    for moved in [np.ones(1)] if len(at) == 1 else [1.0 - toward, toward]:
+    (first, last), lengths = scale.nominal.law_ends, scale.nominal.law_lengths
+    toward = (lengths - first) / (last - first)
+    for moved in [np.ones(1)] if len(lengths) == 1 else [1.0 - toward, toward]:
         stiffer = scale.nominal.law_stiffnesses * (1.0 + step * moved)
         other = dataclasses.replace(scale.nominal, law_stiffnesses=stiffer)
         columns.append(FREE_LAW * (np.log(readings(other, HiddenMachine(), scale.rows)) - scale.base) / step)

@@ -1,7 +1,7 @@
 """Cutter-location files: the points, tool axes and feeds that CAM systems hand to post processors, in APT's words.
 
-`statements` splits lines; `vocabulary` is the table of words, whose functions are in `modes` and `motion`; each takes
-the `state` and a statement. `state` also makes moves of what `geometry` computes.
+`statements` splits lines; `vocabulary` is the table of words, whose functions are in `modes`, `motion` and `cycles`;
+each takes the `state` and a statement. `state` also makes moves of what `circles` and `tool_axes` compute.
 
 A file is read to `ReadProgram`, the same contract as the reader of G code, or checked, with all its errors.
 """
@@ -60,10 +60,10 @@ def read(request: Request) -> ReadProgram:
     >>> parse_program("UNITS/MM\nFEDRAT/600,MMPM\nFROM/0,0,50\nGOTO/0,0,0\nGOTO/40,0,0\nFINI\n", "part.apt")
     <ReadProgram part.apt: 2 moves, read as cutter-location file>
     """
-    state = State(request.name, copy.deepcopy(request.tools), request.controller.feed)
+    state = State(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
     for error in run(state, request.lines):
         raise error
-    warnings = not_for(request.controller, request.offsets, request.block_delete)
+    warnings = not_for(request.controller, request.work_offsets, request.block_delete)
     return ReadProgram(
         name=request.name,
         path=request.path,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from toolpath_stiff.nc.cutter_location import modes, motion
+from toolpath_stiff.nc.cutter_location import cycles, modes, motion
 from toolpath_stiff.nc.cutter_location.modes import FRAMES, HEADING, TOOL
 from toolpath_stiff.nc.cutter_location.state import State
 from toolpath_stiff.nc.cutter_location.statements import Statement, is_number, number
@@ -156,7 +156,7 @@ _ACTING = (
     Word("MOVARC", motion.movarc, _CIRCLE, AUTODESK, ISO, "/x,y,z,i,j,k,r,ANGLE,a"),
     Word("INDIRV", motion.indirv, _DIRECTION, CATIA_CREO, APT, "/i,j,k"),
     Word("TLON,GOFWD", motion.tlon, "the tool moves along a circle", CATIA_CREO, DASSAULT, "/(...),ON,(...)"),
-    Word("CYCLE", motion.cycle, "drilling cycle", ALL, PTC, _CYCLE_FORM),
+    Word("CYCLE", cycles.cycle, "drilling cycle", ALL, PTC, _CYCLE_FORM),
     Word("FEDRAT", modes.fedrat, "feed", ALL, ISO, "/number[,unit] or unit,number"),
     Word("SPINDL", modes.spindl, "spindle speed", ALL, ISO),
     Word("UNITS", modes.units, "length unit", f"{CREO}, {AUTODESK}", ISO, "/MM or INCHES"),

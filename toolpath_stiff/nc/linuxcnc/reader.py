@@ -84,7 +84,7 @@ class _Session:
         self, request: Request, lines: list[Line], rs274: str, dropped: Sequence[Dropped], limits: Limits | None
     ) -> None:
         self.request, self.lines, self.rs274, self.dropped, self.limits = request, lines, rs274, dropped, limits
-        self.offsets = copy.deepcopy(request.offsets)
+        self.offsets = copy.deepcopy(request.work_offsets)
 
     def read(self) -> ReadProgram:
         request = self.request
@@ -114,7 +114,7 @@ class _Session:
             unsupported=tuple(self._unsupported()),
             warnings=(*self._warnings(source, given), *lathe_warning(self._turning(), moves)),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program", *self._left_out()),
-            tools=tuple(tool_of(request.tools, number).in_use() for number in follower.used_tools),
+            tools=tuple(tool_of(request.tool_table, number).in_use() for number in follower.used_tools),
             interpreter="linuxcnc",
             dialect="linuxcnc",
         )
@@ -172,7 +172,7 @@ class _Session:
 
     def _run(self, shift: Sequence[float], until: int | None = None) -> tuple[Run, Follower]:
         """Run the program, or its part before the line `until` is first executed."""
-        name, tools = self.request.name, self.request.tools
+        name, tools = self.request.name, self.request.tool_table
         prefix, active = self._prefix(shift)
         lines = [Line(line.number, "M2") if line.number == until else line for line in self.lines]
         switch = bool(self.request.switches)
@@ -195,7 +195,7 @@ class _Session:
 
     def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
         request = self.request
-        follower = Follower(request.name, self.lines, request.tools, request.posted is not None, reference)
+        follower = Follower(request.name, self.lines, request.tool_table, request.posted, reference)
         follower.follow(run.canon)
         return follower
 
