@@ -11,6 +11,7 @@ has been told apart counts no more; one that cannot be told apart takes nothing 
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -31,11 +32,11 @@ from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all
 from toolpath_stiff.planning.gaps import GapShares, ReadingNoise, pair_shares, repeat_and_clamping
 from toolpath_stiff.planning.indicators import loops_between, with_indicators
 from toolpath_stiff.planning.menu import Menu
-from toolpath_stiff.planning.outlook import MOST_REPEATS, SETTLED, Expectation, Outlook
+from toolpath_stiff.planning.outlook import SETTLED, Expectation, expected_outcome
 from toolpath_stiff.planning.visits import Matters, Visits, possible_visits
 
 MOST_RIVALS = 6  # a plan that separates more would separate none well
-MOST_VISITS = 200
+MOST_VISITS, MOST_REPEATS = 200, 64
 LEAST_GAP = 1.0  # standard deviations after all visits: below, tip stiffness cannot tell the two apart
 LEAST_GAIN = 0.01  # of a probability that is printed in whole per cent: less is no reason to measure
 # Where an indicator reads a link's own deflection.
@@ -148,9 +149,12 @@ class RivalPlan:
         """Whether any pair can be told apart by tip stiffness."""
         return any(pair.separable for pair in self.pairs)
 
-    @property
-    def _outlook(self) -> Outlook:
-        return Outlook(self.visits, self.picked, self.forecasts, self.scatter, self.seed)
+    def expected(self, count: int | None = None, repeats: int = 1) -> Expectation:
+        """What is to be expected of the best visits (None: all), each made so often."""
+        rows = [self.visits.rows(visit) for visit in self.picked[:count]]
+        visit_of = np.repeat(np.arange(len(rows)), [len(some) for some in rows])
+        noise = self.scatter.shared_out(repeats)
+        return expected_outcome(self.forecasts, np.concatenate(rows), visit_of, noise, self.seed)
 
     @property
     def before(self) -> Expectation:
@@ -161,17 +165,26 @@ class RivalPlan:
     @cached_property
     def after(self) -> Expectation:
         """The same after the plan, to be expected."""
-        return self._outlook.after()
+        return self.expected()
 
     @cached_property
     def enough(self) -> int | None:
         """How many of the poses, the best ones, should bring the truth a probability of `SETTLED`; None: not all."""
-        return self._outlook.enough()
+        counts = range(1, len(self.picked) + 1)
+        return next((count for count in counts if self.expected(count).truth >= SETTLED), None)
 
     @cached_property
     def repeats(self) -> int | None:
         """How often each visit must be repeated, clamped anew, for that; None: not even `MOST_REPEATS` times."""
-        return self._outlook.repeats_needed()
+
+        def settles(repeats: int) -> bool:
+            return self.expected(repeats=repeats).truth >= SETTLED
+
+        if self.after.truth >= SETTLED:
+            return 1
+        if not settles(MOST_REPEATS):
+            return None
+        return bisect_left(range(MOST_REPEATS + 1), True, lo=1, hi=MOST_REPEATS, key=settles)
 
     @property
     def gains(self) -> bool:
