@@ -1,4 +1,4 @@
-"""What is to be expected of visits: readings simulated under every rival, judged by Bayes' rule."""
+"""The outlook of visits: readings simulated under every rival, judged by Bayes' rule."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DRAWS = 400  # simulated results a rival
 
 @dataclass(frozen=True)
 class Expectation:
-    """What is to be expected of readings.
+    """Expected outcome of readings.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What to measure next, or first: which measurements would tell rival explanations apart, per minute of work.
+"""Plans between rivals: the measurements that would tell rival explanations apart, per minute of work.
 
 Visits are chosen one after another. Each lowers the bound on the chance of taking one rival for another,
 
@@ -54,7 +54,7 @@ INDICATORS = {
 
 @dataclass(frozen=True)
 class PairGap:
-    """How far two rivals are apart.
+    """The gap between two rivals.
 
     Attributes
     ----------
@@ -118,12 +118,12 @@ class RivalPlan:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What each chosen visit changes, one word or two."""
+        """The change that each chosen visit brings, one word or two."""
         return tuple(self.visits.kind(visit) for visit in self.chosen)
 
     @property
     def why(self) -> tuple[str, ...]:
-        """What each chosen visit is for, a sentence."""
+        """The purpose of each chosen visit, a sentence."""
         return tuple(why_of(self.visits, visit, self.shares) for visit in self.chosen)
 
     @property
@@ -146,11 +146,11 @@ class RivalPlan:
 
     @property
     def separable(self) -> bool:
-        """Whether any pair can be told apart by tip stiffness."""
+        """True where any pair can be told apart by tip stiffness."""
         return any(pair.separable for pair in self.pairs)
 
     def expected(self, count: int | None = None, repeats: int = 1) -> Expectation:
-        """What is to be expected of the best visits (None: all), each made so often."""
+        """The expected outcome of the best visits (None: all), each made so often."""
         rows = [self.visits.rows(visit) for visit in self.picked[:count]]
         visit_of = np.repeat(np.arange(len(rows)), [len(some) for some in rows])
         noise = self.scatter.shared_out(repeats)
@@ -158,7 +158,7 @@ class RivalPlan:
 
     @property
     def before(self) -> Expectation:
-        """What is known: the probabilities of the truth and of a settled verdict."""
+        """The probabilities of the truth and of a settled verdict as they are now."""
         weights = [forecast.weight for forecast in self.forecasts]
         return Expectation(float(np.square(weights).sum()), float(max(weights) >= NAMED))
 
@@ -169,13 +169,13 @@ class RivalPlan:
 
     @cached_property
     def enough(self) -> int | None:
-        """How many of the poses, the best ones, should bring the truth a probability of `SETTLED`; None: not all."""
+        """The number of poses, the best ones, that should bring the truth a probability of `SETTLED`; None: not all."""
         counts = range(1, len(self.picked) + 1)
         return next((count for count in counts if self.expected(count).truth >= SETTLED), None)
 
     @cached_property
     def repeats(self) -> int | None:
-        """How often each visit must be repeated, clamped anew, for that; None: not even `MOST_REPEATS` times."""
+        """The repeats of each visit, clamped anew, that this takes; None: not even `MOST_REPEATS` do."""
 
         def settles(repeats: int) -> bool:
             return self.expected(repeats=repeats).truth >= SETTLED
@@ -188,7 +188,7 @@ class RivalPlan:
 
     @property
     def gains(self) -> bool:
-        """Whether the truth becomes likelier, or the verdict settled, on average, and more of it would go on so."""
+        """True where the truth becomes likelier, or the verdict settled, on average, and more of it would go on so."""
         rises = (self.after.truth - self.before.truth, self.after.settled - self.before.settled)
         return bool(max(rises) >= LEAST_GAIN and (self.separable or self.repeats is not None))
 
@@ -205,7 +205,7 @@ class RivalPlan:
 
     @property
     def sentences(self) -> list[str]:
-        """What the plan promises."""
+        """The promises of the plan."""
         lines = [
             f"{self._work}: the probability of the right explanation is expected to rise {self._rise}, "
             f"and the verdict to be settled in {_percent(self.after.settled)} of cases"
@@ -234,7 +234,7 @@ class RivalPlan:
 
     @property
     def nothing_gained(self) -> str:
-        """That a plan is not worth its minutes, and what would tell its two likeliest rivals apart instead."""
+        """A sentence: the plan is not worth its minutes, and what would tell its two likeliest rivals apart instead."""
         first, second = (rival.name for rival in self.rivals[:2])
         pair = next(pair for pair in self.pairs if {first, second} == set(pair.effects))
         beside = bool((self.visits.readings.loop != "").any())  # indicators take part already
@@ -354,7 +354,7 @@ def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
 
 
 def matters(rivals: Sequence[Rival]) -> Matters:
-    """What the rivals' answers hang on."""
+    """Columns that the rivals' answers hang on."""
     actives = [active for rival in rivals for active in rival.effects]
     needs = {column for active in actives for column in active.effect.needs}
     # A set-up that an effect acts on is a text among its values.

@@ -56,7 +56,7 @@ def _corners(corners: FloatArray) -> list[list[float | None]]:
 
 
 def text(placed: Placement) -> str:
-    """What got worse, the placement, what it brings, what it costs."""
+    """A placement in words: what got worse, the placement, what it brings, what it costs."""
     best, present, count = placed.chosen, placed.present, len(placed.front)
     first = len(placed.worse) + placed.search.nothing_better
     label = "picked" if placed.picked else "recommended"
@@ -101,7 +101,7 @@ def _figures_words(row: PlacementRow) -> str:
 
 
 def _written(written: Written | Refused) -> list[str]:
-    """What became of the transformed program."""
+    """Lines on the transformed program."""
     if isinstance(written, Refused):
         return [f"not rewritten   {written.file}: {written.refused}"]
     zero, apart = written.analysed_at, written.relative_difference
