@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.effects import draft_effect as draft_effect
     from toolpath_stiff.api.effects import effect_template as effect_template
     from toolpath_stiff.api.effects import effects as effects
+    from toolpath_stiff.api.machine_files import MachineFile as MachineFile
+    from toolpath_stiff.api.machine_files import machine_from_linuxcnc as machine_from_linuxcnc
+    from toolpath_stiff.api.machine_files import machine_template as machine_template
+    from toolpath_stiff.api.machine_files import recover_geometry as recover_geometry
     from toolpath_stiff.api.machines import Machine as Machine
-    from toolpath_stiff.api.machines import MachineFile as MachineFile
-    from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
-    from toolpath_stiff.api.machines import machine_template as machine_template
-    from toolpath_stiff.api.machines import recover_geometry as recover_geometry
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
@@ -102,7 +102,8 @@ _PUBLIC = {
     "api.correction": ("plan", "update"),
     "api.diagnosis": ("Measurements", "compare", "diagnose"),
     "api.effects": ("check_effects", "draft_effect", "effect_template", "effects"),
-    "api.machines": ("Machine", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
+    "api.machine_files": ("MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
+    "api.machines": ("Machine",),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.placements": ("PlacementTrial", "place", "rewrite", "try_placement"),
     "api.poses": ("map_stiffness", "pose", "read_poses"),

@@ -22,7 +22,7 @@ from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.confounding import confounding
 from toolpath_stiff.inference.detectable import detectable_sizes
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.fits import Baseline, refine
+from toolpath_stiff.inference.fits import baseline, refine
 from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
 from toolpath_stiff.inference.left_out import held_out, of_readings
 from toolpath_stiff.inference.noise import JOINT_ERROR, noise_models
@@ -123,7 +123,7 @@ def diagnose(
     effects, cannot = testable_effects(main.problem.predictor)
     tested = {family.name for family in main.families}
     cannot |= {effect.name: () for effect in effects if effect.name not in tested}
-    baseline = Baseline.of(main.problem)
+    as_given, refitted = baseline(main.problem)
     # Of every family that the judgement has only on tables, the best once more with the model itself.
     best = {family.name: family.best for family in main.families if family.best is not None}
     fits = main.fits | {name: refine(main.problem, fit) for name, fit in best.items() if name not in main.fits}
@@ -131,11 +131,11 @@ def diagnose(
     likeliest = fits.get(max(main.probability, key=lambda name: main.probability[name], default=NONE), main.base)
     log_model, tip = main.problem.observed - likeliest.residual, data.tip
     verdict, plausible = common_verdict(list(judgements.values()))
-    found = Diagnosis(
+    diagnosis = Diagnosis(
         verdict, list(plausible), judgements, main, data.of_tip, machine, cannot,
-        of_readings(baseline.as_given, tip), of_readings(baseline.refitted, tip),
+        of_readings(as_given, tip), of_readings(refitted, tip),
         {name: of_readings(fit, tip) for name, fit in fits.items()},
-        held_out(baseline.refitted, data.point).of_readings(tip),
+        held_out(refitted, data.point).of_readings(tip),
         {name: left_out.of_readings(tip) for name, left_out in held.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
@@ -144,12 +144,12 @@ def diagnose(
         slips=slips,
         loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
     )  # fmt: skip
-    found = replace(found, portrait=portrait_of(found, progress), alike=alike_of(found))
-    if not plan_next or found.verdict not in ("ambiguous", "described"):
-        return found
+    diagnosis = replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis))
+    if not plan_next or diagnosis.verdict not in ("ambiguous", "described"):
+        return diagnosis
     progress("planning the next measurements")
-    rows, remarks = next_measurements(found, seed=seed)
-    return replace(found, next_measurements=tuple(rows), remarks=tuple(remarks))
+    rows, remarks = next_measurements(diagnosis, seed=seed)
+    return replace(diagnosis, next_measurements=tuple(rows), remarks=tuple(remarks))
 
 
 Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise model; the one that is written out
@@ -214,8 +214,8 @@ def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portra
         problem = Problem.of(Predictor(diagnosis.machine, diagnosis.data, diagnosis.predictor.effect_files), noise)
         base = problem.score_base()
     progress("describing what is missing")
-    found = draw_portrait(problem, base, noise, diagnosis.seed, main.base_gate.worst)
-    return found if found.terms or verdict == "unexplained" else None
+    portrait = draw_portrait(problem, base, noise, diagnosis.seed, main.base_gate.worst)
+    return portrait if portrait.terms or verdict == "unexplained" else None
 
 
 def alike_of(diagnosis: Diagnosis) -> Alike | None:

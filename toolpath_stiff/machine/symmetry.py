@@ -126,9 +126,9 @@ def _candidates() -> Iterator[tuple[str, Pairing, Fit]]:
     """Kinds of symmetry with every way of pairing six struts: two cycles of three, three pairs."""
     for first in combinations(range(1, 6), 2):
         start, *rest = (i for i in range(1, 6) if i not in first)
-        for one in permutations(first):
-            for other in permutations(rest):
-                yield "three-fold", _pairing((0, *one), (start, *other)), _turn_of
+        for second in permutations(first):
+            for third in permutations(rest):
+                yield "three-fold", _pairing((0, *second), (start, *third)), _turn_of
     for a in range(1, 6):
         start, *left = (i for i in range(1, 6) if i != a)
         for b in left:

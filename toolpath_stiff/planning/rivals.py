@@ -12,7 +12,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, error_figures
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
-from toolpath_stiff.inference.fits import Baseline, fit_effects, refine
+from toolpath_stiff.inference.fits import baseline, fit_effects, refine
 from toolpath_stiff.inference.hypotheses import score_family
 from toolpath_stiff.inference.judgement import NONE, Judgement
 from toolpath_stiff.planning.forecasts import Rival
@@ -127,8 +127,8 @@ def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: 
 
 def errors_so_far(problem: Problem, rivals: Sequence[Rival]) -> dict[str, float]:
     """Mean errors on the data so far, %: as given, strut law refitted, then with each rival that is an effect."""
-    baseline = Baseline.of(problem)
-    residuals = {AS_GIVEN: baseline.as_given.residual, LAW_REFITTED: baseline.refitted.residual}
+    as_given, refitted = baseline(problem)
+    residuals = {AS_GIVEN: as_given.residual, LAW_REFITTED: refitted.residual}
     for rival in rivals:
         if rival.effects:
             modelled = problem.predictor.log_stiffness(np.asarray(rival.law), rival.effects)

@@ -221,7 +221,7 @@ class Selection:
         Beside a description each term has the information A - A J (J^T A J + prior)^-1 J^T A leaves of it.
         """
         projected, columns = before.fit.projected, self.dictionary.columns
-        slope = -set_wild_aside(projected.times(residuals), projected).pulls @ columns.T
+        slope = -set_wild_aside(projected.times(residuals), projected)[0] @ columns.T
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
         root = inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
         information = self._squares - ((columns @ (weighted.T @ root)) ** 2).sum(axis=1)

@@ -173,10 +173,10 @@ def compliance_with_effects(
         control = kernel.on_joints_of(model.control, tool_length)
         position, rotation, sure = closed_form.followed_columns(kernel, control, position, rotation)
     if not any(hook in ADDING for active in acting_effects(model) for hook in active.effect.hooks):
-        found, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
-        found[~(sure & good)] = np.nan
-        return found
-    found = np.full(n, np.nan)
+        compliance, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
+        compliance[~(sure & good)] = np.nan
+        return compliance
+    compliance = np.full(n, np.nan)
     extension = 0.0 if np.isnan(tool_length) else tool_length - model.machine.reference_tool_length
     for start in range(0, n, BLOCK):
         rows = slice(start, start + BLOCK)
@@ -194,8 +194,8 @@ def compliance_with_effects(
         )
         some = np.flatnonzero(good & sure[rows])
         path = path if len(some) == len(forces) else path.take(some)
-        found[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
-    return found
+        compliance[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
+    return compliance
 
 
 def _exact(
@@ -315,11 +315,11 @@ def searched_directions(
     if idle is not None:
         tried = np.concatenate([tried, _in_planes(idle)], axis=1)
     tried = tried if across is None else _flattened(tried, across)
-    found = value(tried)
-    best = np.argsort(-found, axis=1, kind="stable")
+    values_of_tried = value(tried)
+    best = np.argsort(-values_of_tried, axis=1, kind="stable")
     best = (_best_of_each_cell(best, tried, forces) if softest else best)[:, :CLIMBS]
     directions = np.take_along_axis(tried, best[..., None], axis=1)
-    reached = np.take_along_axis(found, best, axis=1)
+    reached = np.take_along_axis(values_of_tried, best, axis=1)
     step = np.full(reached.shape, FIRST_STEP)
     while (step > LAST_STEP).any():
         around = _around(directions, step)
@@ -366,10 +366,10 @@ def _around(directions: FloatArray, step: FloatArray) -> FloatArray:
 
 def _in_planes(normal: FloatArray) -> FloatArray:
     """(n, m, 3) unit vectors spread over the planes across unit vectors (n, 6, 3), and where two planes meet."""
-    one, other = np.triu_indices(6, 1)
-    meeting = np.cross(normal[:, one], normal[:, other])
+    first_strut, second_strut = np.triu_indices(6, 1)
+    meeting = np.cross(normal[:, first_strut], normal[:, second_strut])
     length = np.linalg.norm(meeting, axis=-1, keepdims=True)
-    meeting = np.where(length > 1e-6, meeting / np.maximum(length, 1e-6), normal[:, one])
+    meeting = np.where(length > 1e-6, meeting / np.maximum(length, 1e-6), normal[:, first_strut])
     first = _beside(normal)
     angle = np.pi * np.arange(IN_PLANE)[:, None] / IN_PLANE
     circle = first[..., None, :] * np.cos(angle) + np.cross(normal, first)[..., None, :] * np.sin(angle)
