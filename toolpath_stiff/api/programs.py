@@ -141,7 +141,7 @@ def path_options(
     partial: bool,
     require_N_per_mm: float | None,
 ) -> tuple[dict[str, Any], float | None]:
-    """What an analysis is asked, checked and in SI, and the stiffness required; arguments and errors of `analyze`."""
+    """Options of an analysis, checked and in SI, and the stiffness required; arguments and errors of `analyze`."""
     from toolpath_stiff.analysis.loads import parse_load
 
     parse_load(load)
