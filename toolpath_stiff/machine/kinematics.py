@@ -100,7 +100,7 @@ def solve_struts(
     (1, 6, 6)
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
-    joints = platform_joints(machine, tool_length)
+    joints = machine.platform_joints_for(tool_length)
     if rotation is None:
         arms = np.broadcast_to(joints, (len(tip), 6, 3))
     else:
@@ -109,17 +109,6 @@ def solve_struts(
     struts = tip[:, None, :] + arms - machine.frame_joints
     lengths = np.sqrt(np.einsum("nij,nij->ni", struts, struts))
     return Struts(lengths=lengths, directions=struts / lengths[..., None], arms=arms)
-
-
-def platform_joints(machine: Machine, tool_length: ArrayLike = np.nan) -> FloatArray:
-    """(6, 3), or (n, 6, 3) for n tool lengths: platform joints relative to the tip, platform frame, m."""
-    length = np.asarray(tool_length, dtype=float)
-    if length.ndim == 0:
-        return machine.platform_joints_for(float(length))
-    extension = np.where(np.isnan(length), 0.0, length - machine.reference_tool_length)
-    shift = np.zeros((len(length), 1, 3))
-    shift[:, 0, 2] = extension
-    return machine.platform_joints + shift
 
 
 def solve_struts_at(machine: Machine, pose: ArrayLike) -> Struts:

@@ -358,14 +358,14 @@ def _beginnings(
 
 def _headings_passed(way: _Way, heads: list[Heading]) -> dict[int, Sequence[int]]:
     """Move -> headings (rows of `heads`) passed right before it."""
-    at = np.array([head.line for head in heads], dtype=np.int64)
+    lines = np.array([head.line for head in heads], dtype=np.int64)
     seen: dict[int, Sequence[int]] = {}
-    below, odd = np.searchsorted(at, way.line, side="right"), way.turns()
+    below, odd = np.searchsorted(lines, way.line, side="right"), way.turns()
     straight = np.flatnonzero(~odd & (np.diff(below) != 0))
     for move, low, high in zip(straight.tolist(), below[straight].tolist(), below[straight + 1].tolist(), strict=True):
         seen[move] = range(low, high)
     for move in np.flatnonzero(odd).tolist() if heads else ():
-        spans = [np.searchsorted(at, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
+        spans = [np.searchsorted(lines, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
         between = [row for low, high in spans for row in range(low, high)]
         if between:
             seen[move] = between

@@ -30,7 +30,8 @@ from toolpath_stiff.placement.rows import (
     placement_mm_deg,
 )
 from toolpath_stiff.placement.search import search_placements
-from toolpath_stiff.placement.task import LeftOutRapid, Rewriting, SearchedFront, SearchRecord, Task
+from toolpath_stiff.placement.task import Rewriting, SearchedFront, SearchRecord, Task
+from toolpath_stiff.placement.working import Search
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.units import Pose, m_from_mm
 
@@ -70,14 +71,13 @@ def place_program(task: Task, progress: Callable[[int, int], None] | None = None
     """
     task.check()
     path = work_path(task.program, task.step, task.load, task.present, task.read)
-    present = np.array(task.present)
-    front = search_placements(
-        task.model, path, task.load, task.bounds, task.rules, force=task.force, present=present, progress=progress
-    )
+    search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
+    search.report = progress or search.report
+    front = search_placements(search)
     record = SearchRecord(
         **vars(task.fingerprint()),
         recommended=front.best + 1,
-        rapids_left_out=tuple(LeftOutRapid(line, reason) for line, reason in front.rapids_left_out),
+        rapids_left_out=front.rapids_left_out,
         pose_evaluations=front.pose_evaluations,
         searches=front.searches,
         nothing_better=front.alone,

@@ -12,7 +12,7 @@ from typing import Any
 from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 from toolpath_stiff.stiffness.declarations import NAME, wrong_in
-from toolpath_stiff.stiffness.term_effect import ASSUMED, TermEffect, kind_of, size_parameter
+from toolpath_stiff.stiffness.term_effect import ASSUMED, kind_of, size_parameter
 from toolpath_stiff.stiffness.terms import (
     ALONG,
     AXES,
@@ -95,19 +95,18 @@ def effects_of_terms(file: str) -> dict[str, Effect]:
     drawn_from = toml.table("drawn_from", toml.data.get("drawn_from", {}), "[drawn_from] with readings")
     toml.only("drawn_from", drawn_from, ("readings",))
     marks = tuple(_text(toml, "drawn_from.readings", drawn_from.get("readings", "-")).replace("-", " ").split())
-    sized: dict[type[TermEffect], dict[str, tuple[Term, Parameter]]] = {}
-    names: set[str] = set()
-    for number, row in enumerate(rows, 1):
-        term, parameter = _entry(toml, f"effect[{number}]", row)
-        if parameter.name in names:
-            raise toml.error(f"size {parameter.name!r} is there twice", where=f"effect[{number}].size")
-        names.add(parameter.name)
-        sized.setdefault(kind_of(term), {})[parameter.name] = (term, parameter)
+    entries = [_entry(toml, f"effect[{number}]", row) for number, row in enumerate(rows, 1)]
+    names = [parameter.name for _, parameter in entries]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise toml.error(f"size {name!r} is there twice", where=f"effect[{number + 1}].size")
     effects: dict[str, Effect] = {}
-    for kind in sorted(sized, key=lambda kind: kind.ending):
-        terms, parameters = zip(*sized[kind].values(), strict=True)
-        name = common if len(sized) == 1 else f"{common}{kind.ending}"
-        effects[name] = kind(name, dict(zip(sized[kind], terms, strict=True)), parameters, source, marks, file)
+    kinds = sorted({kind_of(term) for term, _ in entries}, key=lambda kind: kind.ending)
+    for kind in kinds:
+        terms, parameters = zip(*(entry for entry in entries if kind_of(entry[0]) is kind), strict=True)
+        name = common if len(kinds) == 1 else f"{common}{kind.ending}"
+        by_size = {parameter.name: term for term, parameter in zip(terms, parameters, strict=True)}
+        effects[name] = kind(name, by_size, parameters, source, marks, file)
     return effects
 
 

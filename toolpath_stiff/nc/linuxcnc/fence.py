@@ -136,8 +136,8 @@ def _confusing(words: str) -> tuple[str, ...]:
     # M codes that it has not; those that it rounds to a user's are the fence's.
     out = {code for code in codes if code[0] == "M" and "." not in code and float(code[1:]) not in KNOWN_M}
     for code in codes & OTHERS_CODES.keys():
-        own = set(OTHERS_CODES[code])
-        if code not in OWN_CODES or (letters & own and letters <= own | set("GMFST")):
+        meant = set(OTHERS_CODES[code])
+        if code not in OWN_CODES or (letters & meant and letters <= meant | set("GMFST")):
             out.add(code)
     taken = {letter for code in out for letter in OTHERS_CODES.get(code, "")}
     if out == codes and any(code[0] == "M" for code in out) and not letters & set("XYZABC"):
