@@ -59,10 +59,7 @@ class Struts:
 
 
 def solve_struts(
-    machine: Machine,
-    position: ArrayLike,
-    rotation: ArrayLike | None = None,
-    tool_length: ArrayLike = np.nan,
+    machine: Machine, position: ArrayLike, rotation: ArrayLike | None = None, tool_length: ArrayLike = np.nan
 ) -> Struts:
     """Lengths, directions and arms of the six struts.
 
