@@ -31,15 +31,8 @@ from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import checked
 from toolpath_stiff.report.analysis.summary import check_table
 from toolpath_stiff.report.batch.index import files, names
-from toolpath_stiff.report.batch.programs import (
-    Found,
-    Listed,
-    Outcome,
-    columns_of,
-    find_programs,
-    report_folders,
-    terminal_summary,
-)
+from toolpath_stiff.report.batch.outcomes import Outcome, columns_of, terminal_summary
+from toolpath_stiff.report.batch.programs import Found, Listed, find_programs, report_folders
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, Result
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
@@ -79,7 +72,7 @@ class ManyAnalyses(Result):
     @property
     def below_required(self) -> list[Outcome]:
         """The programs with a cut below what was required."""
-        return [outcome for outcome in self.outcomes if (outcome.figures or {}).get("lines_below_required")]
+        return [outcome for outcome in self.outcomes if outcome.figure("lines_below_required")]
 
     @cached_property
     def _document(self) -> list[dict[str, Any]]:
