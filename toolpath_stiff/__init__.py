@@ -37,14 +37,13 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.effects import draft_effect as draft_effect
     from toolpath_stiff.api.effects import effect_template as effect_template
     from toolpath_stiff.api.effects import effects as effects
+    from toolpath_stiff.api.machine_files import MachineFile as MachineFile
+    from toolpath_stiff.api.machine_files import machine_from_linuxcnc as machine_from_linuxcnc
+    from toolpath_stiff.api.machine_files import machine_template as machine_template
+    from toolpath_stiff.api.machine_files import recover_geometry as recover_geometry
     from toolpath_stiff.api.machines import Machine as Machine
-    from toolpath_stiff.api.machines import MachineFile as MachineFile
-    from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
-    from toolpath_stiff.api.machines import machine_template as machine_template
-    from toolpath_stiff.api.machines import recover_geometry as recover_geometry
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
-    from toolpath_stiff.api.next_visits import next_visit as next_visit
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
@@ -78,6 +77,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
     from toolpath_stiff.placement.result import Placement as Placement
     from toolpath_stiff.planning.next_visit import NextVisit as NextVisit
+    from toolpath_stiff.planning.next_visit import next_visit as next_visit
     from toolpath_stiff.planning.result import Plan as Plan
     from toolpath_stiff.readings.raw import Reduction as Reduction
     from toolpath_stiff.readings.raw import reduce as reduce
@@ -102,9 +102,9 @@ _PUBLIC = {
     "api.correction": ("plan", "update"),
     "api.diagnosis": ("Measurements", "compare", "diagnose"),
     "api.effects": ("check_effects", "draft_effect", "effect_template", "effects"),
-    "api.machines": ("Machine", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
+    "api.machine_files": ("MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
+    "api.machines": ("Machine",),
     "api.many": ("ManyAnalyses", "analyze_many"),
-    "api.next_visits": ("next_visit",),
     "api.placements": ("PlacementTrial", "place", "rewrite", "try_placement"),
     "api.poses": ("map_stiffness", "pose", "read_poses"),
     "api.programs": ("analyze", "check", "sample_path"),
@@ -122,7 +122,7 @@ _PUBLIC = {
     "placement.case_study": ("CaseStudy",),
     "placement.keep_out": ("KeepOut",),
     "placement.result": ("Placement",),
-    "planning.next_visit": ("NextVisit",),
+    "planning.next_visit": ("NextVisit", "next_visit"),
     "planning.result": ("Plan",),
     "readings.raw": ("Reduction", "reduce"),
     "rewriting.program": ("RewrittenProgram",),

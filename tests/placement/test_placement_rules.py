@@ -23,7 +23,6 @@ from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path import place
 from toolpath_stiff.placement.climb import Climber
-from toolpath_stiff.placement.effort import NO_FLOORS
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.fronts import apart
 from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
@@ -31,6 +30,7 @@ from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.linear_programmes import least_costs
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.search import search_placements
+from toolpath_stiff.placement.working import NO_FLOORS, Search
 from toolpath_stiff.stiffness.model import build_model
 
 ROOT = Path(__file__).parents[2]
@@ -44,7 +44,7 @@ STEP = 8e-3  # m
 
 def searched(program, bounds=README_BOUNDS, present=PRESENT, step=STEP, read=None, **asked):
     path = work_path(program, step, TANGENTIAL, present, read)
-    return search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(**asked), present=np.array(present))
+    return search_placements(Search(MODEL, path, TANGENTIAL, bounds, SearchRules(**asked), present=np.array(present)))
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,9 @@ def test_where_two_rapids_exclude_each_other_the_error_names_what_failed():
     path = work_path(read(PRESENT), STEP, TANGENTIAL, PRESENT, read)
     bounds = Bounds(np.array([-0.2, 0, 0.8, 0, 0, 0]), np.array([0.2, 0, 0.8, 0, 0, 0]))
     with pytest.raises(UnreachableError, match=r"the rapid of line [67] runs [1-9][\d.]* mm deep into the keep-out"):
-        search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=slabs), present=np.array(PRESENT))
+        search_placements(
+            Search(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=slabs), present=np.array(PRESENT))
+        )
 
 
 @pytest.mark.parametrize("margin", [0.01, 0.2])
@@ -319,7 +321,7 @@ def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt
         for first in firsts
     ]
     found = search_placements(
-        MODEL, path, TANGENTIAL, bounds, SearchRules(objective=objective, allow_extrapolation=True)
+        Search(MODEL, path, TANGENTIAL, bounds, SearchRules(objective=objective, allow_extrapolation=True))
     )
     best = max(np.nanmax(value), *polished)
     assert goal.value(found.best_figures)[0] >= best - 2e-3 * abs(best)

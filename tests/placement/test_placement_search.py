@@ -31,6 +31,7 @@ from toolpath_stiff.placement.paths import placed_path, representative_path, wor
 from toolpath_stiff.placement.result import nothing_better_words
 from toolpath_stiff.placement.search import search_placements
 from toolpath_stiff.placement.task import SearchRecord
+from toolpath_stiff.placement.working import Search
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.model import build_model
@@ -108,7 +109,7 @@ def test_no_placement_of_a_grid_is_better(name):
     x, y, z, c = (g.ravel() for g in np.meshgrid(*axes, indexing="ij"))
     grid = np.column_stack([x, y, z, 0 * x, 0 * x, c])
     brute = Evaluator(MODEL, path, TANGENTIAL, 1000.0).figures(grid)
-    found = search_placements(MODEL, path, TANGENTIAL, BOUNDS)
+    found = search_placements(Search(MODEL, path, TANGENTIAL, BOUNDS))
     kept = (brute.margin >= 0.01) & (brute.rapid_margin >= 0.01)
     best = float(np.max((brute.mean - brute.spread)[kept]))
     ours = float(found.best_figures.mean[0] - found.best_figures.spread[0])
@@ -148,7 +149,7 @@ def test_keep_outs_and_heights_are_kept():
     path = representative_path(work_path(program_of("case_study"), 5e-3), 60)
     box = KeepOut("vice", (-300, -300, 0), (0, 300, 2000))
     bounds = Bounds(BOUNDS.low, BOUNDS.high, heights=(0.6, 0.8))
-    found = search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=(box,)))
+    found = search_placements(Search(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=(box,))))
 
     for placement in found.front:
         position = placed_path(path, placement)[0]
@@ -166,7 +167,7 @@ def test_keep_outs_and_heights_are_kept():
 def test_nothing_feasible_says_why(bounds, keepouts, words):
     path = representative_path(work_path(program_of("case_study"), 5e-3), 40)
     with pytest.raises(InputError) as caught:
-        search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=keepouts))
+        search_placements(Search(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=keepouts)))
     assert words in str(caught.value)
 
 
@@ -309,7 +310,7 @@ def test_objectives_agree_on_one_front_and_its_ends_are_the_ends():
     path = wide_path("plunges")
     present = np.array(PRESENT)
     found = [
-        search_placements(MODEL, path, TANGENTIAL, WIDE, SearchRules(objective=name), present=present)
+        search_placements(Search(MODEL, path, TANGENTIAL, WIDE, SearchRules(objective=name), present=present))
         for name in ("balanced", "range")
     ]
     one, other = (result.figures.objectives.max(axis=0) for result in found)
@@ -332,10 +333,10 @@ def test_nothing_better_is_said_first_with_how_hard_it_was_looked_for():
     program = program_of("drilling")
     here = np.array(PRESENT)
     path = work_path(program, 4e-3, TANGENTIAL, PRESENT)
-    best = search_placements(MODEL, path, TANGENTIAL, Bounds(here, here + np.array([0, 0, 0.3, 0, 0, 0])))
+    best = search_placements(Search(MODEL, path, TANGENTIAL, Bounds(here, here + np.array([0, 0, 0.3, 0, 0, 0]))))
     at = best.front[-1]
     close = Bounds(at, at + np.array([0, 0, 1e-9, 0, 0, 0]))
-    found = search_placements(MODEL, path, TANGENTIAL, close, present=at)
+    found = search_placements(Search(MODEL, path, TANGENTIAL, close, present=at))
     assert found.alone and found.searches == 3
     told = nothing_better_words(SearchRecord("", "", {}, 1, (), found.pose_evaluations, found.searches))
     assert f"3 searches from the beginning, {found.pose_evaluations} poses" in told

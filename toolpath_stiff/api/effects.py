@@ -131,17 +131,22 @@ def draft_effect(
     from toolpath_stiff.diagnosis.diagnose import diagnose
     from toolpath_stiff.stiffness.catalogue import known_effects
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    question = Question(machine, data, noise_percent, strut_spread_percent, seed)
     name = effect_name(file, ".toml")
-    if name in known_effects(asked.on.effect_files):
+    if name in known_effects(question.on.effect_files):
         raise InputError(f"effect {name} exists already", hint="give the draft another file name")
     diagnosis = replace(
         diagnose(
-            asked.model, asked.readings, plan_next=False, names=asked.files, progress=teller(progress), **asked.common
+            question.model,
+            question.readings,
+            plan_next=False,
+            names=question.files,
+            progress=teller(progress),
+            **question.common,
         ),
-        line=asked.asked.command("diagnose", *options(seed=seed or None)),
-        asked=asked.asked,
-        inputs=asked.inputs,
+        line=question.asked.command("diagnose", *options(seed=seed or None)),
+        asked=question.asked,
+        inputs=question.inputs,
     )
     return draft(diagnosis, str(file))
 

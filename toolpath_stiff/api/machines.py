@@ -1,18 +1,16 @@
-"""A machine with the effects that act on it, slips in its file, the file itself."""
+"""A machine with the effects that act on it, and slips in its file."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from toolpath_stiff.api.inputs import pose_si
-from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import read_bytes, write_atomically
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.options import Option, checked
-from toolpath_stiff.results import Result, TextFile, TextResult
+from toolpath_stiff.results import Result
 from toolpath_stiff.units import mm_from_m, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
@@ -144,10 +142,10 @@ class Machine(Result):
         """
         files = tuple(map(str, effects))
         model = _checked_model(str(machine), files, allow_unchecked_effects)
-        found = cls(model, str(machine), files, allow_unchecked_effects=allow_unchecked_effects)
-        found = found.under(setup, temperature_C)
-        found.running()
-        return found
+        loaded = cls(model, str(machine), files, allow_unchecked_effects=allow_unchecked_effects)
+        loaded = loaded.under(setup, temperature_C)
+        loaded.running()
+        return loaded
 
     @checked
     def under(self, setup: Setup = None, temperature_C: Temperature = None) -> Machine:
@@ -245,9 +243,9 @@ class Machine(Result):
             setup, said_by = program.controller.setup, str(program.said.get("controller"))
         check_setup(model.conditions.setup or "", f"machine {self.name}, [setup] name", model)
         check_setup(setup or "", said_by, model, *(other.model for other in beside))
-        asked = "" if setup == NO_SETUP else setup
+        chosen = "" if setup == NO_SETUP else setup
         temperature = model.conditions.temperature if self.temperature_C is None else self.temperature_C
-        return replace(model, conditions=Conditions(model.conditions.setup if asked is None else asked, temperature))
+        return replace(model, conditions=Conditions(model.conditions.setup if chosen is None else chosen, temperature))
 
     def like(self, machine: str | Path) -> Machine:
         """Another machine with the same effect files, set-up and temperature.
@@ -468,120 +466,3 @@ def check_machine(machine: Machine | str | Path) -> MachineCheck:
 
     on = machine_from(machine)
     return look(on.running(), on.asked)
-
-
-class MachineFile(TextFile):
-    """The text of a machine file.
-
-    Attributes
-    ----------
-    name, text, notes
-        The machine's name; the file; what was assumed in making it.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> template = tps.machine_template("mill.toml")
-    >>> template.name, template.to_dict()["notes"]
-    ('mill', [])
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = template.save(pathlib.Path(folder, "mill.toml"))
-    ...     tps.Machine.load(file)
-    <Machine mill: 6 struts, no effects>
-    """
-
-    command: ClassVar[str] = "machine"
-
-    def __init__(self, name: str, text: str, notes: Sequence[str] = ()) -> None:
-        super().__init__(name, text)
-        self.notes = list(notes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The text and the notes."""
-        return {"machine": self.name, "text": self.text, "notes": self.notes}
-
-
-def machine_template(file: str | Path = "mine.toml") -> MachineFile:
-    """A commented machine file to edit, named after its file; nothing is written before `save`.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_template("mill.toml").name
-    'mill'
-    """
-    from toolpath_stiff.machine.writer import TEMPLATE_REMARK, toml_text
-
-    target = Path(file)
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")
-    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
-    return MachineFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
-
-
-@checked
-def machine_from_linuxcnc(
-    file: str | Path, units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None
-) -> MachineFile:
-    """The machine of the genhexkins pins in a LinuxCNC HAL file.
-
-    Parameters
-    ----------
-    file
-        The HAL file.
-    units
-        Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, lacks pins, or nobody says the unit.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_linuxcnc("nowhere.hal")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.FileError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
-    """
-    from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
-    from toolpath_stiff.machine.writer import machine_toml
-
-    path = Path(file)
-    text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
-    unit = units or units_of(path)
-    if unit is None:
-        mistake = "the unit of the pins is not known (no ini file beside it that says LINEAR_UNITS)"
-        raise InputError(mistake, hint="give it with --units mm or --units inch", file=str(file))
-    machine, notes = machine_from_hal(text, unit, path.name)
-    heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
-    return MachineFile(machine.name, machine_toml(machine, heading), notes)
-
-
-@checked
-def recover_geometry(
-    *,
-    starts: Annotated[int, Option("--starts", at_least=1, at_most=1000)] = 20,
-    seed: Annotated[int, Option("--seed", at_least=0)] = 1,
-) -> TextResult:
-    """Fit the NIST geometry to the paper's Table 1 anew, from scattered starting points.
-
-    Parameters
-    ----------
-    starts
-        How many starting points.
-    seed
-        Of where they lie.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.recover_geometry(starts=1)
-    >>> found.to_dict()["starts"]
-    1
-    """
-    from toolpath_stiff.correction.geometry import recover_geometry as recover
-    from toolpath_stiff.correction.geometry import recovery_text
-
-    found = recover(starts=starts, seed=seed)
-    return TextResult(recovery_text(found), found, f"the NIST geometry from {starts} starts")

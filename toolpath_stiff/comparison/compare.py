@@ -28,7 +28,7 @@ from toolpath_stiff.files import Content
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.fits import Baseline
+from toolpath_stiff.inference.fits import base_fit
 from toolpath_stiff.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.model import Machine
@@ -233,7 +233,7 @@ def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int,
     refitted = law = None
     problem = Problem(predictor, Scatter.of(noise, spread))
     if len(values) >= FEWEST_TO_REFIT:
-        law = Baseline.of(problem).refitted
+        law = base_fit(problem, law_free=True)
         if np.linalg.cond(residuals.law_columns) < 1.0 / TELLS_LAW:
             refitted = find_structure(values, residuals.patterns, scattering, residuals.law_columns.T, most=0)
     model_free = assess(checks, predictor.data, spread, scattering.draws(0.0))

@@ -7,7 +7,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import ALL
 from toolpath_stiff.comparison.structure import SIGNIFICANT, FoundPattern, Pattern
-from toolpath_stiff.stiffness.contract import about
+from toolpath_stiff.stiffness.sizes import about
 
 NOUGHT = 0.3  # of a course's change: a residual below is nothing beside it
 

@@ -21,8 +21,8 @@ from toolpath_stiff.machine.writer import value_text
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.portrait.words import portrait_text, size_words, term_words
 from toolpath_stiff.readings.measurements import reading_marks
-from toolpath_stiff.stiffness.contract import joined
 from toolpath_stiff.stiffness.effect_file import EffectFile
+from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.stiffness.term_effect import kind_of
 from toolpath_stiff.stiffness.term_file import entry_of
 from toolpath_stiff.stiffness.terms import PINS, Term, formula

@@ -35,7 +35,7 @@ from toolpath_stiff.inference.candidates import Candidate, testable_effects
 from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import Baseline, add_effect, base_fit
+from toolpath_stiff.inference.fits import add_effect, base_fit, baseline
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import score_families, signatures, tables_of
 from toolpath_stiff.inference.left_out import error_falls, gain_in_standard_errors
@@ -101,8 +101,8 @@ def build_ladder(
     worst = max(noise_models(data, noise, strut_spread), key=lambda model: model.typical)
     problem = Problem.of(Predictor(machine, data, effect_files), worst)
     work = _Work(problem, worst, not keep_law, seed, tuple(effect_files), say)
-    baseline = Baseline.of(problem)
-    steps, refitted = [work.step(AS_GIVEN, baseline.as_given)], work.step(LAW_REFITTED, baseline.refitted)
+    as_given, law_refitted = baseline(problem)
+    steps, refitted = [work.step(AS_GIVEN, as_given)], work.step(LAW_REFITTED, law_refitted)
     if not keep_law:
         steps.append(refitted)
     wanted = {addition.effect.name: addition.candidates(data) for addition in additions}

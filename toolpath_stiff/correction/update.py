@@ -26,7 +26,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import Baseline
+from toolpath_stiff.inference.fits import baseline
 from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
@@ -171,7 +171,7 @@ def update_by_mean_error(
     search = minimise_mean_error(predictor, seed)
     worst = max(noise_models(data, noise, strut_spread), key=lambda model: model.typical)
     problem = Problem.of(predictor, worst)
-    baseline, law = Baseline.of(problem), search.law
+    (as_given, law_refitted), law = baseline(problem), search.law
     say("leaving points out, drawing points anew")
     modelled = predictor.log_stiffness(law)
     last = Fit(
@@ -179,8 +179,8 @@ def update_by_mean_error(
         resampled_covariance(predictor, law, seed), problem.scatter,
     )  # fmt: skip
     left_out = HeldOut(leave_points_out(predictor, law), np.zeros((0, 2)), data.point)
-    steps = Step.of(AS_GIVEN, baseline.as_given, data), Step.of("strut law by mean error", last, data, left_out)
-    refitted = Step.of(LAW_REFITTED, baseline.refitted, data)
+    steps = Step.of(AS_GIVEN, as_given, data), Step.of("strut law by mean error", last, data, left_out)
+    refitted = Step.of(LAW_REFITTED, law_refitted, data)
     return Update(
         machine, data, worst, problem, steps, refitted, forced=force, law_asked=True, objective="mean-error",
         question=question(predictor), search=search, seed=seed,

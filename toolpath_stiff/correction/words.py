@@ -8,7 +8,7 @@ import numpy as np
 
 from toolpath_stiff.correction.outcome import FORCED, NOTHING, REFUSED, Outcome
 from toolpath_stiff.inference.errors import LAW_REFITTED, errors_text
-from toolpath_stiff.stiffness.contract import joined
+from toolpath_stiff.stiffness.sizes import joined
 
 NEEDED = 1.0  # standard errors by which the error at left-out points must fall
 

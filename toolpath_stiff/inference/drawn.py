@@ -27,7 +27,8 @@ from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Scatter
 from toolpath_stiff.readings.measurements import Measurements, reading_marks
-from toolpath_stiff.stiffness.contract import Effect, joined
+from toolpath_stiff.stiffness.contract import Effect
+from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import json_number
 
 CONFIRMS = 3.0  # log probability that new readings must gain: odds of 20 to 1, strong evidence (Kass and Raftery 1995)

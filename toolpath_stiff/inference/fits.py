@@ -7,7 +7,7 @@ Everything is dimensionless or scaled: with constants in N/m the gradient would 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -278,22 +278,6 @@ def _without_zeros(fit: Fit) -> Fit:
     )
 
 
-@dataclass(frozen=True)
-class Baseline:
-    """The first two models of every report.
-
-    Attributes
-    ----------
-    as_given
-        The machine file as it stands; nothing is fitted.
-    refitted
-        Its strut law's two stiffnesses refitted, without a further effect.
-    """
-
-    as_given: Fit
-    refitted: Fit
-
-    @classmethod
-    def of(cls, problem: Problem) -> Baseline:
-        """Of data and model under one noise."""
-        return cls(base_fit(problem, law_free=False), base_fit(problem, law_free=True))
+def baseline(problem: Problem) -> tuple[Fit, Fit]:
+    """The first two models of every report: the machine file as it stands, and with its strut law refitted."""
+    return base_fit(problem, law_free=False), base_fit(problem, law_free=True)

@@ -188,7 +188,7 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[fl
     averaged over amplitudes and forms.
     """
     projected = problem.projected(score.jacobian)
-    taken = set_wild_aside(projected.times(score.residual[None]), projected, problem.scatter).taken
+    _, taken = set_wild_aside(projected.times(score.residual[None]), projected, problem.scatter)
     structure = Structure(forms, projected)
     loads = structure.loads(score.residual[None], taken)
     gains = []

@@ -172,7 +172,7 @@ class Predictor:
         """(n, 6) d ln k / d ln(stiffness of strut i) at the machine file's strut law: its share of the compliance."""
         prepared = self._timeless
         softness = 1.0 / self.machine.strut_law.stiffness(prepared.path.struts.lengths)
-        return np.asarray((prepared.products * softness * self._base_stiffness[:, None])[prepared.which])
+        return np.asarray((prepared.products * softness * np.exp(self._base_log)[:, None])[prepared.which])
 
     def struts_carry_all(self, effects: Iterable[Effect]) -> bool:
         """Whether these effects and the machine file's leave geometry, equilibrium and readings as they are."""
@@ -242,13 +242,13 @@ class Predictor:
                     self.base, machine=given.with_changes(**{name: joints}), control=self.base.control or given
                 )
                 stiffness = mechanical_stiffness(moved, measured_path(moved, prepared.data), prepared.data)
-                columns.append((np.log(stiffness) - np.log(self._base_stiffness))[prepared.which] / JOINT_STEP)
+                columns.append((np.log(stiffness) - self._base_log)[prepared.which] / JOINT_STEP)
         return np.stack(columns, axis=1)
 
     @cached_property
-    def _base_stiffness(self) -> FloatArray:
-        """(m,) N/m of the machine file's model at the distinct rows, before instruments."""
-        return self._mechanics(self.base, self._timeless)
+    def _base_log(self) -> FloatArray:
+        """(m,) ln k of the machine file's model at the distinct rows, before instruments."""
+        return np.asarray(np.log(self._mechanics(self.base, self._timeless)))
 
 
 def idle_on(model: StiffnessModel, data: Measurements) -> dict[str, str]:

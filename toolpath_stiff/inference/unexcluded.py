@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import LARGEST, SMALLEST, Candidate, Component, Table
+from toolpath_stiff.inference.candidates import LARGEST, SMALLEST, Candidate, Table
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.inference.minima import bounded_step
@@ -47,22 +47,7 @@ class Unexcluded:
     value: float
     rms: float
     left: float
-    probability: float
-
-
-@dataclass(frozen=True)
-class _Room:
-    """How far one size of a candidate may go beside an explanation; attributes as of `Unexcluded`.
-
-    `mean` is that of the likelihood over the prior of the size, 1 where the readings say nothing.
-    """
-
-    candidate: Candidate
-    component: Component
-    size: float
-    rms: float
-    left: float
-    mean: float
+    probability: float = np.nan
 
 
 def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_odds: float) -> list[Unexcluded]:
@@ -79,21 +64,16 @@ def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_o
     """
     beside = _Beside(problem, fit)
     odds: dict[str, float] = {}
-    widest: dict[str, _Room] = {}
+    widest: dict[str, Unexcluded] = {}
     for family in families:
         if family.name not in fit.names:
             seen = ((table, np.flatnonzero(table.columns.any(axis=0)).tolist()) for table in family.tables)
             rooms = [beside.room(table, j) for table, components in seen for j in components]
-            odds[family.name] = prior_odds * float(np.mean([room.mean for room in rooms]))
-            widest[family.name] = max(rooms, key=lambda room: room.rms)
+            odds[family.name] = prior_odds * float(np.mean([mean for _, mean in rooms]))
+            widest[family.name] = max((room for room, _ in rooms), key=lambda room: room.rms)
     whole = 1.0 + sum(odds.values())
-    unexcluded = [
-        Unexcluded(room.candidate.effect, room.candidate, room.component.parameter, room.component.value(room.size),
-                   room.rms, room.left, odds[name] / whole)
-        for name, room in widest.items()
-        if room.rms >= MATTERS
-    ]  # fmt: skip
-    return sorted(unexcluded, key=lambda hidden: (-hidden.probability, hidden.effect.name))
+    hidden = [replace(room, probability=odds[name] / whole) for name, room in widest.items() if room.rms >= MATTERS]
+    return sorted(hidden, key=lambda room: (-room.probability, room.effect.name))
 
 
 class _Beside:
@@ -112,8 +92,11 @@ class _Beside:
         self.low = np.array([-np.inf] * 2 + [min(component.bounds[0] - size, 0.0) for component, size in free])
         self.high = np.array([np.inf] * 2 + [max(component.bounds[1] - size, 0.0) for component, size in free])
 
-    def room(self, table: Table, j: int) -> _Room:
-        """How far component `j` of a table may go: of both signs the one at which it changes more."""
+    def room(self, table: Table, j: int) -> tuple[Unexcluded, float]:
+        """How far component `j` of a table may go: of both signs the one at which it changes more.
+
+        And the mean of the likelihood over the prior of the size, 1 where the readings say nothing.
+        """
         component = table.candidate.components[j]
         least, squares = self._moved(self.fit.residual[None])
         none, gain, mass = float(squares[0]), 0.0, 0.0
@@ -124,16 +107,17 @@ class _Beside:
             whole = self.problem.base_compliance if table.candidate.effect.is_instrument else self.compliance
             change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
             moves, squares = self._moved(self.fit.residual + change)
-            left = change - (moves - least[0]) @ self.fit.jacobian.T
-            rms, rms_left = (np.sqrt(np.mean(rows[:, self.tip] ** 2, axis=1)) for rows in (change, left))
-            sides.append((sizes, rms, rms_left, squares))
+            rest = change - (moves - least[0]) @ self.fit.jacobian.T
+            changes, lefts = (np.sqrt(np.mean(rows[:, self.tip] ** 2, axis=1)) for rows in (change, rest))
+            sides.append((sizes, changes, lefts, squares))
             # Of the prior, as far as sizes are expected; whether the readings would show them does not matter here.
-            weights = np.exp(log_expected(rms) + log_usual(sizes, component.typical()))
+            weights = np.exp(log_expected(changes) + log_usual(sizes, component.typical()))
             weights *= np.abs(np.gradient(np.log(np.abs(sizes))))
             gain, mass = gain + float(weights @ np.exp(0.5 * (none - squares))), mass + float(weights.sum())
         most = min(none, *(float(squares.min()) for *_, squares in sides)) + LIKELY
-        widest = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
-        return _Room(table.candidate, component, *widest, gain / mass)
+        size, rms, left = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
+        candidate, value = table.candidate, component.value(size)
+        return Unexcluded(candidate.effect, candidate, component.parameter, value, rms, left), gain / mass
 
     def _sizes(self, table: Table, j: int) -> Iterator[FloatArray]:
         """Sizes (g,) of each sign, rising."""

@@ -67,17 +67,17 @@ def _all_limits(machine: Machine) -> list[Limit]:
     limits = machine.limits
     low, high = limits.strut_length
     span = high - low if np.isfinite(high) else max(low, 1.0)
-    found: list[Limit] = []
+    bounds: list[Limit] = []
     for i in range(1, 7):
-        found.append(Limit(f"strut{i} min length", STRUT, low, True, span, "mm"))
-        found.append(Limit(f"strut{i} max length", STRUT, high, False, span, "mm"))
+        bounds.append(Limit(f"strut{i} min length", STRUT, low, True, span, "mm"))
+        bounds.append(Limit(f"strut{i} max length", STRUT, high, False, span, "mm"))
     for quantity, angle in ((FRAME, limits.frame_joint_angle), (PLATFORM, limits.platform_joint_angle)):
-        found += [Limit(f"{quantity} joint{i} angle", quantity, angle, False, angle, "deg") for i in range(1, 7)]
+        bounds += [Limit(f"{quantity} joint{i} angle", quantity, angle, False, angle, "deg") for i in range(1, 7)]
     for axis, lo, hi in zip(AXES, *limits.workspace.tolist(), strict=True):
         both = hi - lo if np.isfinite(hi - lo) else 1.0
-        found.append(Limit(f"workspace {axis} min", axis, lo, True, both, "mm"))
-        found.append(Limit(f"workspace {axis} max", axis, hi, False, both, "mm"))
-    return [*found, Limit("singularity", SINGULARITY, limits.singularity, True, 1.0 - limits.singularity, "")]
+        bounds.append(Limit(f"workspace {axis} min", axis, lo, True, both, "mm"))
+        bounds.append(Limit(f"workspace {axis} max", axis, hi, False, both, "mm"))
+    return [*bounds, Limit("singularity", SINGULARITY, limits.singularity, True, 1.0 - limits.singularity, "")]
 
 
 @dataclass(frozen=True)
@@ -209,8 +209,7 @@ class Extremes:
     determinant: FloatArray
     rotation: FloatArray | None
     tool: float
-    cosines: dict[str, FloatArray] = field(default_factory=dict)
-    angles: dict[str, FloatArray] = field(default_factory=dict)
+    joints: dict[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     @cached_property
     def kinds(self) -> list[tuple[Limit, IntArray]]:
@@ -279,38 +278,28 @@ class Extremes:
         if limit.quantity == STRUT:
             return self.shortest if limit.lower else self.longest
         if limit.quantity in (FRAME, PLATFORM):
-            return self._angle(limit.quantity)
+            return self._joints(limit.quantity)[1]
         if limit.quantity == SINGULARITY:
             return self.singularity
         return np.asarray(self.position[AXES.index(limit.quantity)])
 
     def _strut(self, limit: Limit, rows: IntArray) -> IntArray:
         """(k,) the strut or joint that has the extreme value, of some poses; the first of several."""
-        values = self.lengths if limit.quantity == STRUT else self._cosine(limit.quantity)
+        values = self.lengths if limit.quantity == STRUT else self._joints(limit.quantity)[0]
         some = np.ascontiguousarray(values[:, rows].T)
         lowest = limit.lower or limit.quantity != STRUT  # the smallest cosine is the largest angle
         return np.asarray(some.argmin(axis=1) if lowest else some.argmax(axis=1))
 
-    def _angle(self, quantity: str) -> FloatArray:
-        """(n,) rad, the largest angle of the frame's or the platform's joints."""
-        name = self._name(quantity)
-        if name not in self.angles:
-            smallest = self._cosine(quantity).min(axis=0)
-            self.angles[name] = np.arccos(np.clip(smallest, -1.0, 1.0, out=smallest), out=smallest)
-        return self.angles[name]
-
-    def _name(self, quantity: str) -> str:
-        """The joints whose angles are those of a quantity's."""
+    def _joints(self, quantity: str) -> tuple[FloatArray, FloatArray]:
+        """(6, n) cosines of the angles of the frame's or the platform's joints, and (n,) rad, the largest angle."""
         frame, platform = neutral_axes(self.machine)
-        return FRAME if self.rotation is None and bool((frame == platform).all()) else quantity
-
-    def _cosine(self, quantity: str) -> FloatArray:
-        """(6, n) cosines of the angles of the frame's or the platform's joints."""
-        name = self._name(quantity)
-        if name not in self.cosines:
-            along = self._along_axes(neutral_axes(self.machine)[name == PLATFORM], name == PLATFORM)
-            self.cosines[name] = np.divide(along, self.lengths, out=along)
-        return self.cosines[name]
+        name = FRAME if self.rotation is None and bool((frame == platform).all()) else quantity
+        if name not in self.joints:
+            along = self._along_axes(platform if name == PLATFORM else frame, name == PLATFORM)
+            cosines = np.divide(along, self.lengths, out=along)
+            smallest = cosines.min(axis=0)
+            self.joints[name] = cosines, np.arccos(np.clip(smallest, -1.0, 1.0, out=smallest), out=smallest)
+        return self.joints[name]
 
     def _along_axes(self, axes: FloatArray, of_platform: bool) -> FloatArray:
         """(6, n) m, components of the struts R p + tip - b along the joints' neutral axes."""

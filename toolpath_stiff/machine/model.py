@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
@@ -152,15 +153,15 @@ class StrutLaw:
         return np.asarray(self.room(length) < 0.0)
 
 
-def _piecewise(at: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
+def _piecewise(position: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
     """Linear between values (p,) at rising knots (p,), at positions of any shape; the end pieces go on outside."""
-    i = _segment(at, knots)
+    i = _segment(position, knots)
     slope = (values[1:] - values[:-1]) / (knots[1:] - knots[:-1])
-    return np.asarray(values[i] + slope[i] * (at - knots[i]))
+    return np.asarray(values[i] + slope[i] * (position - knots[i]))
 
 
-def _segment(at: FloatArray, knots: FloatArray) -> IntArray:
-    return np.asarray(np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2))
+def _segment(position: FloatArray, knots: FloatArray) -> IntArray:
+    return np.asarray(np.clip(np.searchsorted(knots, position, side="right") - 1, 0, len(knots) - 2))
 
 
 @dataclass(frozen=True)
@@ -276,15 +277,16 @@ class Machine:
         derived: Derived = known[key]
         return derived
 
-    def platform_joints_for(self, tool_length: float) -> FloatArray:
-        """(6, 3) m, platform joints relative to the tip of a tool of that length; nan: the reference tool.
+    def platform_joints_for(self, tool_length: ArrayLike) -> FloatArray:
+        """(6, 3) m, or (n, 6, 3) for n lengths: platform joints relative to the tip of such a tool, nan: of reference.
 
         A longer tool puts the joints further above the tip, along the spindle axis.
         """
-        if np.isnan(tool_length):
+        length = np.asarray(tool_length, dtype=float)
+        if length.ndim == 0 and np.isnan(length):
             return self.platform_joints
-        shift = np.array([0.0, 0.0, tool_length - self.reference_tool_length])
-        return np.asarray(self.platform_joints + shift)
+        extension = np.where(np.isnan(length), 0.0, length - self.reference_tool_length)
+        return np.asarray(self.platform_joints + extension[..., None, None] * np.array([0.0, 0.0, 1.0]))
 
     def with_changes(self, **changes: Any) -> Machine:
         """A copy with some attributes replaced."""

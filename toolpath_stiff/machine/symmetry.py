@@ -126,9 +126,9 @@ def _candidates() -> Iterator[tuple[str, Pairing, Fit]]:
     """Kinds of symmetry with every way of pairing six struts: two cycles of three, three pairs."""
     for first in combinations(range(1, 6), 2):
         start, *rest = (i for i in range(1, 6) if i not in first)
-        for one in permutations(first):
-            for other in permutations(rest):
-                yield "three-fold", _pairing((0, *one), (start, *other)), _turn_of
+        for second in permutations(first):
+            for third in permutations(rest):
+                yield "three-fold", _pairing((0, *second), (start, *third)), _turn_of
     for a in range(1, 6):
         start, *left = (i for i in range(1, 6) if i != a)
         for b in left:
@@ -195,8 +195,5 @@ def describe_stray(stray: Stray, kind: str) -> str:
         f"{stray.body} joint {stray.joint + 1} stands at {shown(stray.given)} mm; the {kind} symmetry of the others "
         f"puts it at {shown(stray.expected)} mm, {mm_from_m(stray.distance):.1f} mm away"
     )
-    if stray.slip:
-        text += f" ({stray.slip})"
-    if stray.instead_of is not None:
-        text += f"; or joint {stray.instead_of + 1} is the wrong one of the two"
-    return text
+    text += f" ({stray.slip})" if stray.slip else ""
+    return text + ("" if stray.instead_of is None else f"; or joint {stray.instead_of + 1} is the wrong one of the two")

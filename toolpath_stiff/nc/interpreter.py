@@ -20,12 +20,12 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import Code, code_name
 from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
-from toolpath_stiff.nc.codes.groups import LAST_MODE
 from toolpath_stiff.nc.codes.motion import homes_standing
 from toolpath_stiff.nc.codes.offsets import HOLDS_TIP, list_numbers
 from toolpath_stiff.nc.codes.points import read_numbers
 from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_parameters
 from toolpath_stiff.nc.codes.saved import leave_level
+from toolpath_stiff.nc.groups import LAST_MODE
 from toolpath_stiff.nc.moves import Jump
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, State, Then

@@ -75,8 +75,8 @@ def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = Non
     for index in places:
         language = language_of(lines[index])
         if language is not None:
-            found = f"{lines[index].strip()[:40]!r} is {language}, which is not read"
-            return Place(name, index + 1).fail(found, "G code", HINTS[language])
+            problem = f"{lines[index].strip()[:40]!r} is {language}, which is not read"
+            return Place(name, index + 1).fail(problem, "G code", HINTS[language])
     return None
 
 

@@ -8,8 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.units import (
     Pose,
     deg_from_rad,
@@ -20,15 +24,6 @@ from toolpath_stiff.units import (
     rad_from_deg,
     rad_per_s_from_deg_per_min,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    FloatArray = NDArray[np.float64]
-    IntArray = NDArray[np.int64]
-    BoolArray = NDArray[np.bool_]
-
 
 RAPID, FEED, ARC, CYCLE = 0, 1, 2, 3
 CUTTER_LOCATION = "cutter-location file"
@@ -109,8 +104,6 @@ class Moves:
 
 def move_columns(moves: Moves) -> dict[str, NDArray[Any]]:
     """Column -> values of a table of moves in the shop's units; arcs have their signed angle, else it is 0."""
-    import numpy as np
-
     columns: dict[str, NDArray[Any]] = {
         "line": moves.line,
         "motion": np.array(MOTION_NAMES)[moves.motion],
@@ -245,8 +238,6 @@ class Arcs:
     @staticmethod
     def of(arcs: Mapping[int, Arc]) -> Arcs:
         """Of arcs by their rows."""
-        import numpy as np
-
         columns = (
             zip(*((arc.center, arc.normal, arc.sweep) for arc in arcs.values()), strict=True) if arcs else ((),) * 3
         )
@@ -379,8 +370,6 @@ class Recorder:
 
     def _close(self) -> MovesInMm:
         """The lists as a part; they are empty afterwards."""
-        import numpy as np
-
         arcs, n = {row: arc for row, arc in enumerate(self.arc) if arc is not None}, len(self.line)
         arrays = {name: np.array(getattr(self, name), kind).reshape(n, *wide) for name, (kind, wide) in COLUMNS.items()}
         for column in self._lists.values():
@@ -390,8 +379,6 @@ class Recorder:
 
 def _joined(parts: list[MovesInMm]) -> Moves:
     """All parts, the last one first, in SI; each is let go once it is copied, so that no move is held twice."""
-    import numpy as np
-
     n, first = sum(len(part) for part in parts), 0
     # Pages of zeros that nobody writes to take no memory.
     zeros: dict[str, NDArray[Any]] = {name: np.zeros((n, *wide), kind) for name, (kind, wide) in COLUMNS.items()}
@@ -405,16 +392,12 @@ def _joined(parts: list[MovesInMm]) -> Moves:
 
 def held_once(column: NDArray[Any]) -> NDArray[Any]:
     """A column (n,); of one value, nan counts as one, a read-only view of that: most programs have one tool."""
-    import numpy as np
-
     alike = len(column) > 0 and np.array_equal(column, np.broadcast_to(column[0], column.shape), equal_nan=True)
     return np.broadcast_to(column[0], column.shape) if alike else column
 
 
 def _copy(part: MovesInMm, into: Moves) -> None:
     """Copy a part into rows of moves, to SI."""
-    import numpy as np
-
     for mm, si in ((part.start, into.start), (part.end, into.end)):
         si[:, :3] = m_from_mm(mm[:, :3])
         si[:, 3:] = rad_from_deg(mm[:, 3:])

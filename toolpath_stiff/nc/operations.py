@@ -16,7 +16,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -75,18 +74,17 @@ def headings(lines: Sequence[str]) -> list[Heading]:
     >>> [(heading.line, heading.name) for heading in headings(("G21", "(FACE)", "G1 X1"))]
     [(2, 'FACE')]
     """
-    comments = []  # number and text of lines that hold comments alone
+    blocks: list[tuple[int, list[str]]] = []  # the first line of each, and its comments
+    last = -1
     for number, text in enumerate(lines, 1):
         if ("(" in text or ";" in text) and BEGINS.match(text):
             code, comment = split_comments(text)
             if NO_WORDS.fullmatch(code):
-                comments.append((number, comment))
-    # Successive lines are as far ahead of their place in this list.
-    blocks = groupby(enumerate(comments), lambda item: item[1][0] - item[0])
-    named = []
-    for _, block in blocks:
-        numbers, texts = zip(*(comment for _, comment in block), strict=True)
-        named.append(heading_of(texts, numbers[0]))
+                if number != last + 1:
+                    blocks.append((number, []))
+                blocks[-1][1].append(comment)
+                last = number
+    named = (heading_of(comments, first) for first, comments in blocks)
     return [heading for heading in named if heading is not None]
 
 
@@ -358,14 +356,14 @@ def _beginnings(
 
 def _headings_passed(way: _Way, heads: list[Heading]) -> dict[int, Sequence[int]]:
     """Move -> headings (rows of `heads`) passed right before it."""
-    at = np.array([head.line for head in heads], dtype=np.int64)
+    lines = np.array([head.line for head in heads], dtype=np.int64)
     seen: dict[int, Sequence[int]] = {}
-    below, odd = np.searchsorted(at, way.line, side="right"), way.turns()
+    below, odd = np.searchsorted(lines, way.line, side="right"), way.turns()
     straight = np.flatnonzero(~odd & (np.diff(below) != 0))
     for move, low, high in zip(straight.tolist(), below[straight].tolist(), below[straight + 1].tolist(), strict=True):
         seen[move] = range(low, high)
     for move in np.flatnonzero(odd).tolist() if heads else ():
-        spans = [np.searchsorted(at, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
+        spans = [np.searchsorted(lines, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
         between = [row for low, high in spans for row in range(low, high)]
         if between:
             seen[move] = between

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import options
-from toolpath_stiff.nc.moves import ReadProgram, move_columns
-from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.nc.words import read_lines, split_lines
 from toolpath_stiff.options import Option, arguments_of, checked, switches
 from toolpath_stiff.units import Pose
@@ -20,6 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from toolpath_stiff.nc.controller import Controller
+    from toolpath_stiff.nc.moves import ReadProgram
 
 
 class Reading(TypedDict, total=False):
@@ -154,6 +153,7 @@ class Program:
     def _of(cls, name: str, file: str | None, text: str | None, reading: Mapping[str, Any]) -> Program:
         """What the options of reading mean, tables included."""
         from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
+        from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 
         given = {option: reading.get(option) for option in Reading.__annotations__}
         said = {option.removesuffix("_mm_per_min"): value for option, value in given.items() if value}
@@ -246,6 +246,8 @@ class Program:
         [[2, 'rapid'], [3, 'feed'], [4, 'feed']]
         """
         import pandas as pd
+
+        from toolpath_stiff.nc.moves import move_columns
 
         return pd.DataFrame(move_columns(self.moves().moves))
 

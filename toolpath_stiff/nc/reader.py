@@ -110,8 +110,8 @@ def read(request: Request) -> ReadProgram:
     native = request.interpreter == "linuxcnc"
     if looks_like_cutter_location(lines, name):
         if native:
-            found = "LinuxCNC's interpreter reads no cutter-location files"
-            raise ProgramError(found, expected="--interpreter builtin", file=name)
+            problem = "LinuxCNC's interpreter reads no cutter-location files"
+            raise ProgramError(problem, expected="--interpreter builtin", file=name)
         return _with_feed(cutter_location.read(request), request)
     refused = foreign_program(lines, name) if native else refused_program(lines, name, request.controller.dialect)
     if refused is not None:

@@ -11,9 +11,9 @@ from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.codes.groups import Group
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
+from toolpath_stiff.nc.groups import Group
 from toolpath_stiff.nc.moves import Arc, Recorder, ToolUse, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES, POLAR, Block, Word

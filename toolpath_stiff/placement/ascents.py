@@ -8,10 +8,10 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.placement.climb import Climber
-from toolpath_stiff.placement.effort import ENDS, Effort
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.goals import Goal
 from toolpath_stiff.placement.paths import with_rows
+from toolpath_stiff.placement.working import ENDS, Search
 
 # Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
 STARTS, FLOORED_STARTS, FINALISTS = (4, 3, 12, 3), 2, 3  # of each objective; the range has most hills
@@ -25,7 +25,7 @@ EXCHANGES = 4  # at most, until the samples that stand for the path miss nothing
 MISSED = 1e-3  # of the mean: a figure that they put so much too high is missed
 
 
-def climbed(search: Effort, candidates: FloatArray, figures: PlacementFigures) -> FloatArray:
+def climbed(search: Search, candidates: FloatArray, figures: PlacementFigures) -> FloatArray:
     """The ends of the front and what each objective recommends, climbed to from candidates with figures on few samples.
 
     Whichever objective is asked for, all are climbed to: no answer may be beaten by the end of another one's front.
@@ -42,15 +42,15 @@ def climbed(search: Effort, candidates: FloatArray, figures: PlacementFigures) -
     return np.vstack(ends)
 
 
-def _falls(search: Effort, placements: FloatArray, floors: FloatArray) -> bool:
-    """Whether each of some placements is worse in something than the floors."""
+def _falls(search: Search, placements: FloatArray, floors: FloatArray) -> bool:
+    """True where each of some placements is worse in something than the floors."""
     return bool((Goal(ENDS[0].weights, floors).worsening(search.whole.figures(placements)) > 0.0).all())
 
 
 def _climbed_to(
-    search: Effort, candidates: FloatArray, figures: PlacementFigures, goals: Sequence[Goal], starts: Sequence[int]
+    search: Search, candidates: FloatArray, figures: PlacementFigures, goals: Sequence[Goal], starts: Sequence[int]
 ) -> list[FloatArray]:
-    """Where climbs from the best candidates to each goal end: many on few samples, few on more, one on the whole path.
+    """Ends of climbs from the best candidates to each goal: many on few samples, few on more, one on the whole path.
 
     `figures` are those of the candidates on few samples. There are several hills, and a slope that few samples show is
     not always the whole path's. All climb together, each to its own goal.
@@ -81,8 +81,8 @@ def _climbed_to(
     return [np.vstack(pair) for pair in zip(tops, _finished(search, best, goals), strict=True)]
 
 
-def _exchanged(search: Effort, tops: list[FloatArray], goals: Sequence[Goal]) -> list[FloatArray]:
-    """Where climbs on more samples end, to which what decides at their ends is added until they miss nothing there."""
+def _exchanged(search: Search, tops: list[FloatArray], goals: Sequence[Goal]) -> list[FloatArray]:
+    """Ends of climbs on more samples, to which what decides at these ends is added until they miss nothing there."""
     for _ in range(EXCHANGES):
         search.heed(np.vstack([placements[:1] for placements in tops]))
         climber = search.climber("middle")
@@ -96,13 +96,13 @@ def _exchanged(search: Effort, tops: list[FloatArray], goals: Sequence[Goal]) ->
 
 
 def _together(climber: Climber, first: list[FloatArray], goals: Sequence[Goal], steps: int) -> list[FloatArray]:
-    """Where climbs from placements (k, 6) to each goal end."""
+    """Ends of climbs from placements (k, 6) to each goal."""
     each = [goal for goal, placements in zip(goals, first, strict=True) for _ in placements]
     ends = climber.climb(np.vstack(first), each, steps)
     return np.split(ends, np.cumsum([len(placements) for placements in first])[:-1])
 
 
-def _finished(search: Effort, best: list[FloatArray], goals: Sequence[Goal]) -> list[FloatArray]:
+def _finished(search: Search, best: list[FloatArray], goals: Sequence[Goal]) -> list[FloatArray]:
     """For each goal (k, 6) the end of a climb on the whole path, from a placement (6,) near its top.
 
     A long path is climbed on samples that stand for it, to which those are added that decide on it there: the extremes

@@ -30,7 +30,8 @@ from toolpath_stiff.placement.rows import (
     placement_mm_deg,
 )
 from toolpath_stiff.placement.search import search_placements
-from toolpath_stiff.placement.task import LeftOutRapid, Rewriting, SearchedFront, SearchRecord, Task
+from toolpath_stiff.placement.task import Rewriting, SearchedFront, SearchRecord, Task
+from toolpath_stiff.placement.working import Search
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.units import Pose, m_from_mm
 
@@ -70,21 +71,20 @@ def place_program(task: Task, progress: Callable[[int, int], None] | None = None
     """
     task.check()
     path = work_path(task.program, task.step, task.load, task.present, task.read)
-    present = np.array(task.present)
-    found = search_placements(
-        task.model, path, task.load, task.bounds, task.rules, force=task.force, present=present, progress=progress
-    )
+    search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
+    search.report = progress or search.report
+    front = search_placements(search)
     record = SearchRecord(
         **vars(task.fingerprint()),
-        recommended=found.best + 1,
-        rapids_left_out=tuple(LeftOutRapid(line, reason) for line, reason in found.rapids_left_out),
-        pose_evaluations=found.pose_evaluations,
-        searches=found.searches,
-        nothing_better=found.alone,
+        recommended=front.best + 1,
+        rapids_left_out=front.rapids_left_out,
+        pose_evaluations=front.pose_evaluations,
+        searches=front.searches,
+        nothing_better=front.alone,
     )
-    assert found.present is not None
-    rows = numbered_rows(task.model, path, task.load, found, task.force)
-    return _placed(task, rows, record, found.best + 1, found.present)
+    assert front.present is not None
+    rows = numbered_rows(task.model, path, task.load, front, task.force)
+    return _placed(task, rows, record, front.best + 1, front.present)
 
 
 def place_again(task: Task, earlier: SearchedFront, number: int) -> Placement:

@@ -7,23 +7,18 @@ and the recommendation on the whole path. Every figure that is returned was comp
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.placement.ascents import climbed
-from toolpath_stiff.placement.effort import ENDS, NO_FLOORS, Effort
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.fronts import front_rows, thin
-from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
-from toolpath_stiff.placement.paths import WorkPath
-from toolpath_stiff.placement.unreachable import LeftOut, infeasible, let_go
-from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.placement.goals import Goal, Rules
+from toolpath_stiff.placement.unreachable import LeftOutRapid, infeasible, let_go
+from toolpath_stiff.placement.working import ENDS, NO_FLOORS, Search
 
 SCOUTS = 250  # placements tried at random before the evolution, for each that is free of x, y, z, A, B, C
 LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 12, 60, 120  # after each leg the few samples hear of what they missed
@@ -36,7 +31,7 @@ SAME = 1e-7  # of the mean: figures that differ by less count as equal; the orde
 
 @dataclass(frozen=True)
 class PlacementResult:
-    """What a search found. SI.
+    """A front of placements and the recommended one. SI.
 
     Attributes
     ----------
@@ -51,7 +46,7 @@ class PlacementResult:
     rules
         What every placement of the front keeps.
     rapids_left_out
-        (line, what it breaks) of rapids that no placement within the bounds keeps within reach.
+        Rapids that no placement within the bounds keeps within reach.
     pose_evaluations
         Poses that the search evaluated.
     searches
@@ -65,7 +60,7 @@ class PlacementResult:
     best: int
     present: PlacementFigures | None
     rules: Rules
-    rapids_left_out: tuple[tuple[int, str], ...] = ()
+    rapids_left_out: tuple[LeftOutRapid, ...] = ()
     pose_evaluations: int = 0
     searches: int = 1
     alone: bool = False
@@ -76,63 +71,34 @@ class PlacementResult:
         return self.figures.take(slice(self.best, self.best + 1))
 
 
-def search_placements(
-    model: StiffnessModel,
-    path: WorkPath,
-    load: Load,
-    bounds: Bounds,
-    wanted: SearchRules | None = None,
-    *,
-    force: float = defaults.FORCE,
-    present: FloatArray | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> PlacementResult:
+def search_placements(search: Search) -> PlacementResult:
     """Search for placements of a path.
-
-    Parameters
-    ----------
-    model, path, load, force
-        The machine, the path in the set-up frame, the load.
-    bounds
-        What may vary.
-    wanted
-        What a placement must keep and is to be good at.
-    present
-        (6,) where program zero sits now: what the recommendation must not be worse than.
-    progress
-        Called with (stages done, stages in all).
 
     Raises
     ------
     UnreachableError
         No placement keeps the rules; says which one binds at the least bad placement, at which line, by how much.
     """
-    wanted = wanted or SearchRules()
-    if wanted.objective not in defaults.OBJECTIVES:
-        raise InputError(f"objective {wanted.objective!r}", expected=f"one of {', '.join(defaults.OBJECTIVES)}")
-    report = progress or (lambda done, total: None)
-    search = Effort(model, path, load, force, bounds, wanted, report, present)
-    start = present[None] if present is not None and bounds.holds(present) else np.zeros((0, 6))
-    rapids_left_out: LeftOut = ()
+    now, start = search.now, search.start
+    rapids_left_out: tuple[LeftOutRapid, ...] = ()
     for searches in range(1, SEARCHES + 1):
-        candidates, left_out = _candidates(search, start, np.random.default_rng(wanted.seed + searches - 1))
+        candidates, left_out = _candidates(search, np.random.default_rng(search.wanted.seed + searches - 1))
         rapids_left_out += left_out
         result = _result(search, candidates, rapids_left_out)
-        gain = result.figures.objectives - (
-            NO_FLOORS if search.now is None or not len(start) else search.now.objectives
-        )
-        alone = bool(len(bounds.free) and len(gain) == 1 and (np.abs(gain) <= SAME * result.figures.mean[0]).all())
+        gain = result.figures.objectives - (now.objectives if now is not None and len(start) else NO_FLOORS)
+        same = len(gain) == 1 and (np.abs(gain) <= SAME * result.figures.mean[0]).all()
+        alone = bool(len(search.bounds.free) and same)
         if not alone or searches == SEARCHES:
             break
-    report(4, 4)
+    search.report(4, 4)
     return replace(result, searches=searches, alone=alone)
 
 
-def _candidates(search: Effort, start: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, LeftOut]:
+def _candidates(search: Search, rng: np.random.Generator) -> tuple[FloatArray, tuple[LeftOutRapid, ...]]:
     """Candidates for the front (k, 6), the present placement first where it may be one; rapids that were left out."""
     bounds = search.bounds
     unit = rng.uniform(size=(max(SCOUTS * len(bounds.free), 1), len(bounds.free)))
-    scouts = np.vstack([start, bounds.placements(unit)])
+    scouts = np.vstack([search.start, bounds.placements(unit)])
     known, rapids_left_out = let_go(search, scouts)
     search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, known))
     search.report(1, 4)
@@ -145,10 +111,10 @@ def _candidates(search: Effort, start: FloatArray, rng: np.random.Generator) -> 
         figures = search.evaluators["middle"].figures(archive)
         rows = front_rows(figures, search.rules_for("middle").violation(figures) == 0.0)
         archive = archive[thin(figures.take(rows).objectives, rows, most) if len(rows) else slice(0, most)]
-    return np.vstack([start, archive, ends]), rapids_left_out
+    return np.vstack([search.start, archive, ends]), rapids_left_out
 
 
-def _result(search: Effort, candidates: FloatArray, rapids_left_out: LeftOut) -> PlacementResult:
+def _result(search: Search, candidates: FloatArray, rapids_left_out: tuple[LeftOutRapid, ...]) -> PlacementResult:
     """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
     candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]  # of equals the first stands
     figures = search.whole.figures(candidates)
@@ -171,7 +137,7 @@ def _result(search: Effort, candidates: FloatArray, rapids_left_out: LeftOut) ->
     )
 
 
-def _extrapolation_allowed(search: Effort, scouts: FloatArray, few: PlacementFigures) -> float:
+def _extrapolation_allowed(search: Search, scouts: FloatArray, few: PlacementFigures) -> float:
     """Largest share of samples outside the strut law: as now; where that is out of reach, the least that was found.
 
     `few` are the figures of the scouts on few samples.
@@ -189,7 +155,7 @@ def _extrapolation_allowed(search: Effort, scouts: FloatArray, few: PlacementFig
 
 
 def _evolved(
-    search: Effort, scouts: FloatArray, known: PlacementFigures, rng: np.random.Generator
+    search: Search, scouts: FloatArray, known: PlacementFigures, rng: np.random.Generator
 ) -> tuple[FloatArray, PlacementFigures]:
     """An archive of placements that nothing dominates, from the scouts on, with their figures on few samples.
 
@@ -204,19 +170,19 @@ def _evolved(
         if generation % GENERATIONS == 0:
             search.heed(np.vstack([archive[search.ranked(goal, figures)[:1]] for goal in ENDS]))
             archive, figures = _survivors(search, archive, search.few.figures(archive))
-        parents, one, other = (bounds.unit(archive[rng.integers(len(archive), size=CHILDREN)]) for _ in range(3))
+        parents, first, second = (bounds.unit(archive[rng.integers(len(archive), size=CHILDREN)]) for _ in range(3))
         step = spread * rng.normal(size=parents.shape) * (rng.uniform(size=parents.shape) < 0.7)
         along = np.where(rng.uniform(size=(CHILDREN, 1)) < 0.5, 0.5, 0.0)
-        children = bounds.placements(parents + step + along * (one - other))
+        children = bounds.placements(parents + step + along * (first - second))
         met = PlacementFigures.joined([figures, search.few.figures(children)])
         archive, figures = _survivors(search, np.vstack([archive, children]), met)
     return archive, figures
 
 
 def _survivors(
-    search: Effort, placements: FloatArray, figures: PlacementFigures
+    search: Search, placements: FloatArray, figures: PlacementFigures
 ) -> tuple[FloatArray, PlacementFigures]:
-    """What nothing dominates, thinned; where too little keeps the rules, the nearest to keeping them as well."""
+    """Placements that none dominates, thinned; where too few keep the rules, the nearest to keeping them as well."""
     violation = search.rules_for("few").violation(figures)
     rows = front_rows(figures, violation == 0.0)
     rows = thin(figures.take(rows).objectives, rows, ARCHIVE) if len(rows) else rows
@@ -226,11 +192,11 @@ def _survivors(
     return placements[rows], figures.take(rows)
 
 
-def _recommended(search: Effort, figures: PlacementFigures) -> int:
+def _recommended(search: Search, figures: PlacementFigures) -> int:
     """Row of the recommendation: the best of those that are no worse in anything, else the least worse."""
     goal, now = Goal(defaults.OBJECTIVES[search.wanted.objective], NO_FLOORS), search.now
     possible = np.flatnonzero(search.kept(figures))
-    if now is not None and now.margin[0] >= 0.0:
+    if now is not None and search.present is not None:
         fall = (now.objectives[0] - figures.objectives[possible]).max(axis=1)
         slack = NO_WORSE * float(now.mean[0])
         possible = possible[fall <= slack if (fall <= slack).any() else fall <= fall.min() + slack]

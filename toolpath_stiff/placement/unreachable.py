@@ -1,8 +1,8 @@
-"""What no placement keeps: anchored rapids, which the search leaves out, and all else, which is an error."""
+"""Rules that no placement keeps: anchored rapids are left out of the search, all else is an error."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,17 +12,24 @@ from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, reach
 from toolpath_stiff.path import place_orientations
-from toolpath_stiff.placement.effort import Effort
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
 from toolpath_stiff.placement.paths import WorkPath, placed_path
+from toolpath_stiff.placement.working import Search
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m, pose_in_mm
 
 SCOUTS_AT_A_TIME = 50  # until one keeps an anchored rapid within reach
-LeftOut = tuple[tuple[int, str], ...]  # lines of rapids, and what they break
 
 
-def let_go(search: Effort, scouts: FloatArray) -> tuple[PlacementFigures, LeftOut]:
+@dataclass(frozen=True)
+class LeftOutRapid:
+    """A rapid that no placement keeps within reach: its line, and what it breaks."""
+
+    line: int
+    reason: str
+
+
+def let_go(search: Search, scouts: FloatArray) -> tuple[PlacementFigures, tuple[LeftOutRapid, ...]]:
     """Drop anchored rapids that no placement keeps within reach where the cuts are.
 
     Returns the figures of the scouts on few samples, and the lines of these rapids and why.
@@ -38,7 +45,7 @@ def let_go(search: Effort, scouts: FloatArray) -> tuple[PlacementFigures, LeftOu
         alone = search.evaluator(replace(few.path.take(slice(0)), anchored=rapid))
         best, most = _roomiest(search, alone, possible)
         if most < 0.0:
-            left_out.append((int(rapid.line[0]), _breaks(search, alone.path, best)))
+            left_out.append(LeftOutRapid(int(rapid.line[0]), _breaks(search, alone.path, best)))
             gone.append(move)
     if gone:
         search.sample(replace(search.path, anchored=anchored.take(~np.isin(anchored.move, gone))))
@@ -46,7 +53,7 @@ def let_go(search: Effort, scouts: FloatArray) -> tuple[PlacementFigures, LeftOu
     return figures, tuple(left_out)
 
 
-def _roomiest(search: Effort, evaluator: Evaluator, placements: FloatArray) -> tuple[FloatArray, float]:
+def _roomiest(search: Search, evaluator: Evaluator, placements: FloatArray) -> tuple[FloatArray, float]:
     """The first placement that keeps the rules at all samples, else the one that misses them least, and its room."""
     best, most = placements[0], -np.inf
     for start in range(0, len(placements), SCOUTS_AT_A_TIME):
@@ -60,8 +67,8 @@ def _roomiest(search: Effort, evaluator: Evaluator, placements: FloatArray) -> t
     return best, most
 
 
-def _breaks(search: Effort, rapid: WorkPath, placement: FloatArray) -> str:
-    """What the worst sample of an anchored rapid breaks at a placement, in words."""
+def _breaks(search: Search, rapid: WorkPath, placement: FloatArray) -> str:
+    """The rule that the worst sample of an anchored rapid breaks at a placement, in words."""
     position, stand = _stand(search, rapid, placement)
     worst = int(np.argmin(stand.margin))
     if stand.margin[worst] < search.rules.margin:
@@ -70,7 +77,7 @@ def _breaks(search: Effort, rapid: WorkPath, placement: FloatArray) -> str:
     return f"it runs through the keep-out {boxes[0]}" if boxes else "it cannot be kept"
 
 
-def _stand(search: Effort, path: WorkPath, placement: FloatArray) -> tuple[FloatArray, Reach]:
+def _stand(search: Search, path: WorkPath, placement: FloatArray) -> tuple[FloatArray, Reach]:
     """(m + q, 3) m of a path at a placement, anchored rapids last, and how these stand to the limits."""
     anchored, machine = path.anchored, search.model.machine
     turn = rotation_matrices(placement[None, 3:])
@@ -80,7 +87,7 @@ def _stand(search: Effort, path: WorkPath, placement: FloatArray) -> tuple[Float
     return position, reach(machine, position, solve_struts(machine, position, rotation, tools), rotation)
 
 
-def infeasible(search: Effort, placement: FloatArray) -> UnreachableError:
+def infeasible(search: Search, placement: FloatArray) -> UnreachableError:
     """The error that names the rule, the line and by how much, at the least bad placement."""
     path, least = search.path, search.rules.margin
     figures = search.whole.figures(placement[None])

@@ -1,4 +1,4 @@
-"""What a plan may vary, and what work costs."""
+"""The menu of a plan: what may vary, and what work costs."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Costs:
 
 @dataclass(frozen=True)
 class Menu:
-    """What a plan may vary. Defaults are assumed; each is an option of `tps plan`.
+    """The menu of a plan: what may vary, and what it costs. Defaults are assumed; each is an option of `tps plan`.
 
     Attributes
     ----------
@@ -155,5 +155,5 @@ def _by_last_use(values: Iterable[T]) -> tuple[T, ...]:
 
 def _lowest(data: Measurements, setup: str) -> float:
     """Lowest tool tip measured in a set-up; in one that was never used, the lowest of all."""
-    own = data.setup == setup
-    return float(data.position[own if own.any() else slice(None), 2].min())
+    there = data.setup == setup
+    return float(data.position[there if there.any() else slice(None), 2].min())

@@ -1,4 +1,4 @@
-"""Which pose next, at the machine: a plan's tables, and the readings taken so far, without the model.
+"""The next pose, at the machine: from a plan's tables and the readings taken so far, without the model.
 
 Readings change what a plan has worked out (`tables`) in closed form, by Bayes' rule: the probabilities of the rivals,
 their means, their factors (Gaussian conditioning; Rasmussen and Williams 2006, Gaussian Processes for Machine
@@ -51,7 +51,7 @@ class Taken(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NextVisit(Result):
-    """Where a plan stands, and the visit to make next.
+    """A plan after some readings, and the visit to make next.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class NextVisit(Result):
 
     @property
     def settled(self) -> bool:
-        """Whether one of them has 95 %."""
+        """True where one of them has 95 %."""
         return not self.unlike and max(self.weights.values()) >= SETTLED
 
     @cached_property
@@ -104,7 +104,7 @@ class NextVisit(Result):
 
     @property
     def sentences(self) -> list[str]:
-        """Where the plan stands, and what is next."""
+        """Sentences on where the plan stands, and what is next."""
         chances = ", ".join(f"{name} {_percent(weight)}" for name, weight in self.weights.items())
         lines = [f"after {len(self.taken.rows)} readings of this plan: {chances}"]
         if self.unlike:
@@ -160,29 +160,50 @@ def _percent(share: float) -> str:
     return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
 
 
-def next_visit(folder: str | Path, files: tuple[str, ...] = (), columns: Mapped = None) -> NextVisit:
-    """Where to go next after some readings of a plan.
+def next_visit(
+    folder: str | Path, data: Sequence[str | Path] | str | Path = (), *, columns: Mapped = None
+) -> NextVisit:
+    """The pose of a plan to go to next, after the readings so far.
 
     Parameters
     ----------
     folder
-        Of the plan.
-    files
-        Measurement files with the readings taken so far, rows still empty among them; none: the plan's own plan.csv,
-        and those of the visits chosen one by one.
+        Where `plan` has been saved; a plan between explanations, not a first campaign.
+    data
+        Measurement files with the plan's readings taken so far, rows still empty among them; unless given, the
+        folder's own plan.csv and next_1.csv, next_2.csv ... Readings from before the plan are in it already.
+    columns
+        Which columns the files call otherwise: "stiffness=stiff_mean:N/um", or such a dict.
 
     Raises
     ------
     InputError, InputErrors
-        The folder holds no tables; a file cannot be read, bad rows.
+        The folder holds no plan between explanations; a file cannot be read, every bad row.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import toolpath_stiff as tps
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = tps.plan(machine="nist", between=("spindle_compliance", "none"), n=2).save(folder, plots=False)
+    ...     found = tps.next_visit(folder)
+    ...     [file.name for file in found.save()]
+    ['next_1.csv']
+    >>> found
+    <NextVisit: 0 readings, open>
+    >>> found.probability, found.settled
+    ({'spindle_compliance': 0.5, 'none': 0.5}, False)
+    >>> len(found.to_frame()) == len(found.to_dict()["rows"]) == len(found.rows)
+    True
     """
     tables = Tables.read(folder)
-    taken, notes = _taken(tables, files or own_files(folder), columns)
+    files = (data,) if isinstance(data, str | Path) else data
+    taken, notes = _taken(tables, tuple(map(str, files)) or own_files(folder), columns)
     forecasts, far = tables.forecasts, list[tuple[int, float]]()
     if len(taken.rows):
         forecasts, far = conditioned(tables, taken)
         notes += [f"{taken.where[k]}: {size:.1f} standard deviations off under every rival" for k, size in far]
-    probability = {one.name: one.weight for one in sorted(forecasts, key=lambda one: -one.weight)}
+    probability = {rival.name: rival.weight for rival in sorted(forecasts, key=lambda rival: -rival.weight)}
     unlike = len(far) > max(1.0, WILD_SHARE * len(taken.rows))
     done = unlike or max(probability.values()) >= SETTLED
     visit, why = (None, "") if done else _next(tables, forecasts, taken)
@@ -203,24 +224,24 @@ def conditioned(tables: Tables, taken: Taken) -> tuple[tuple[Forecast, ...], lis
     scatter = tables.noise.repeat**2 * np.eye(len(taken.rows)) + tables.noise.clamping**2 * same
     inverse = np.linalg.inv(scatter)
     logs, means, factors, off = [], [], [], []
-    for one in tables.forecasts:
-        factor = np.concatenate([one.factor, tables.noise.machine], axis=1)
-        own, residual = factor[taken.rows], taken.logs - one.mean[taken.rows]
-        pulled = own.T @ inverse
-        inner = np.eye(factor.shape[1]) + pulled @ own
+    for rival in tables.forecasts:
+        factor = np.concatenate([rival.factor, tables.noise.machine], axis=1)
+        measured, residual = factor[taken.rows], taken.logs - rival.mean[taken.rows]
+        pulled = measured.T @ inverse
+        inner = np.eye(factor.shape[1]) + pulled @ measured
         moved = np.linalg.solve(inner, pulled @ residual)
         square = residual @ inverse @ residual - (pulled @ residual) @ moved
-        logs.append(np.log(one.weight) - 0.5 * (square + np.linalg.slogdet(inner)[1]))
-        means.append(one.mean + factor @ moved)
+        logs.append(np.log(rival.weight) - 0.5 * (square + np.linalg.slogdet(inner)[1]))
+        means.append(rival.mean + factor @ moved)
         # (1 + G^T R^-1 G)^-1 = L^-T L^-1 of the lower L of what is inverted.
         factors.append(principal(np.linalg.solve(np.linalg.cholesky(inner), factor.T).T))
-        deviation = np.sqrt(np.diag(scatter) + (own**2).sum(axis=1))
+        deviation = np.sqrt(np.diag(scatter) + (measured**2).sum(axis=1))
         off.append(np.abs(residual) / deviation)
     weights = np.exp(np.array(logs) - max(logs))
     weights /= weights.sum()
     forecasts = tuple(
-        Forecast(one.name, float(weight), mean, factor)
-        for one, weight, mean, factor in zip(tables.forecasts, weights, means, factors, strict=True)
+        Forecast(rival.name, float(weight), mean, factor)
+        for rival, weight, mean, factor in zip(tables.forecasts, weights, means, factors, strict=True)
     )
     least = np.min(off, axis=0)
     return forecasts, [(int(k), float(least[k])) for k in np.flatnonzero(least > DOUBTFUL)]
@@ -295,7 +316,7 @@ def _taken(tables: Tables, files: tuple[str, ...], columns: Mapped) -> tuple[Tak
 
 
 def _key(numbers: Sequence[float], setup: str, loop: str) -> Key:
-    """Of position, angles, direction, force and tool; the force to a millinewton."""
+    """The key of position, angles, direction, force and tool; the force to a millinewton."""
     *lengths, force, tool = numbers
     return (*(round(float(value), 6) + 0.0 for value in (*lengths, 1e-3 * force, tool)), setup, loop)
 

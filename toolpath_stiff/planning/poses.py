@@ -23,7 +23,7 @@ STEEP_SHARE = 0.5  # share of the others with the largest tilt
 def draw_poses(machine: Machine, menu: Menu, count: int, rng: Generator) -> FloatArray:
     """(m, 6) round, reachable poses with the reference tool, m <= count; a quarter of them with a vertical spindle."""
     levels = np.array(menu.heights or axis_levels(machine))
-    found: list[FloatArray] = []
+    drawn: list[FloatArray] = []
     for batch in range(8):
         m = count
         radius, azimuth = menu.radius * np.sqrt(rng.random(m)), rng.uniform(0.0, 2.0 * np.pi, m)
@@ -39,10 +39,10 @@ def draw_poses(machine: Machine, menu: Menu, count: int, rng: Generator) -> Floa
         poses = np.concatenate([position, angles], axis=1) + 0.0
         if batch == 0:
             poses[: len(levels)] = np.stack([np.array([0.0, 0.0, z, 0.0, 0.0, 0.0]) for z in levels])[:m]
-        found += list(poses[reachable(machine, poses, 0.0)])
-        if len(found) >= count:
+        drawn += list(poses[reachable(machine, poses, 0.0)])
+        if len(drawn) >= count:
             break
-    return np.array(found[:count]).reshape(-1, 6)
+    return np.array(drawn[:count]).reshape(-1, 6)
 
 
 def axis_levels(machine: Machine, count: int = 5) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, error_figures
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
-from toolpath_stiff.inference.fits import Baseline, fit_effects, refine
+from toolpath_stiff.inference.fits import baseline, fit_effects, refine
 from toolpath_stiff.inference.hypotheses import score_family
 from toolpath_stiff.inference.judgement import NONE, Judgement
 from toolpath_stiff.planning.forecasts import Rival
@@ -36,18 +36,18 @@ def rivals_of(judgement: Judgement) -> list[Rival]:
     Where it leaves one or none standing, the most likely others beside it, at `LEAST_WEIGHT`: what a plan would
     confirm the answer against.
     """
-    found = []
+    rivals = []
     for name, weight in sorted(judgement.probability.items(), key=lambda item: (-item[1], item[0])):
         fit = _fit_of(judgement, name) if weight >= LEAST_WEIGHT or name in judgement.explanations else None
         if fit is not None:
-            found.append(rival_of_fit(name, fit, max(weight, LEAST_WEIGHT)))
+            rivals.append(rival_of_fit(name, fit, max(weight, LEAST_WEIGHT)))
     for name in (NONE, *(family.name for family in judgement.families)):
-        if len(found) >= 2:
+        if len(rivals) >= 2:
             break
         fit = _fit_of(judgement, name)
-        if fit is not None and name not in {rival.name for rival in found}:
-            found.append(rival_of_fit(name, fit, LEAST_WEIGHT))
-    return found
+        if fit is not None and name not in {rival.name for rival in rivals}:
+            rivals.append(rival_of_fit(name, fit, LEAST_WEIGHT))
+    return rivals
 
 
 def _fit_of(judgement: Judgement, name: str) -> Fit | None:
@@ -70,11 +70,11 @@ def fitted_rivals(problem: Problem, names: Sequence[str], effects: Mapping[str, 
     """
     _check(names, effects)
     base = problem.score_base()
-    found = []
+    rivals = []
     lacking = problem.predictor.data.cannot_test(effects[name] for name in names if name != NONE)
     for name in names:
         if name == NONE:
-            found.append(rival_of_fit(NONE, fit_effects(problem, (), (), (), base.law)))
+            rivals.append(rival_of_fit(NONE, fit_effects(problem, (), (), (), base.law)))
             continue
         if name in lacking:
             raise InputError(
@@ -87,8 +87,8 @@ def fitted_rivals(problem: Problem, names: Sequence[str], effects: Mapping[str, 
                 f"fitted to these data, {name} comes out at nothing: it is no other explanation than {NONE}",
                 hint="plan without data (leave the files out) for the size that it usually has",
             )
-        found.append(rival_of_fit(name, refine(problem, family.best)))
-    return found
+        rivals.append(rival_of_fit(name, refine(problem, family.best)))
+    return rivals
 
 
 def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: str = "") -> list[Rival]:
@@ -103,10 +103,10 @@ def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: 
         An effect that does not exist.
     """
     _check(names, effects)
-    found = []
+    rivals = []
     for name in names:
         if name == NONE:
-            found.append(Rival(NONE, (0.0, 0.0), (), np.diag([LAW_PRIOR**2] * 2)))
+            rivals.append(Rival(NONE, (0.0, 0.0), (), np.diag([LAW_PRIOR**2] * 2)))
             continue
         effect = effects[name]
         sizes = [usual_size(Component.of(p)) for p in effect.parameters if not p.discrete]
@@ -121,19 +121,19 @@ def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: 
             else:
                 values[parameter.name] = setup if discrete == 1 else ""
         covariance = np.diag([LAW_PRIOR**2] * 2 + [(UNKNOWN_SIZE * size) ** 2 for size in sizes])
-        found.append(Rival(name, (0.0, 0.0), (ActiveEffect(effect, values),), covariance))
-    return found
+        rivals.append(Rival(name, (0.0, 0.0), (ActiveEffect(effect, values),), covariance))
+    return rivals
 
 
 def errors_so_far(problem: Problem, rivals: Sequence[Rival]) -> dict[str, float]:
     """Mean errors on the data so far, %: as given, strut law refitted, then with each rival that is an effect."""
-    baseline = Baseline.of(problem)
-    found = {AS_GIVEN: baseline.as_given.residual, LAW_REFITTED: baseline.refitted.residual}
+    as_given, refitted = baseline(problem)
+    residuals = {AS_GIVEN: as_given.residual, LAW_REFITTED: refitted.residual}
     for rival in rivals:
         if rival.effects:
             modelled = problem.predictor.log_stiffness(np.asarray(rival.law), rival.effects)
-            found[f"with {rival.name}"] = problem.observed - modelled
-    return {name: error_figures(residual)["mean_abs_error_percent"] for name, residual in found.items()}
+            residuals[f"with {rival.name}"] = problem.observed - modelled
+    return {name: error_figures(residual)["mean_abs_error_percent"] for name, residual in residuals.items()}
 
 
 def usual_size(component: Component) -> float:

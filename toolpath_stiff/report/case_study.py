@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.placement.case_study import HIGH_MM, LOW_MM, REGION_COLUMNS, CaseStudy
+from toolpath_stiff.placement.case_study import FIGURES, HIGH_MM, LOW_MM, REGION_COLUMNS, CaseStudy
 from toolpath_stiff.report.axes import colour_scale, heading, in_thousands
 from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, new_figure, picture
 from toolpath_stiff.stiffness.model import machine_words
@@ -26,7 +26,7 @@ ABOVE, LEAST_ASPECT = 0.2, 0.6  # of a path of one's own: room for words above i
 BESIDE = 1.3  # inches
 HOLDS = {True: "yes", False: "NO", None: "not tested"}
 # As in the paper's Figure 10, mean and range first.
-COLUMNS = ("region", *REGION_COLUMNS, "mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")
+COLUMNS = ("region", *REGION_COLUMNS, *FIGURES)
 NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
 
@@ -162,12 +162,12 @@ def text(study: CaseStudy) -> str:
     """The case study in words and numbers, Markdown."""
     summary = study.summary
     count = len(summary["regions"])
-    asked = [
+    opening = [
         f"One path ({summary['program']}, {summary['note']}) in four regions, as the paper's Figure 10: mean stiffness",
         "under a load along the motion, and in parentheses its range, N/mm.",
     ]
     if study.is_own:
-        asked = [
+        opening = [
             f"{summary['program']} in {count} region{'s' if count > 1 else ''}: mean stiffness under a load along the",
             "motion, and in parentheses its range, N/mm.",
         ]
@@ -175,7 +175,7 @@ def text(study: CaseStudy) -> str:
         f"# Case study on {machine_words(summary)}",
         "",
         *(line for warning in summary["warnings"] for line in (f"Warning: {warning}.", "")),
-        *asked,
+        *opening,
         "",
         "| region | program zero, mm | turned | mean (range), N/mm |",
         "| --- | --- | --- | --- |",
@@ -187,8 +187,8 @@ def text(study: CaseStudy) -> str:
             f"{number(row['mean_N_per_mm'])} ({number(row['range_N_per_mm'])}) |"
         )
     lines += ["", "## The paper's conclusions", ""]
-    for row_number, found in enumerate(summary["conclusions"], 1):
-        lines.append(f"{row_number}. {found['statement']}: {HOLDS[found['holds']]}. {found['numbers']}.")
+    for row_number, conclusion in enumerate(summary["conclusions"], 1):
+        lines.append(f"{row_number}. {conclusion['statement']}: {HOLDS[conclusion['holds']]}. {conclusion['numbers']}.")
     lines += ["", "## Where they stop holding", "", *_limits_words(summary, study.is_own)]
     if study.is_own:
         return "\n".join([*lines, ""])
@@ -208,19 +208,19 @@ def text(study: CaseStudy) -> str:
     return "\n".join([*lines, ""])
 
 
-def _limits_words(summary: Mapping[str, Any], own: bool) -> list[str]:
-    limits, heights, at = summary["limits_of_the_conclusions"], summary["heights"], summary["regions"][0]
-    turned = f", turned {at['rotation_deg']:g} deg," if at["rotation_deg"] else ","
-    moved = f"Moved up and down at ({at['x_mm']:g}, {at['y_mm']:g}) mm{turned}"
+def _limits_words(summary: Mapping[str, Any], custom: bool) -> list[str]:
+    limits, heights, first = summary["limits_of_the_conclusions"], summary["heights"], summary["regions"][0]
+    turned = f", turned {first['rotation_deg']:g} deg," if first["rotation_deg"] else ","
+    moved = f"Moved up and down at ({first['x_mm']:g}, {first['y_mm']:g}) mm{turned}"
     mean, widest = (f"{limits[f'largest_{what}_at_z_mm']:g}" for what in ("mean", "range"))
-    if not own:
+    if not custom:
         return [
             f"{moved} the same path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm: "
             "beyond, both fall again."
         ]
     return [
-        f"{moved} as region {at['region']}, from z = {heights[0]['z_mm']:g} to {heights[-1]['z_mm']:g} mm (where it is "
-        f"within reach), the path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm."
+        f"{moved} as region {first['region']}, from z = {heights[0]['z_mm']:g} to {heights[-1]['z_mm']:g} mm (where it "
+        f"is within reach), the path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm."
     ]
 
 

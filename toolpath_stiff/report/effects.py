@@ -19,7 +19,8 @@ def trials_text(check: EffectCheck) -> str:
     for trial in check.trials:
         lines.append(f"{trial.effect.name}, on machine {check.machine}: {'good' if trial.passed else 'FAILS'}")
         width = max(len(outcome.name) for outcome in trial.outcomes)
-        lines += [f"  {TRIAL_WORDS[one.passed]:<5}  {one.name:<{width}}  {one.found}" for one in trial.outcomes]
+        for outcome in trial.outcomes:
+            lines.append(f"  {TRIAL_WORDS[outcome.passed]:<5}  {outcome.name:<{width}}  {outcome.found}")
     return "\n".join(lines)
 
 

@@ -71,9 +71,9 @@ def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArr
     for i in range(6):
         axes.plot(*np.array([frame[i], joints[i]]).T, color=STRUT, lw=2.2)
         # The two struts of a vertex run close together: their labels sit at different heights.
-        at = frame[i] + (0.3 if i % 2 else 0.55) * (joints[i] - frame[i])
+        place = frame[i] + (0.3 if i % 2 else 0.55) * (joints[i] - frame[i])
         label = f"{i + 1}: {mm_from_m(struts.lengths[0, i]):.0f} mm, {stiffness[i] / 1e3:.1f} kN/mm"
-        axes.text(*at, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=LABEL)
+        axes.text(*place, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=LABEL)
     _truss(axes, machine, nodes, lw=1.2)
     axes.scatter(*nodes[TIP], color=TOOL, s=30, depthshade=False)
     axes.set_title("whole machine: struts with length and stiffness", fontsize=10, color="#374151", y=0.85 - BELOW)
@@ -119,8 +119,8 @@ def _box(axes: Any, zoom: float | None = None) -> FloatArray:
 def _reach(axes: Any) -> FloatArray:
     """(2, 2) pixels by which a view's figures and what its axes are called reach beyond its box, as it is drawn."""
     box = _box(axes)
-    found = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
-    ends = np.concatenate([box, *(one.get_points() for one in found if one is not None)])
+    boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    ends = np.concatenate([box, *(box_of_axis.get_points() for box_of_axis in boxes if box_of_axis is not None)])
     return np.array([ends.min(axis=0), ends.max(axis=0)]) - box
 
 
@@ -230,5 +230,5 @@ def text(machine: Machine, stand: Reach) -> str:
         f"  {quantity:<{width}}  {value} {unit}".rstrip() + f"  [{origin}]" for quantity, value, unit, origin, _ in rows
     ]
     remarks = {row[4] for row in rows if row[4]}
-    said = "".join(f"\n  {name}: {remark}" for name, remark in machine.remarks.items() if remark in remarks)
-    return "\n".join([*lines, f"{said}\n\n  at the pose drawn: {stand.describe(0)}"])
+    remarked = "".join(f"\n  {name}: {remark}" for name, remark in machine.remarks.items() if remark in remarks)
+    return "\n".join([*lines, f"{remarked}\n\n  at the pose drawn: {stand.describe(0)}"])

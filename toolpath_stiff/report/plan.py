@@ -112,18 +112,18 @@ def plan_picture(
 
 
 def _numbers(visits: Visits, chosen: Sequence[int]) -> list[str]:
-    """Where each visit stands in measuring order; visits to one pose share a label."""
+    """Labels of the visits, their numbers in measuring order; visits to one pose share a label."""
     poses = [visits.pose[v].tobytes() for v in chosen]
     return [", ".join(str(k + 1) for k, other in enumerate(poses) if other == pose) for pose in poses]
 
 
 def _marks(
-    axes: Axes, poses: FloatArray, kinds: Sequence[str], numbers: Sequence[str], own: IntArray, half: float
+    axes: Axes, poses: FloatArray, kinds: Sequence[str], numbers: Sequence[str], here: IntArray, half: float
 ) -> None:
     """Poses by kind, the tilt of the spindle as a line toward where it leans, numbered in measuring order."""
     names = list(dict.fromkeys(kinds))
     labelled: set[str] = set()
-    for k in own:
+    for k in here:
         x, y = (float(v) for v in mm_from_m(poses[k, :2]))
         # The spindle's axis R z leans toward (sin b cos a, -sin a) for small yaw.
         lean = np.array([np.sin(poses[k, 4]) * np.cos(poses[k, 3]), -np.sin(poses[k, 3])])
@@ -136,7 +136,7 @@ def _marks(
         if numbers[k] not in labelled:
             box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.8}
             # Towards the middle, so that labels stay in their panel; each elsewhere where marks crowd.
-            near = [j for j in own if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
+            near = [j for j in here if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
             place = list(dict.fromkeys(numbers[j] for j in near)).index(numbers[k]) % 4
             left, above = (x > 0.25 * half) != (place >= 2), place % 2 == 0
             if lean.any() and place == 0 and len(numbers[k]) < SHORT:  # not upon the line

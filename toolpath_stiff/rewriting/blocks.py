@@ -241,8 +241,8 @@ def _piece_count(controls: Controls) -> int:
     tolerance = controls.linearise - controls.unit
     if tolerance < controls.unit:
         option = both_names("--linearise", f"{controls.linearise:g}")
-        found = f"{option} is no more than the rounding to {controls.digits} decimals"
-        raise controls.refusal(found, "give more of it, or more --decimals")
+        problem = f"{option} is no more than the rounding to {controls.digits} decimals"
+        raise controls.refusal(problem, "give more of it, or more --decimals")
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
     if arc is not None and (off_plane or count > 1):
         controls.note(

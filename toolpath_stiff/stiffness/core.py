@@ -35,6 +35,7 @@ CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2
 COMPILED_FROM = 1_500_000
 ROUTES = ("exact", "closed_form", "compiled")
 
+Tools = FloatArray | float  # m, length of the tool: of all poses, or (n,)
 Along = Callable[[FloatArray, IntArray], FloatArray]
 
 DIRECTIONS = 60  # over half a sphere: neighbours some 15 degrees apart
@@ -65,7 +66,7 @@ def tip_compliance(
     model: StiffnessModel,
     position: FloatArray,
     rotation: FloatArray | None = None,
-    tool_length: FloatArray | float = np.nan,
+    tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
     route: str | None = None,
 ) -> FloatArray:
@@ -173,10 +174,10 @@ def compliance_with_effects(
         control = kernel.on_joints_of(model.control, tool_length)
         position, rotation, sure = closed_form.followed_columns(kernel, control, position, rotation)
     if not any(hook in ADDING for active in acting_effects(model) for hook in active.effect.hooks):
-        found, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
-        found[~(sure & good)] = np.nan
-        return found
-    found = np.full(n, np.nan)
+        compliance, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
+        compliance[~(sure & good)] = np.nan
+        return compliance
+    compliance = np.full(n, np.nan)
     extension = 0.0 if np.isnan(tool_length) else tool_length - model.machine.reference_tool_length
     for start in range(0, n, BLOCK):
         rows = slice(start, start + BLOCK)
@@ -194,16 +195,12 @@ def compliance_with_effects(
         )
         some = np.flatnonzero(good & sure[rows])
         path = path if len(some) == len(forces) else path.take(some)
-        found[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
-    return found
+        compliance[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
+    return compliance
 
 
 def _exact(
-    model: StiffnessModel,
-    position: FloatArray,
-    rotation: FloatArray | None,
-    tool_length: FloatArray | float,
-    force: float,
+    model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: Tools, force: float
 ) -> FloatArray:
     compliance = np.empty((len(position), 3, 3))
     for rows, path in _paths(model, position, rotation, tool_length, force):
@@ -215,7 +212,7 @@ def _paths(
     model: StiffnessModel,
     position: FloatArray,
     rotation: FloatArray | None,
-    tool_length: FloatArray | float,
+    tool_length: Tools,
     force: float,
     at_a_time: int = BLOCK,
 ) -> Iterator[tuple[slice, LoadPath]]:
@@ -232,7 +229,7 @@ def compliance_along(
     direction: FloatArray,
     position: FloatArray,
     rotation: FloatArray | None = None,
-    tool_length: FloatArray | float = np.nan,
+    tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
 ) -> FloatArray:
     """Compliance of the tip along unit vectors (n, 3), load-dependent effects included: (n,) m/N."""
@@ -246,7 +243,7 @@ def extreme_directions(
     model: StiffnessModel,
     position: FloatArray,
     rotation: FloatArray | None = None,
-    tool_length: FloatArray | float = np.nan,
+    tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
     softest: bool = True,
     across: FloatArray | None = None,
@@ -276,11 +273,7 @@ def half_sphere(count: int) -> FloatArray:
 
 
 def searched_directions(
-    along: Along,
-    tensor: FloatArray,
-    forces: FloatArray,
-    softest: bool = True,
-    across: FloatArray | None = None,
+    along: Along, tensor: FloatArray, forces: FloatArray, softest: bool = True, across: FloatArray | None = None
 ) -> FloatArray:
     """Directions in which the tip gives way most, or least.
 
@@ -315,11 +308,11 @@ def searched_directions(
     if idle is not None:
         tried = np.concatenate([tried, _in_planes(idle)], axis=1)
     tried = tried if across is None else _flattened(tried, across)
-    found = value(tried)
-    best = np.argsort(-found, axis=1, kind="stable")
+    values_of_tried = value(tried)
+    best = np.argsort(-values_of_tried, axis=1, kind="stable")
     best = (_best_of_each_cell(best, tried, forces) if softest else best)[:, :CLIMBS]
     directions = np.take_along_axis(tried, best[..., None], axis=1)
-    reached = np.take_along_axis(found, best, axis=1)
+    reached = np.take_along_axis(values_of_tried, best, axis=1)
     step = np.full(reached.shape, FIRST_STEP)
     while (step > LAST_STEP).any():
         around = _around(directions, step)
@@ -366,10 +359,10 @@ def _around(directions: FloatArray, step: FloatArray) -> FloatArray:
 
 def _in_planes(normal: FloatArray) -> FloatArray:
     """(n, m, 3) unit vectors spread over the planes across unit vectors (n, 6, 3), and where two planes meet."""
-    one, other = np.triu_indices(6, 1)
-    meeting = np.cross(normal[:, one], normal[:, other])
+    first_strut, second_strut = np.triu_indices(6, 1)
+    meeting = np.cross(normal[:, first_strut], normal[:, second_strut])
     length = np.linalg.norm(meeting, axis=-1, keepdims=True)
-    meeting = np.where(length > 1e-6, meeting / np.maximum(length, 1e-6), normal[:, one])
+    meeting = np.where(length > 1e-6, meeting / np.maximum(length, 1e-6), normal[:, first_strut])
     first = _beside(normal)
     angle = np.pi * np.arange(IN_PLANE)[:, None] / IN_PLANE
     circle = first[..., None, :] * np.cos(angle) + np.cross(normal, first)[..., None, :] * np.sin(angle)

@@ -45,8 +45,8 @@ def line_of(kind: type, attribute: str, index: int | None = None) -> int | None:
         tree = ast.parse(Path(inspect.getsourcefile(kind) or "").read_text("utf-8"))
     except (TypeError, OSError, ValueError, SyntaxError):  # built in, or its file or module is gone
         return None
-    found = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__]
-    return _line_within(found[0], attribute, index) if found else None
+    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__]
+    return _line_within(classes[0], attribute, index) if classes else None
 
 
 def _line_within(node: ast.ClassDef, attribute: str, index: int | None) -> int:

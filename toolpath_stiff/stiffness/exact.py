@@ -133,11 +133,11 @@ def _whole_steps(load: SharedLoad, forces: FloatArray, rows: IntArray) -> IntArr
         stiffened = np.linalg.solve(struts, np.concatenate([jacobian, longer[..., None]], axis=-1))
         system = transposed @ stiffened[..., :6] + load.parallel[rows]
         motion = _solved(system, load.wrench[rows] + _times(transposed, stiffened[..., 6]))
-        found = _times(stiffened[..., :6], motion) - stiffened[..., 6]
-        moved = np.abs(found - before).max(axis=1) / load.force[rows]
+        settled = _times(stiffened[..., :6], motion) - stiffened[..., 6]
+        moved = np.abs(settled - before).max(axis=1) / load.force[rows]
         # Between tension and compression of a strut lies its gap, where it is idle.
-        crossing = (found * before < 0.0) & (moved > SETTLED)[:, None]
-        forces[rows] = np.where(crossing, 0.0, found)
+        crossing = (settled * before < 0.0) & (moved > SETTLED)[:, None]
+        forces[rows] = np.where(crossing, 0.0, settled)
         rows = rows[moved > SETTLED]
     return rows
 
@@ -184,14 +184,14 @@ def _length(gradient: Callable[[FloatArray], FloatArray], forces: FloatArray, st
 
     low, high = np.zeros(len(forces)), np.ones(len(forces))
     goal = FLAT * np.abs(slope(low))
-    share, found = high.copy(), slope(high)
+    share, rise = high.copy(), slope(high)
     for _ in range(LINE_STEPS):
-        rising, falling = found > goal, (found < -goal) & (share < 1.0)
+        rising, falling = rise > goal, (rise < -goal) & (share < 1.0)
         if not (rising | falling).any():
             break
         high, low = np.where(rising, share, high), np.where(falling, share, low)
         share = np.where(rising | falling, 0.5 * (low + high), share)
-        found = slope(share)
+        rise = slope(share)
     return share
 
 
@@ -307,10 +307,10 @@ def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.solve(matrix, right))
     except np.linalg.LinAlgError:
         solution = np.full(np.broadcast_shapes(matrix.shape[:-2], right.shape[:-2]) + right.shape[-2:], np.nan)
-        for i, (one, side) in enumerate(zip(matrix, right, strict=True)):
+        for i, (left, side) in enumerate(zip(matrix, right, strict=True)):
             # The same test as for a batch without singular poses: a pose's result does not hang on its neighbours.
             with suppress(np.linalg.LinAlgError):
-                solution[i] = np.linalg.solve(one, side)
+                solution[i] = np.linalg.solve(left, side)
         return solution
 
 

@@ -333,39 +333,39 @@ def condition_warnings(model: StiffnessModel, tool_given: bool = False) -> list[
     `tool_given`: whether the length of the tool is known; else it is the reference tool's.
     """
     names = ", ".join(active.effect.name for active in model.instruments)
-    found = list(model.unchecked)
-    found += [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
-    found += [str(one) for one in idle_effects(model) if one.waiting]
+    warnings = list(model.unchecked)
+    warnings += [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
+    warnings += [str(idle) for idle in idle_effects(model) if idle.waiting]
     length = mm_from_m(model.machine.reference_tool_length)
     if not tool_given:
-        found += [
+        warnings += [
             f"{active.effect.name} acts as with the reference tool ({length:g} mm): nobody gives the tool's length"
             for active in acting_effects(model)
             if TOOL in active.effect.needs
         ]
     given = model.given
-    asked = model.conditions.setup and (given is None or given.setup != model.conditions.setup)
-    if asked and not any(SETUP in active.effect.conditions(active.values) for active in model.effects):
+    named = model.conditions.setup and (given is None or given.setup != model.conditions.setup)
+    if named and not any(SETUP in active.effect.conditions(active.values) for active in model.effects):
         name = model.machine.name
-        found.append(f"set-up {model.conditions.setup!r} changes nothing: no effect of machine {name} depends on it")
-    return found
+        warnings.append(f"set-up {model.conditions.setup!r} changes nothing: no effect of machine {name} depends on it")
+    return warnings
 
 
 def conditions_stated(model: StiffnessModel) -> list[str]:
     """What the results assume of set-up and temperature, and which effects stand aside for it."""
-    found = []
+    stated = []
     if model.conditions.setup is not None:
-        found.append(f"set-up: {model.conditions.setup or NO_SETUP}")
+        stated.append(f"set-up: {model.conditions.setup or NO_SETUP}")
     if model.conditions.temperature is not None:
-        found.append(f"temperature: {model.conditions.temperature:g} degrees C")
-    return found + [str(one) for one in idle_effects(model) if not one.waiting]
+        stated.append(f"temperature: {model.conditions.temperature:g} degrees C")
+    return stated + [str(idle) for idle in idle_effects(model) if not idle.waiting]
 
 
 def effects_stated(model: StiffnessModel) -> dict[str, Any]:
     """The entries of a result's JSON: what acts, what does not and why, under which set-up and temperature."""
     return {
         "effects": acting_names(model),
-        "effects_idle": [{"effect": one.effect, "reason": one.reason} for one in idle_effects(model)],
+        "effects_idle": [{"effect": idle.effect, "reason": idle.reason} for idle in idle_effects(model)],
         "setup": NO_SETUP if model.conditions.setup == "" else model.conditions.setup,
         "temperature_C": model.conditions.temperature,
     }
@@ -383,15 +383,15 @@ def idle_on_readings(model: StiffnessModel, missing: Collection[str], setups: Co
 
     `missing`: columns that the readings lack; `setups`: names that occur in them.
     """
-    found = {}
+    sentences = {}
     for active in (*model.effects, *model.instruments):
-        waits_for, own = active.effect.conditions(active.values), setup_of(active)
+        waits_for, setup = active.effect.conditions(active.values), setup_of(active)
         lacking = ", ".join(name for name in waits_for if name in missing)
-        if lacking or (SETUP in waits_for and own and own not in setups):
-            why = f"column {lacking} is missing" if lacking else f"none is of set-up {own!r}"
+        if lacking or (SETUP in waits_for and setup and setup not in setups):
+            why = f"column {lacking} is missing" if lacking else f"none is of set-up {setup!r}"
             name = active.effect.name
-            found[name] = f"{name} of the machine file does not act on these readings: {why}"
-    return found
+            sentences[name] = f"{name} of the machine file does not act on these readings: {why}"
+    return sentences
 
 
 def known_setups(models: Iterable[StiffnessModel]) -> list[str]:
@@ -410,7 +410,7 @@ def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:
     """
     known = known_setups(models)
     effects = [active for model in models for active in model.effects]
-    takes_any = any(SETUP in one.effect.needs and not setup_of(one) for one in effects)
+    takes_any = any(SETUP in active.effect.needs and not setup_of(active) for active in effects)
     if setup in ("", NO_SETUP, *known) or takes_any or not known:
         return
     near = difflib.get_close_matches(setup, known, n=1)

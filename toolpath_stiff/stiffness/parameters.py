@@ -23,12 +23,12 @@ def read_parameters(effect: Effect, entry: EffectEntry, where: str) -> Values:
     values: dict[str, float | str] = {}
     for key, parameter in by_key.items():
         if key not in entry.parameters:
-            found = f"effect {effect.name}: {key} is missing"
-            raise entry.error(found, expected=parameter.expected, where=where)
+            mistake = f"effect {effect.name}: {key} is missing"
+            raise entry.error(mistake, expected=parameter.expected, where=where)
         value = entry.parameters[key]
         if not _is_valid(parameter, value):
-            found = f"effect {effect.name}: {key} = {value!r}"
-            raise entry.error(found, key, expected=parameter.expected, where=where)
+            mistake = f"effect {effect.name}: {key} = {value!r}"
+            raise entry.error(mistake, key, expected=parameter.expected, where=where)
         values[parameter.name] = float(value) * parameter.si if parameter.kind == "real" else value
     return values
 

@@ -1,7 +1,7 @@
 """Cutter-location files: the points, tool axes and feeds that CAM systems hand to post processors, in APT's words.
 
-`statements` splits lines; `vocabulary` is the table of words, whose functions are in `modes` and `motion`; each takes
-the `state` and a statement. `state` also makes moves of what `geometry` computes.
+`statements` splits lines; `vocabulary` is the table of words, whose functions are in `modes`, `motion` and `cycles`;
+each takes the `state` and a statement. `state` also makes moves of what `circles` and `tool_axes` compute.
 
 A file is read to `ReadProgram`, the same contract as the reader of G code, or checked, with all its errors.
 """

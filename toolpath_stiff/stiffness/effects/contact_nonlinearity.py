@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, about, compliance
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance
+from toolpath_stiff.stiffness.sizes import about
 
 REFERENCE_FORCE = 500.0  # N, force in the strut at which the compliance is given
 IDLE = 1e-3  # N: below, a strut adds nothing to the tip that could be measured, and the power law would diverge

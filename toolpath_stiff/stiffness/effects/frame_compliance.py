@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, compliance, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, compliance
+from toolpath_stiff.stiffness.sizes import sizes_in_words
 
 EXPERIENCE = "engineering experience, no source: stiff machine frames are built for 100 to 500 N/um"
 
@@ -47,9 +48,9 @@ class FrameCompliance(Effect):
                 continue
             outward = path.struts.directions[:, pair] @ radial
             upward = path.struts.directions[:, pair, 2]
-            own = p["radial"] * _outer(outward) + p["vertical"] * _outer(upward)
+            springs = p["radial"] * _outer(outward) + p["vertical"] * _outer(upward)
             first, last = pair
-            form[:, first : last + 1 : last - first, first : last + 1 : last - first] += own
+            form[:, first : last + 1 : last - first, first : last + 1 : last - first] += springs
         return form
 
     def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, at_the_tip, compliance, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, at_the_tip, compliance
+from toolpath_stiff.stiffness.sizes import sizes_in_words
 
 
 class SpindleCompliance(Effect):

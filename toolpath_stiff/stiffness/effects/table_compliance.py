@@ -5,15 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import (
-    Effect,
-    LoadPath,
-    Parameter,
-    Values,
-    at_the_tip,
-    compliance,
-    sizes_in_words,
-)
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, at_the_tip, compliance
+from toolpath_stiff.stiffness.sizes import sizes_in_words
 
 EXPERIENCE = "engineering experience, no source: machine beds are built for 100 to 500 N/um"
 

@@ -1,4 +1,4 @@
-"""What a search works with: the evaluators of the whole path and of the samples that stand for it, and its rules."""
+"""The means of a search: evaluators of the whole path and of the samples that stand for it, bounds and rules."""
 
 from __future__ import annotations
 
@@ -24,21 +24,34 @@ ENDS = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
 
 
 @dataclass
-class Effort:
-    """The evaluators of one search (of a few samples, of more, of the whole path), its bounds and rules.
+class Search:
+    """One search for placements: the evaluators of a few samples, of more, of the whole path; bounds and rules.
 
-    `now` are the figures of the present placement, `present` where that is, if its cuts are within reach; `rules` get
-    their largest share of extrapolated samples when the scouts are back.
+    Attributes
+    ----------
+    model, path, load, force
+        The machine, the path in the set-up frame, the load.
+    bounds, wanted
+        What may vary; what a placement must keep and is to be good at.
+    present
+        (6,) where program zero sits now: what the recommendation must not be worse than; None where it is out of reach.
+    report
+        Called with (stages done, stages in all).
+    start, now
+        The present placement where it lies within the bounds, (0, 6) or (1, 6); its figures, within them or not.
+    rules
+        Get their largest share of extrapolated samples when the scouts are back.
     """
 
     model: StiffnessModel
     path: WorkPath
     load: Load
-    force: float
     bounds: Bounds
-    wanted: SearchRules
-    report: Callable[[int, int], None]
+    wanted: SearchRules = field(default_factory=SearchRules)
+    force: float = defaults.FORCE
     present: FloatArray | None = None
+    report: Callable[[int, int], None] = lambda done, total: None
+    start: FloatArray = field(init=False)
     now: PlacementFigures | None = None
     rules: Rules = field(init=False)
     evaluators: dict[str, Evaluator] = field(default_factory=dict)
@@ -46,10 +59,11 @@ class Effort:
     heeded: IntArray = field(init=False)
 
     def __post_init__(self) -> None:
-        self.rules = Rules(self.wanted.margin)
+        self.rules, self.start = Rules(self.wanted.margin), np.zeros((0, 6))
         self.sample(self.path)
         if self.present is not None:
             self.now = self.whole.figures(self.present[None])
+            self.start = self.present[None] if self.bounds.holds(self.present) else self.start
             self.present = self.present if self.now.margin[0] >= 0.0 else None
 
     def sample(self, path: WorkPath) -> None:
@@ -76,12 +90,12 @@ class Effort:
 
     @property
     def whole(self) -> Evaluator:
-        """Of the whole path."""
+        """The evaluator of the whole path."""
         return self.evaluators["whole"]
 
     @property
     def few(self) -> Evaluator:
-        """Of the few samples that stand for it."""
+        """The evaluator of the few samples that stand for it."""
         return self.evaluators["few"]
 
     @property
