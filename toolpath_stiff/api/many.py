@@ -145,7 +145,7 @@ def analyze_many(
         Called with the program that is done, programs done, programs in all; first with 0 done, when all arguments
         have been found right.
     **options
-        Those of `analyze` (origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm, compare_with), and those of
+        Those of `analyze` (origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm, compare_with) and of
         `Program.read`.
 
     Raises
