@@ -120,10 +120,10 @@ def analyze(
         second = compare_with if isinstance(compare_with, Machine) else first.like(compare_with)
     options, required = path_options(origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm)
 
-    def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> Analysis:
-        model = one.running(part, [other] if other else [])
+    def on(machine: Machine, other: Machine | None, progress: Callable[[int, int], None] | None) -> Analysis:
+        model = machine.running(part, [other] if other else [])
         read = part.moves(options["origin"], model.machine.default_origin)
-        return analyze(model, read, progress=told, **options)
+        return analyze(model, read, progress=progress, **options)
 
     return replace(
         on(first, second, counter(progress, f"{part.name}: samples")),
