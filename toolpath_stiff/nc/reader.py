@@ -5,7 +5,6 @@ Programs in other languages than G code are recognised by their first lines and 
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -15,13 +14,12 @@ from pathlib import Path
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.points import increments_hint
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Dialect, Switches, check_plain, plain
-from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.lathes import lathe_program, lathe_warning
 from toolpath_stiff.nc.moves import RAPID, Moves, Program
 from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
@@ -300,18 +298,15 @@ def _read_built_in(request: Request) -> Program:
 def _run_built_in(
     request: Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
 ) -> Program:
-    posted = request.posted
-    frames = Frames(copy.deepcopy(request.offsets), *request.zero, posted=posted)
-    state = State(request.name, frames, copy.deepcopy(request.tools), request.controller.dialect)
-    state.feed = request.controller.feed
-    run = begin(state, request.lines, request.name, request.switches)
-    warnings = run.run()
+    run = begin(request.start(), request.lines, request.name, request.switches)
+    posted, state, frames, warnings = request.posted, run.state, run.state.frames, run.run()
     if not state.recorder.cuts:
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
     g54 = request.offsets.table[0].given or frames.offsets.table[0].given
     if frames.source == "option" and g54:
         warnings.append(ORIGIN_WINS)
-    moves = state.recorder.moves()
+    moves, more, assumptions = conclusions(run, request.controller)
+    assert moves is not None
     program = Program(
         name=request.name,
         path=request.path,
@@ -320,13 +315,8 @@ def _run_built_in(
         origin=pose_in_si(frames.origin),
         origin_source=frames.source,
         unsupported=tuple(state.unsupported),
-        warnings=(
-            *warnings,
-            *state.warnings,
-            *lathe_warning(state.turning, moves),
-            *millimetre_warning(state, run.lines),
-        ),
-        assumptions=(START, *state.assumptions, *feed_assumption(request.controller, moves)),
+        warnings=(*warnings, *more),
+        assumptions=(START, *assumptions),
         tools=tuple(state.used_tools.values()),
         dialect=request.controller.label,
         jumps=tuple(run.jumps),
@@ -334,6 +324,14 @@ def _run_built_in(
     if posted is None:
         return program
     return _on_the_part(program, request, posted, state.tip_held, frames.offsets)
+
+
+def conclusions(run: ProgramRun, controller: Controller) -> tuple[Moves | None, list[str], list[str]]:
+    """Moves of a run that has ended, None if there are none; its warnings and assumptions."""
+    state = run.state
+    moves = state.recorder.moves() if len(state.recorder) else None
+    warnings = [*state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, run.lines)]
+    return moves, warnings, [*state.assumptions, *feed_assumption(controller, moves)]
 
 
 _LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)

@@ -11,9 +11,9 @@ from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.codes.groups import Group
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
+from toolpath_stiff.nc.groups import Group
 from toolpath_stiff.nc.moves import Arc, Recorder, ToolUse, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
@@ -39,12 +39,17 @@ class Flow(Enum):
 
 @dataclass(frozen=True)
 class Call:
-    """A subprogram call: its number, its L (None: not given), the column of its M98; `local`: by an N number."""
+    """A subprogram call: its number, its L (None: not given), the column of its code; `local`: by an N number.
+
+    `arguments`: the local variables that a macro call gives; `modal`: G66.
+    """
 
     number: int
     repeats: int | None
     column: int
     local: bool = False
+    arguments: dict[int, float | None] | None = None
+    modal: bool = False
 
 
 @dataclass(frozen=True)

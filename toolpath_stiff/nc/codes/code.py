@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from toolpath_stiff.nc.codes.groups import STEPS, Group
+from toolpath_stiff.nc.groups import STEPS, Group
 from toolpath_stiff.nc.state import CurrentBlock, State
 
 EVERYWHERE = ("generic", "linuxcnc", "fanuc", "haas")
