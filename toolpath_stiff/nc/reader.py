@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -14,8 +13,6 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.points import increments_hint
 from toolpath_stiff.nc.controller import Controller, Switches, check_plain, plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
-from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.languages import foreign_program, refused_program
 from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
@@ -25,6 +22,7 @@ from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.parametric.statements import uses_variables
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
@@ -118,7 +116,7 @@ def read(request: Request) -> ReadProgram:
         raise refused
     if native:
         check_plain(request.block_delete, request.controller)
-        return _on_the_part(linuxcnc.read(request), request)
+        return _on_the_part(_with_feed(linuxcnc.read(request), request), request)
     try:
         return _read_built_in(request)
     except InputError as error:
@@ -128,7 +126,7 @@ def read(request: Request) -> ReadProgram:
         if request.interpreter == "builtin" or not plain(request.block_delete, request.controller):
             raise
         _check_second(error, request)
-    return _on_the_part(linuxcnc.read(request), request)
+    return _on_the_part(_with_feed(linuxcnc.read(request), request), request)
 
 
 def _check_second(error: InputError, request: Request) -> None:
@@ -162,17 +160,14 @@ def _read_built_in(request: Request) -> ReadProgram:
 def _run_built_in(
     request: Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
 ) -> ReadProgram:
-    frames = Frames(copy.deepcopy(request.work_offsets), *request.zero, posted=request.posted)
-    state = State(request.name, frames, copy.deepcopy(request.tool_table), request.controller.dialect)
-    state.feed = request.controller.feed
-    run = begin(state, request.lines, request.name, request.switches)
-    warnings = run.run()
+    run = begin(request.start(), request.lines, request.name, request.switches)
+    state, frames, warnings = run.state, run.state.frames, run.run()
     if not state.recorder.cuts:
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
     if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
         warnings.append(ORIGIN_WINS)
-    moves = state.recorder.moves()
-    warnings += [*state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, run.lines)]
+    moves, more, assumptions = conclusions(run, request.controller)
+    assert moves is not None
     program = ReadProgram(
         name=request.name,
         path=request.path,
@@ -181,8 +176,8 @@ def _run_built_in(
         origin=pose_in_si(frames.origin),
         origin_source=frames.source,
         unsupported=tuple(state.unsupported),
-        warnings=tuple(warnings),
-        assumptions=(START, *state.assumptions),
+        warnings=(*warnings, *more),
+        assumptions=(START, *assumptions),
         tools=tuple(state.used_tools.values()),
         dialect=request.controller.label,
         jumps=tuple(run.jumps),
@@ -202,13 +197,20 @@ def _on_the_part(
     offsets: Offsets | None = None,
 ) -> ReadProgram:
     """A program with the moves of the tool on the part, if it was posted for another machine."""
-    program = _with_feed(program, request)
     if request.posted is None:
         return program
     check_rotary_offsets(offsets or request.work_offsets, request.posted, program.name)
     if request.origin is None:
         return recovered(program, request.posted, tip_held, request.default_origin, "default")
     return recovered(program, request.posted, tip_held, request.origin, "option")
+
+
+def conclusions(run: ProgramRun, controller: Controller) -> tuple[Moves | None, list[str], list[str]]:
+    """Moves of a run that has ended, None if there are none; its warnings and assumptions."""
+    state = run.state
+    moves = state.recorder.moves() if len(state.recorder) else None
+    warnings = [*state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, run.lines)]
+    return moves, warnings, [*state.assumptions, *feed_assumption(controller, moves)]
 
 
 _LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)
