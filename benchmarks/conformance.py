@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 from benchmarks.pages import write_page
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.nc.controller import DIALECTS, Controller
-from toolpath_stiff.nc.moves import RAPID, Moves, Program
+from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.nc.reader import read_program
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.path import sample_moves
@@ -69,7 +69,7 @@ def programs_of(arguments: Iterable[str]) -> Iterator[Path]:
         yield from sorted(inside) if argument.is_dir() else [argument]
 
 
-def feed_path(program: Program) -> Moves:
+def feed_path(program: ReadProgram) -> Moves:
     """Its cutting moves, less those that vanish in rs274's digits."""
     moves = program.moves
     length = np.abs(in_mm(moves.end) - in_mm(moves.start)).max(axis=1)
@@ -133,7 +133,7 @@ def _apart(points: np.ndarray, start: np.ndarray, along: np.ndarray) -> np.ndarr
     return apart
 
 
-def difference(one: Program, two: Program) -> float:
+def difference(one: ReadProgram, two: ReadProgram) -> float:
     """How far two feed paths are apart, mm or degrees, in both directions."""
     first, second = feed_path(one), feed_path(two)
     if not len(first) or not len(second):
@@ -159,7 +159,7 @@ def held_against(file: Path, control: Controller, rs274: str | None = None) -> R
     return Row(name, SAME if apart <= TOLERANCE else OTHER, said, detail)
 
 
-def _without_a_path(file: Path, theirs: Program | None, said: str, ours: Program | None, answer: str) -> str:
+def _without_a_path(file: Path, theirs: ReadProgram | None, said: str, ours: ReadProgram | None, answer: str) -> str:
     """The verdict where one of them has no path to compare; "" if both have."""
     if ours is not None and theirs is not None:
         return ""
@@ -171,7 +171,7 @@ def _without_a_path(file: Path, theirs: Program | None, said: str, ours: Program
     return OTHER if theirs is not None or said == NONE else UNCHECKED
 
 
-def read(file: Path, control: Controller, interpreter: str, rs274: str | None) -> tuple[Program | None, str]:
+def read(file: Path, control: Controller, interpreter: str, rs274: str | None) -> tuple[ReadProgram | None, str]:
     """The program, or why not; no cutting move is told apart, since it is an answer of its own."""
     try:
         program = read_program(file, interpreter=interpreter, rs274=rs274, controller=control)

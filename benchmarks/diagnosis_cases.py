@@ -13,15 +13,16 @@ import numpy as np
 
 from benchmarks.bars import Record
 from benchmarks.case_loop import record_of
+from benchmarks.random_visits import random_visits
 from toolpath_stiff.diagnosis.diagnose import Diagnosis, diagnose
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.plan import RivalPlan, plan_measurements, random_visits
+from toolpath_stiff.planning.menu import Menu
+from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.rivals import rivals_of
 from toolpath_stiff.planning.rows import plan_csv, plan_rows
-from toolpath_stiff.planning.visits import Costs, Menu
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
 from toolpath_stiff.rig import exercise
@@ -220,7 +221,7 @@ def _plan(diagnosis: Diagnosis, poses: int) -> RivalPlan | None:
         return None
     noise = (float(np.sqrt(np.mean(judgement.noise.repeat**2))), judgement.noise.clamping)
     return plan_measurements(
-        diagnosis.machine, rivals, noise, poses, menu=Menu.of(diagnosis.data), costs=Costs(), seed=0,
+        diagnosis.machine, rivals, noise, poses, menu=Menu.of(diagnosis.data), seed=0,
         strut_spread=judgement.noise.strut_spread,
     )  # fmt: skip
 

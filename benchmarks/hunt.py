@@ -27,7 +27,7 @@ from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.linuxcnc.reader import refusal
-from toolpath_stiff.nc.moves import MOTION_NAMES, Program
+from toolpath_stiff.nc.moves import MOTION_NAMES, ReadProgram
 from toolpath_stiff.nc.reader import read_program
 from toolpath_stiff.nc.words import split_lines
 
@@ -55,7 +55,7 @@ class Outcome:
     text: str
 
 
-def our_moves(program: Program) -> list[Move]:
+def our_moves(program: ReadProgram) -> list[Move]:
     """Moves in control coordinates, mm and degrees, as the witness has them."""
     moves, origin = program.moves, np.array(program.origin[:3]) * 1e3
     found: list[Move] = []
@@ -143,7 +143,7 @@ def hunt_one(text: str, folder: Path, controller: Controller = UNKNOWN_CONTROL) 
     return Outcome(REFUSED, "too many lines", text)
 
 
-def _both_read(program: Program, theirs: rs274.Canon, text: str) -> Outcome:
+def _both_read(program: ReadProgram, theirs: rs274.Canon, text: str) -> Outcome:
     ours = our_moves(program)
     apart = difference(kept(ours, False), kept(theirs.moves, False))
     if apart:

@@ -23,15 +23,16 @@ from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.controller import read_controller
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program, read_program
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
+from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.fronts import apart
+from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.placing import place_program
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.rows import FIGURES
-from toolpath_stiff.placement.search import SearchRules
 from toolpath_stiff.placement.task import Task
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import closed_form
@@ -50,7 +51,7 @@ ENDS_RANDOM = 30  # programs of those that are random
 MODEL, LOAD = build_model(load_machine("nist")), parse_load("tangential")
 
 
-def shipped(name: str) -> Program:
+def shipped(name: str) -> ReadProgram:
     """A program of `programs/`."""
     controller = PROGRAMS / f"{Path(name).stem}.toml"
     reading = {"controller": read_controller(controller, None)} if controller.exists() else {}
@@ -59,7 +60,7 @@ def shipped(name: str) -> Program:
     return read_program(PROGRAMS / name, default_origin=MODEL.machine.default_origin, **reading)
 
 
-def random_program(seed: int) -> Program:
+def random_program(seed: int) -> ReadProgram:
     """A small program: rapids at some height, plunges, straight cuts, arcs, ramps, now and then a retract high up."""
     rng = np.random.default_rng(seed)
     size, lines = rng.uniform(20.0, 220.0), ["G21 G90 G17 F600"]
@@ -76,17 +77,17 @@ def random_program(seed: int) -> Program:
     return parse_program("\n".join([*lines, "M2", ""]), f"random {seed}", default_origin=MODEL.machine.default_origin)
 
 
-def placed(program: Program, step: float = 2e-3) -> Placement:
+def placed(program: ReadProgram, step: float = 2e-3) -> Placement:
     """The program placed as the README's command places it."""
 
-    def read(origin: tuple[float, ...]) -> Program:
+    def read(origin: tuple[float, ...]) -> ReadProgram:
         raise AssertionError("no program here goes to machine coordinates")
 
     present = program.origin
     return place_program(Task(MODEL, program, present, read, BOUNDS, SearchRules(), LOAD, step, 1000.0))
 
 
-def kept(program: Program) -> tuple[str, bool]:
+def kept(program: ReadProgram) -> tuple[str, bool]:
     """A row of the first table."""
     try:
         found = placed(program)
@@ -170,7 +171,7 @@ def against_grid(name: str) -> tuple[str, bool]:
     final = whole.figures(np.vstack([grid[nearest], BOUNDS.placements(np.array(polished))]))
     allowed = rules.violation(final) == 0.0
     by = float(np.where(allowed, dominance(final.objectives, ours), 0.0).max())
-    poses = found.search["pose_evaluations"]
+    poses = found.search.pose_evaluations
     times = cpu / (poses * kernel_seconds(bool(path.abc.any())))
     passed = by <= DOMINATED and times <= TIMES_KERNEL
     if name == "pocket.nc":
@@ -188,7 +189,7 @@ def against_grid(name: str) -> tuple[str, bool]:
     return row, passed
 
 
-def ends(program: Program) -> tuple[str, bool]:
+def ends(program: ReadProgram) -> tuple[str, bool]:
     """A row of the third table: each end of the front against Sobol points with a local search on the whole path."""
     from scipy.stats import qmc
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +21,16 @@ import numpy as np
 from benchmarks.bars import Figure, Record, share
 from benchmarks.case_loop import document, record_of, run_benchmark, run_cases, sound
 from benchmarks.pages import table
+from benchmarks.random_visits import random_visits
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.planning.gaps import SETTLED, plan_minutes
-from toolpath_stiff.planning.next_visit import TABLES, next_visit, tables_of
-from toolpath_stiff.planning.plan import RivalPlan, random_visits
+from toolpath_stiff.planning.menu import Menu
+from toolpath_stiff.planning.next_visit import next_visit
+from toolpath_stiff.planning.outlook import SETTLED
+from toolpath_stiff.planning.plan import RivalPlan
 from toolpath_stiff.planning.result import plan
 from toolpath_stiff.planning.rows import plan_csv, plan_rows
+from toolpath_stiff.planning.tables import TABLES, tables_of
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig.case import Case, again, draw_case
 from toolpath_stiff.rig.exercise import csv_text, read_plan
@@ -82,16 +85,16 @@ def _planned(seed: int, hidden: str, folder: Path) -> Record:
     before = diagnose(machine, data, plan_next=False)
     if before.verdict != "ambiguous" and hidden != "joint_compliance":
         return {}
-    proposal = plan(machine, data, n=POSES, indicators=True, judgement=before.main)
+    proposal = plan(machine, data, replace(Menu.of(data), indicators=True), n=POSES, judgement=before.main)
     assert isinstance(proposal.choice, RivalPlan)
-    (folder / TABLES).write_bytes(tables_of(proposal))
+    (folder / TABLES).write_bytes(tables_of(proposal.choice))
     visits, chosen = proposal.choice.visits, proposal.choice.chosen
     minutes, files = [], list[str]()
     for name, some in (("plan", chosen), ("random", random_visits(proposal.choice, POSES, seed))):
         taken = [_measured(case, proposal.choice, visit, folder / f"{name}{k}.csv", k) for k, visit in enumerate(some)]
         files = files or taken
         needed = _needed(folder, taken)
-        minutes.append(plan_minutes(visits, some[:needed], proposal.costs, proposal.menu))
+        minutes.append(visits.minutes(some[:needed]))
     after = diagnose(machine, read_measurements([str(tip), *files], machine), plan_next=False)
     outlook = proposal.choice.after
     rivals = [rival.name for rival in proposal.choice.rivals]

@@ -90,7 +90,7 @@ def one_by_one(text: str) -> None:
     """Our reader without its fast way."""
     from toolpath_stiff.nc.frames import Frames
     from toolpath_stiff.nc.program_run import ProgramRun
-    from toolpath_stiff.nc.reader import ZERO
+    from toolpath_stiff.nc.request import ZERO
     from toolpath_stiff.nc.state import State
     from toolpath_stiff.nc.tables import Offsets
     from toolpath_stiff.nc.words import split_lines

@@ -152,24 +152,24 @@ def joint_columns_are_shared() -> Iterator[None]:
     """What displaced joints do to readings hangs on the machine and on how they are taken: once a process for each."""
     from tests.updating.cases import joint_columns_once
     from toolpath_stiff.inference.prediction import Predictor
-    from toolpath_stiff.planning import rivals
-    from toolpath_stiff.stiffness.guard import is_foreign
+    from toolpath_stiff.planning import forecasts
+    from toolpath_stiff.stiffness.effect_source import is_foreign
 
-    of_readings, of_plan = Predictor.joint_columns, rivals.joint_columns
+    of_readings, of_plan = Predictor.joint_columns, forecasts.joint_columns
 
     def for_readings(own: Predictor) -> FloatArray:
         """`Predictor.joint_columns`."""
         return joint_columns_once("readings", own.machine, own.data, lambda: of_readings(own), own.effect_files)
 
     def for_plan(model: StiffnessModel, readings: Measurements) -> FloatArray:
-        """`rivals.joint_columns`."""
+        """`forecasts.joint_columns`."""
         if model.given is None or any(is_foreign(one.effect) for one in (*model.effects, *model.instruments)):
             return of_plan(model, readings)
         return joint_columns_once("plan", model.given, readings, lambda: of_plan(model, readings))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Predictor, "joint_columns", for_readings)
-        patch.setattr(rivals, "joint_columns", for_plan)
+        patch.setattr(forecasts, "joint_columns", for_plan)
         yield
 
 

@@ -13,7 +13,7 @@ import toolpath_stiff as tps
 from toolpath_stiff.analysis import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.placement.case_study import LOW_MM, case_study_program, origin_of, run_case_study
+from toolpath_stiff.placement.case_study import LOW_MM, case_study_program, conclusions, origin_of, run_case_study
 from toolpath_stiff.stiffness.model import build_model
 
 ROOT = Path(__file__).parent.parent
@@ -53,11 +53,8 @@ def test_the_papers_three_conclusions(study):
 
 
 def test_a_false_conclusion_would_be_told(study):
-    from toolpath_stiff.placement.case_study import _conclusions
-
-    figures = {row["region"]: dict(row) for row in study.summary["regions"]}
-    figures["3"]["mean_N_per_mm"] = 1.0
-    assert [found["holds"] for found in _conclusions(figures)] == [False, True, False]
+    rows = [row | ({"mean_N_per_mm": 1.0} if row["region"] == "3" else {}) for row in study.summary["regions"]]
+    assert [found["holds"] for found in conclusions(rows)] == [False, True, False]
 
 
 def test_where_the_conclusions_stop_holding(study):

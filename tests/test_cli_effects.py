@@ -13,10 +13,11 @@ import pytest
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine, parse_machine
 from toolpath_stiff.stiffness import catalogue as registry
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import LINKS
 from toolpath_stiff.stiffness.core import tip_compliance
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.stiffness.model import build_model
 
 
 @pytest.fixture

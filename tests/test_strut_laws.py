@@ -17,14 +17,14 @@ from toolpath_stiff.correction.strut_law import minimise_mean_error
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor, at_both_ends, scaled_law
 from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
-from toolpath_stiff.machine.model import Machine, with_parameter
+from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.readings.measurements import Measurements, read_measurements
 from toolpath_stiff.report.compare.page import text as compare_text
 from toolpath_stiff.report.machine import machine_figures
 from toolpath_stiff.report.update.page import text as update_text
-from toolpath_stiff.rig import case, exercise
+from toolpath_stiff.rig import campaigns, case, exercise
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import parse_nominal
 from toolpath_stiff.rotations import rotation_matrices
@@ -222,7 +222,7 @@ def test_a_parameter_of_a_constant_law():
     uncertain = f'\n[uncertainty]\nparameters = ["{name}"]\nsd = [2.0]\ncorrelation = [[1.0]]\n'
     machine = parse_machine(text_with(CONSTANT) + uncertain)
     assert machine.uncertainty.names == (name,)
-    assert set(with_parameter(machine, name, 1.0).strut_law.stiffness(np.array([2.3, 3.5])).tolist()) == {41e6}
+    assert set(machine.strut_law.moved(name, 1.0).stiffness(np.array([2.3, 3.5])).tolist()) == {41e6}
     assert with_parameter_moved(build_model(machine), name, 1.0).machine.strut_law.stiffness_1 == 41e6
     with pytest.raises(InputError, match=r"is not a parameter of this file; expected one of strut_law\.stiffness_1"):
         parse_machine(NIST + uncertain)
@@ -246,7 +246,7 @@ def campaign(law: str) -> tuple[str, Measurements]:
 def test_the_rig_reads_the_law_by_itself(law):
     """Readings of the nominal machine are those of the model: two programs that share no stiffness code."""
     machine, (data, nominal) = machine_with(law), (campaign(law)[1], parse_nominal(text_with(law), "mine.toml"))
-    rows = case.rows_of(case.paper_campaign())
+    rows = case.rows_of(campaigns.paper_campaign())
     plain = readings(nominal, HiddenMachine(), rows)
     modelled = np.exp(Predictor(machine, data).log_stiffness())
     np.testing.assert_allclose(plain, modelled, rtol=1e-9)
@@ -270,7 +270,7 @@ def test_update_refits_the_law_in_its_own_form(law, tmp_path):
     assert ends[0]["stiffness"] == pytest.approx(found.stiffness_1 / 1e6, rel=1e-4)
     if truth.constant:
         assert len(ends) == 1 and ends[0]["length_mm"] is None
-    said = update_text(update.to_dict())
+    said = update_text(update)
     assert ("N/um at every length" in said) == truth.constant
     assert ("N/um at 2561.6 mm and" in said) != truth.constant
 

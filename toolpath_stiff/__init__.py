@@ -28,42 +28,36 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.by_hand import Preview as Preview
     from toolpath_stiff.api.by_hand import preview as preview
     from toolpath_stiff.api.case_studies import case_study as case_study
-    from toolpath_stiff.api.correction import Update as Update
     from toolpath_stiff.api.correction import plan as plan
     from toolpath_stiff.api.correction import update as update
     from toolpath_stiff.api.diagnosis import Measurements as Measurements
     from toolpath_stiff.api.diagnosis import compare as compare
     from toolpath_stiff.api.diagnosis import diagnose as diagnose
-    from toolpath_stiff.api.effects import EffectDraft as EffectDraft
-    from toolpath_stiff.api.effects import EffectFile as EffectFile
     from toolpath_stiff.api.effects import check_effects as check_effects
     from toolpath_stiff.api.effects import draft_effect as draft_effect
     from toolpath_stiff.api.effects import effect_template as effect_template
     from toolpath_stiff.api.effects import effects as effects
-    from toolpath_stiff.api.inputs import Program as Program
+    from toolpath_stiff.api.machine_files import MachineFile as MachineFile
+    from toolpath_stiff.api.machine_files import machine_from_linuxcnc as machine_from_linuxcnc
+    from toolpath_stiff.api.machine_files import machine_template as machine_template
+    from toolpath_stiff.api.machine_files import recover_geometry as recover_geometry
     from toolpath_stiff.api.machines import Machine as Machine
-    from toolpath_stiff.api.machines import MachineFile as MachineFile
-    from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
-    from toolpath_stiff.api.machines import machine_template as machine_template
-    from toolpath_stiff.api.machines import recover_geometry as recover_geometry
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
-    from toolpath_stiff.api.next_visits import next_visit as next_visit
-    from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
-    from toolpath_stiff.api.placements import RewrittenProgram as RewrittenProgram
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
     from toolpath_stiff.api.placements import try_placement as try_placement
     from toolpath_stiff.api.poses import map_stiffness as map_stiffness
     from toolpath_stiff.api.poses import pose as pose
     from toolpath_stiff.api.poses import read_poses as read_poses
-    from toolpath_stiff.api.programs import SampledPath as SampledPath
     from toolpath_stiff.api.programs import analyze as analyze
     from toolpath_stiff.api.programs import check as check
     from toolpath_stiff.api.programs import sample_path as sample_path
     from toolpath_stiff.case.case import Case as Case
     from toolpath_stiff.comparison.compare import Comparison as Comparison
+    from toolpath_stiff.correction.draft import EffectDraft as EffectDraft
+    from toolpath_stiff.correction.result import Update as Update
     from toolpath_stiff.diagnosis.result import Diagnosis as Diagnosis
     from toolpath_stiff.errors import EffectError as EffectError
     from toolpath_stiff.errors import EffectFault as EffectFault
@@ -77,15 +71,21 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import TableError as TableError
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
+    from toolpath_stiff.nc.program import Program as Program
+    from toolpath_stiff.path import SampledPath as SampledPath
     from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
+    from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
     from toolpath_stiff.placement.result import Placement as Placement
     from toolpath_stiff.planning.next_visit import NextVisit as NextVisit
+    from toolpath_stiff.planning.next_visit import next_visit as next_visit
     from toolpath_stiff.planning.result import Plan as Plan
     from toolpath_stiff.readings.raw import Reduction as Reduction
     from toolpath_stiff.readings.raw import reduce as reduce
+    from toolpath_stiff.rewriting.program import RewrittenProgram as RewrittenProgram
     from toolpath_stiff.stiffness.catalogue import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.stiffness.contract import Effect as Effect
     from toolpath_stiff.stiffness.contract import Parameter as Parameter
+    from toolpath_stiff.stiffness.effect_file import EffectFile as EffectFile
     from toolpath_stiff.stiffness.trial import EffectCheck as EffectCheck
 
 __version__ = _VERSION
@@ -99,30 +99,36 @@ _PUBLIC = {
     "analysis.results": ("Analysis",),
     "api.by_hand": ("Preview", "preview"),
     "api.case_studies": ("case_study",),
-    "api.correction": ("Update", "plan", "update"),
+    "api.correction": ("plan", "update"),
     "api.diagnosis": ("Measurements", "compare", "diagnose"),
-    "api.effects": ("EffectDraft", "EffectFile", "check_effects", "draft_effect", "effect_template", "effects"),
-    "api.inputs": ("Program",),
-    "api.machines": ("Machine", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
+    "api.effects": ("check_effects", "draft_effect", "effect_template", "effects"),
+    "api.machine_files": ("MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
+    "api.machines": ("Machine",),
     "api.many": ("ManyAnalyses", "analyze_many"),
-    "api.next_visits": ("next_visit",),
-    "api.placements": ("KeepOut", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement"),
+    "api.placements": ("PlacementTrial", "place", "rewrite", "try_placement"),
     "api.poses": ("map_stiffness", "pose", "read_poses"),
-    "api.programs": ("SampledPath", "analyze", "check", "sample_path"),
+    "api.programs": ("analyze", "check", "sample_path"),
     "case.case": ("Case",),
     "comparison.compare": ("Comparison",),
+    "correction.draft": ("EffectDraft",),
+    "correction.result": ("Update",),
     "diagnosis.result": ("Diagnosis",),
     "errors": (
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
+    "nc.program": ("Program",),
+    "path": ("SampledPath",),
     "placement.case_study": ("CaseStudy",),
+    "placement.keep_out": ("KeepOut",),
     "placement.result": ("Placement",),
-    "planning.next_visit": ("NextVisit",),
+    "planning.next_visit": ("NextVisit", "next_visit"),
     "planning.result": ("Plan",),
     "readings.raw": ("Reduction", "reduce"),
+    "rewriting.program": ("RewrittenProgram",),
     "stiffness.catalogue": ("EffectCatalogue",),
     "stiffness.contract": ("Effect", "Parameter"),
+    "stiffness.effect_file": ("EffectFile",),
     "stiffness.trial": ("EffectCheck",),
 }  # fmt: skip
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}

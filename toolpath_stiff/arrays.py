@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,3 +25,22 @@ def product(left: FloatArray, right: FloatArray) -> FloatArray:
     for i in range(1, left.shape[-1]):
         total += left[..., :, i, None] * right[..., None, i, :]
     return np.asarray(total)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Arrays with a row each for the same things; a field that is no array holds for all of them."""
+
+    def take(self, rows: IntArray | BoolArray | slice) -> Self:
+        """Some of the rows."""
+        return replace(self, **{name: values[rows] for name, values in self._arrays().items()})
+
+    def _arrays(self) -> dict[str, AnyArray]:
+        columns = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: values for name, values in columns.items() if isinstance(values, np.ndarray)}
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """The rows of one after those of the other."""
+        names = parts[0]._arrays()
+        return replace(parts[0], **{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})

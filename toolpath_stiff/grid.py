@@ -29,8 +29,8 @@ def typed(cell: str) -> str:
 
     The apostrophe that keeps spreadsheets from running a word (`column_files.csv_text`) is no part of the word.
     """
-    found = cell.strip().replace("\u2212", "-")
-    return found[1:] if found[:2] in ("'=", "'+", "'-", "'@") else found
+    text = cell.strip().replace("\u2212", "-")
+    return text[1:] if text[:2] in ("'=", "'+", "'-", "'@") else text
 
 
 def counts(cells: list[str]) -> bool:

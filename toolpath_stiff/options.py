@@ -9,6 +9,7 @@ from __future__ import annotations
 import builtins
 import inspect
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
@@ -17,6 +18,7 @@ from typing import Any, TypeVar, cast, get_args, get_type_hints
 from toolpath_stiff.errors import InputError
 
 F = TypeVar("F", bound=Callable[..., Any])
+SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
 
 
 @dataclass(frozen=True)
@@ -208,6 +210,15 @@ def low_high(text: str) -> tuple[float, float]:
     if low > high:
         raise ValueError(f"LO:HI, but the lower bound {low:g} is above the upper bound {high:g}")
     return low, high
+
+
+def switches(text: str) -> frozenset[int] | bool:
+    """Block-delete switches, `2,3`; nothing, what the option means alone."""
+    if not text:
+        return True
+    if not SWITCHES.fullmatch(text):
+        raise ValueError("switches 1 to 9, as 2,3")
+    return frozenset(map(int, text.split(",")))
 
 
 def names(text: str) -> tuple[str, ...]:

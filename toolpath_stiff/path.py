@@ -9,19 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
+from toolpath_stiff.column_files import csv_pieces
 from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves, held_once
+from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import along_tool_axis, roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
 BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
@@ -103,9 +111,6 @@ class Samples:
         return Samples(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
 
-# -- placing -----------------------------------------------------------------------------------------------------------
-
-
 def place(moves: Moves, origin: ArrayLike) -> Moves:
     r"""Moves in machine coordinates, positions only.
 
@@ -162,9 +167,6 @@ def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
         return abc  # a vertical platform never yaws
     turn, back = rotation_matrices(angles), rotation_about_z(-angles[2])
     return roll_pitch_yaw(product(product(turn, rotation_matrices(abc)), back))
-
-
-# -- sampling ----------------------------------------------------------------------------------------------------------
 
 
 def move_durations(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> FloatArray:
@@ -330,20 +332,9 @@ def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> 
 
 
 def _empty_samples(n: int) -> Samples:
-    return Samples(
-        move=np.empty(n, dtype=np.int64),
-        line=np.empty(n, dtype=np.int64),
-        motion=np.empty(n, dtype=np.int64),
-        tool=np.empty(n, dtype=np.int64),
-        tool_length=np.empty(n),
-        s=np.empty(n),
-        t=np.empty(n),
-        position=np.empty((n, 3)),
-        abc=np.zeros((n, 3)),
-        tangent=np.empty((n, 3)),
-        weight=np.empty(n),
-        feed=np.empty(n),
-    )
+    columns: dict[str, NDArray[Any]] = {name: np.empty(n) for name in ("tool_length", "s", "t", "weight", "feed")}
+    columns |= {name: np.empty(n, dtype=np.int64) for name in ("move", "line", "motion", "tool")}
+    return Samples(**columns, position=np.empty((n, 3)), abc=np.zeros((n, 3)), tangent=np.empty((n, 3)))
 
 
 def _sample_block(
@@ -411,22 +402,11 @@ def _durations(moves: Moves, length: FloatArray, turn: FloatArray, rapid_feed: f
     return np.asarray(distance / np.where(feed > 0.0, feed, 1.0))
 
 
-# -- as a table --------------------------------------------------------------------------------------------------------
-
 # Column -> decimals; None: a whole number or a word. A millionth of a millimetre is finer than any machine and
 # lets sums over a long path keep their digits.
 PATH_COLUMNS: dict[str, int | None] = {
-    "line": None,
-    "motion": None,
-    "tool": None,
-    "s_mm": 6,
-    "t_s": 6,
-    "x_mm": 6,
-    "y_mm": 6,
-    "z_mm": 6,
-    "a_deg": 6,
-    "b_deg": 6,
-    "c_deg": 6,
+    **dict.fromkeys(("line", "motion", "tool")),
+    **dict.fromkeys(("s_mm", "t_s", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"), 6),
     "feed_mm_per_min": 3,
 }
 
@@ -442,18 +422,81 @@ def path_columns(samples: Samples, rows: slice = slice(None)) -> dict[str, NDArr
     >>> columns["x_mm"].tolist(), columns["motion"].tolist()
     ([0.0, 20.0, 40.0], ['feed', 'feed', 'feed'])
     """
-    position, abc = mm_from_m(samples.position[rows]), deg_from_rad(samples.abc[rows])
+    axes = zip("xyz", mm_from_m(samples.position[rows]).T, strict=True)
+    angles = zip("abc", deg_from_rad(samples.abc[rows]).T, strict=True)
     return {
         "line": samples.line[rows],
         "motion": np.array(MOTION_NAMES)[samples.motion[rows]],
         "tool": samples.tool[rows],
         "s_mm": mm_from_m(samples.s[rows]),
         "t_s": samples.t[rows],
-        "x_mm": position[:, 0],
-        "y_mm": position[:, 1],
-        "z_mm": position[:, 2],
-        "a_deg": abc[:, 0],
-        "b_deg": abc[:, 1],
-        "c_deg": abc[:, 2],
+        **{f"{axis}_mm": column for axis, column in axes},
+        **{f"{axis}_deg": column for axis, column in angles},
         "feed_mm_per_min": mm_per_min_from_m_per_s(samples.feed[rows]),
     }
+
+
+@dataclass(frozen=True, repr=False)
+class SampledPath(Result):
+    r"""The sampled path of a program, without a machine.
+
+    Attributes
+    ----------
+    samples
+        Arrays in SI.
+    name, warnings, unsupported
+        The program's; what deserves a look; "line:column: word: reason" of what was not acted upon.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> path = tps.sample_path(slot, step_mm=10)
+    >>> path
+    <SampledPath: slot.nc, 9 samples>
+    >>> path.to_dict()["x_mm"][-2:]
+    [30.0, 40.0]
+    >>> b"".join(path.csv()).decode().splitlines()[0][:26]
+    'line,motion,tool,s_mm,t_s,'
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path.save(pathlib.Path(folder, "path.csv")).name
+    'path.csv'
+    """
+
+    command: ClassVar[str] = "path"
+
+    name: str
+    samples: Samples
+    warnings: list[str]
+    unsupported: list[str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        columns = self.to_frame()
+        return {
+            "program": self.name,
+            "warnings": self.warnings,
+            "unsupported": self.unsupported,
+            **{str(name): columns[name].astype(object).where(columns[name].notna(), None).tolist() for name in columns},
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """The samples, one a row."""
+        import pandas as pd
+
+        return pd.DataFrame(path_columns(self.samples))
+
+    def csv(self) -> Iterator[bytes]:
+        """The table as the command writes it, in pieces."""
+        return csv_pieces(partial(path_columns, self.samples), len(self.samples), PATH_COLUMNS)
+
+    def __str__(self) -> str:
+        return b"".join(self.csv()).decode()
+
+    def _short(self) -> str:
+        return f"{self.name}, {len(self.samples)} samples"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the table as CSV, whole or not at all."""
+        return write_atomically(file, self.csv())

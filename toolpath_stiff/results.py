@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
+from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.results_folder import Rules, write_folder
 
 if TYPE_CHECKING:
@@ -114,7 +114,6 @@ class FolderResult(Result):
 
     inputs: tuple[str, ...] = ()  # files that were read, which must not be written over
 
-    @abstractmethod
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """Name -> content, or what makes it, of every file that `save` writes; pictures and pages with `plots`.
 
@@ -124,6 +123,8 @@ class FolderResult(Result):
         >>> list(tps.map_stiffness("nist", points=5).files())
         ['map.csv', 'map.json', 'map.png', 'map.html']
         """
+        contents: Mapping[str, Content | Callable[[], Content]] = self.view.files(self, plots=plots)
+        return contents
 
     def save(
         self,
@@ -175,6 +176,32 @@ class FolderResult(Result):
             command=self.command,
             rules=rules or Rules(inputs=self.inputs, replace=replace),
         )
+
+
+class TextFile(Result):
+    """A result that is the text of a file: `print` shows it, `save` writes it."""
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name, self.text = name, text
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _short(self) -> str:
+        return f"{self.name}, {len(self.text.splitlines())} lines"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the file, whole or not at all.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     tps.machine_template("mill.toml").save(pathlib.Path(folder, "mill.toml")).name
+        'mill.toml'
+        """
+        return write_atomically(file, self.text)
 
 
 class TextResult(Result):

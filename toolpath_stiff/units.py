@@ -8,6 +8,7 @@ costs nothing at start-up. What is written is rounded here too (`json_number`, `
 from __future__ import annotations
 
 import math
+from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
@@ -119,8 +120,6 @@ def pose_in_si(pose: ShopPose) -> Pose:
     return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))
 
 
-# -- figures as they are written ---------------------------------------------------------------------------------------
-#
 # Sums run in another order on another CPU, and searches stop within a tolerance: digits beyond these are not certain.
 
 DIGITS = 5  # significant digits of a fitted figure
@@ -142,10 +141,12 @@ def json_number(value: float, digits: int = DIGITS) -> float | None:
     return float(f"{value:.{digits}g}") if math.isfinite(value) else None
 
 
-def certain(found: Any) -> Any:
-    """A document with its floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
-    if isinstance(found, float):
-        return float(f"{round(found, DECIMALS):.{CERTAIN}g}") + 0.0
-    if isinstance(found, dict):
-        return {key: certain(value) for key, value in found.items()}
-    return [certain(value) for value in found] if isinstance(found, list | tuple) else found
+def certain(value: Any) -> Any:
+    """The same, its floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
+    if isinstance(value, float):
+        return float(f"{round(value, DECIMALS):.{CERTAIN}g}") + 0.0
+    if isinstance(value, dict):
+        return {key: certain(part) for key, part in value.items()}
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{field.name: certain(getattr(value, field.name)) for field in fields(value)})
+    return [certain(part) for part in value] if isinstance(value, list | tuple) else value

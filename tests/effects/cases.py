@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from tests.stiffness.cases import nist, table_1_positions
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import Effect
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, load_path
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model, load_path
 
 FloatArray = NDArray[np.float64]
 CATALOGUE = (

@@ -11,11 +11,13 @@ import pytest
 from tests.effects.cases import CATALOGUE, all_effects, model_with
 from tests.stiffness.cases import nist
 from toolpath_stiff.readings.measurements import model_stiffness, read_measurements
-from toolpath_stiff.rig.case import rows_of, tilted_campaign
+from toolpath_stiff.rig.campaigns import tilted_campaign
+from toolpath_stiff.rig.case import rows_of
 from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model
+from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model
 
 SIZES = {
     "spindle_compliance": {"radial": 5.0, "axial": 2.0},

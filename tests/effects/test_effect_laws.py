@@ -16,8 +16,9 @@ from tests.stiffness.cases import nist, random_poses
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import parse_machine
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model, load_path
+from toolpath_stiff.stiffness.model import build_model, load_path
 
 NIST_TEXT = (resources.files("toolpath_stiff") / "data" / "machines" / "nist.toml").read_text("utf-8")
 SOFTENING = (

@@ -11,9 +11,10 @@ import pytest
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import EffectFault, InputError
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import MOST_FILES, _loaded, effects_from_file, known_effects
 from toolpath_stiff.stiffness.core import tip_compliance
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.stiffness.trial import try_effect, unit_in_si
 
 SOURCE = """\

@@ -170,10 +170,8 @@ def test_forward_kinematics_with_another_tool():
 
 @pytest.mark.parametrize("tool", [np.nan, 0.25])
 @pytest.mark.parametrize("tilted", [False, True])
-def test_a_gauge_says_what_reach_says(tilted, tool):
+def test_extremes_say_what_reach_says(tilted, tool):
     """Margins from lengths and determinants that are known, against every joint's angle by Kahan's formula."""
-    from toolpath_stiff.machine.limits import gauge_of
-
     rng = np.random.default_rng(8)
     position = np.column_stack([rng.uniform(-0.6, 0.6, (2000, 2)), rng.uniform(0.1, 1.6, 2000)])  # and out of reach
     turn = rotation_matrices(rng.uniform(-0.3, 0.3, (2000, 3))) if tilted else None
@@ -183,22 +181,21 @@ def test_a_gauge_says_what_reach_says(tilted, tool):
         determinant = np.abs(np.linalg.det(struts.jacobian))
         wanted = reach(machine, position, struts, turn)
         known = (np.ascontiguousarray(position.T), np.ascontiguousarray(struts.lengths.T), determinant, columns, tool)
-        found, sure = gauge_of(machine).reach(*known)
+        found, sure = Extremes(machine, *known).reach()
         assert sure.mean() > 0.5 and (sure | (wanted.value < 0.21)).all()  # 0.2 rad has a cosine of 0.98
         np.testing.assert_allclose(found.margin[sure], wanted.margin[sure], rtol=1e-11, atol=1e-14)
         np.testing.assert_allclose(found.value[sure], wanted.value[sure], rtol=1e-13)
         np.testing.assert_array_equal(found.limit[sure], wanted.limit[sure])
         np.testing.assert_array_equal(found.reachable, wanted.reachable)
-        np.testing.assert_allclose(Extremes(gauge_of(machine), *known).margin, wanted.margin, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(Extremes(machine, *known).margin, wanted.margin, rtol=1e-7, atol=1e-7)
 
 
-def test_a_gauge_leaves_an_angle_near_zero_to_the_exact_formula():
+def test_extremes_leave_an_angle_near_zero_to_the_exact_formula():
     """At the neutral pose all angles are zero, of which a cosine of 1 knows eight digits."""
-    from toolpath_stiff.machine.limits import gauge_of
-
     machine = NIST.with_changes(limits=Limits(neutral_pose=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0), frame_joint_angle=1e-3))
     tip = np.array([[0.0, 0.0, 0.8], [1e-3, 0.0, 0.8]])
     struts = solve_struts(machine, tip)
     determinant = np.abs(np.linalg.det(struts.jacobian))
-    _, sure = gauge_of(machine).reach(tip.T, np.ascontiguousarray(struts.lengths.T), determinant, None, np.nan)
+    lengths = np.ascontiguousarray(struts.lengths.T)
+    _, sure = Extremes(machine, tip.T, lengths, determinant, None, np.nan).reach()
     assert not sure.any()

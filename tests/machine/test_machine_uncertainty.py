@@ -7,8 +7,9 @@ import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine, parse_machine
-from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty, with_parameter
+from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty
 from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.stiffness.model import build_model, with_parameter_moved
 
 RADIAL = "spindle_compliance.radial_nm_per_N"
 COVARIANCE = np.array([[0.25, 0.03, -0.04], [0.03, 0.16, 0.01], [-0.04, 0.01, 0.09]])
@@ -37,13 +38,14 @@ def test_written_and_read_back(updated):
 
 
 def test_a_parameter_moved(updated):
-    moved = with_parameter(updated, RADIAL, 0.5)
-    assert moved.effects[0].parameters == {"radial_nm_per_N": 5.75, "axial_nm_per_N": 0.0}
-    stiffer = with_parameter(updated, STRUT_LAW[1], 2.0)
+    model = build_model(updated)
+    moved = with_parameter_moved(model, RADIAL, 0.5)
+    assert moved.effects[0].values == pytest.approx({"radial": 5.75e-9, "axial": 0.0})
+    stiffer = with_parameter_moved(model, STRUT_LAW[1], 2.0).machine
     assert stiffer.strut_law.stiffness_2 == pytest.approx(34.5e6)
     assert stiffer.strut_law.stiffness_1 == updated.strut_law.stiffness_1
     with pytest.raises(InputError, match="no parameter"):
-        with_parameter(updated, "weak_strut.factor", 0.1)
+        with_parameter_moved(model, "weak_strut.factor", 0.1)
 
 
 def test_joined_and_parted(updated):

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 
 MM = 1e-3
 START = "UNITS/MM\nFEDRAT/600,MMPM\n"
 
 
-def read(text: str, **options) -> Program:
+def read(text: str, **options) -> ReadProgram:
     return parse_program(text, "part.apt", **options)
 
 

@@ -10,7 +10,7 @@ from benchmarks import conformance
 from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import assert_same_path, debian_programs
 from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 
 ARC = "G1 X10 F100\nG2 X30 I10\nG1 X40 A5\n"
@@ -43,7 +43,7 @@ class Installed:
         self.readings[file, interpreter] = found = self.original(file, control, interpreter, rs274)
         return found
 
-    def read(self, file: Path, interpreter: str) -> Program | None:
+    def read(self, file: Path, interpreter: str) -> ReadProgram | None:
         """The program, or None where it is refused with file, line and column or makes no cut."""
         program, said = self.readings[file, interpreter]
         assert program or said == conformance.NONE or said.startswith(file.name), said

@@ -20,7 +20,7 @@ from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.words import looks_like_cutter_location
-from toolpath_stiff.rewriting.program import offset_blocks
+from toolpath_stiff.rewriting.offset_blocks import offset_blocks
 from toolpath_stiff.rotations import rotation_matrices
 
 FOLDER = Path(__file__).parents[2] / "programs"

@@ -13,7 +13,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL
 from toolpath_stiff.nc.linuxcnc import reader, runner
 from toolpath_stiff.nc.linuxcnc.runner import Limits
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.request import ZERO, Request
 from toolpath_stiff.nc.tables import Offsets
@@ -256,7 +256,7 @@ def test_a_program_is_not_changed_and_a_run_leaves_no_trace_in_the_next(tmp_path
     assert file.read_bytes() == before and list(tmp_path.iterdir()) == [file]
 
 
-def read_limited(text: str, limits: Limits, unconfined: bool = False) -> Program:
+def read_limited(text: str, limits: Limits, unconfined: bool = False) -> ReadProgram:
     program = (tuple(text.split("\n")), "part.nc", "", None, ZERO, Offsets(), None, False, "linuxcnc", None, unconfined)
     return reader.read(Request(*program, UNKNOWN_CONTROL), limits)
 

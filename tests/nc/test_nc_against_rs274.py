@@ -13,7 +13,7 @@ import pytest
 
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
-from toolpath_stiff.nc.moves import MOTION_NAMES, Program
+from toolpath_stiff.nc.moves import MOTION_NAMES, ReadProgram
 from toolpath_stiff.nc.reader import read_program
 
 pytestmark = pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
@@ -27,7 +27,7 @@ TABLE_RS274 = "".join(f"T{n} P{n} Z{z / 25.4:.8f} D0.25 ;\n" for n, z in TOOLS.i
 TABLE_OURS = "".join(f"T{n} P{n} Z{z} D6.35 ;\n" for n, z in TOOLS.items())
 
 
-def assert_same_path(program: Program, canon: rs274.Canon) -> None:
+def assert_same_path(program: ReadProgram, canon: rs274.Canon) -> None:
     """Same kinds, ends, arc axes and senses, move by move; moves shorter than the printed digits are left out."""
     moves, origin = program.moves, np.array(program.origin[:3]) * 1e3
     start, end = (np.hstack([p[:, :3] * 1e3 + origin, np.rad2deg(p[:, 3:])]) for p in (moves.start, moves.end))

@@ -281,7 +281,7 @@ def test_other_languages_are_refused_by_name(text, language, line):
 
 @given(st.text("GXYZABCIJKRLMFSTN0123456789.+- ()=;%/:", max_size=30))
 def test_plain_g_code_is_not_taken_for_another_language(noise):
-    from toolpath_stiff.nc.reader import language_of
+    from toolpath_stiff.nc.languages import language_of
 
     for line in ("N10 G1 X+10. Y-5. F100", "(L X+10 FMAX)", "; MSG(", "%", "O1234 (DEF REAL)", "T1 M6", "S1000 M3"):
         assert language_of(line) is None

@@ -8,7 +8,8 @@ import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import check_lines
-from toolpath_stiff.nc.reader import language_of, parse_program, read_program
+from toolpath_stiff.nc.languages import language_of
+from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.nc.words import LARGEST_FILE, LONGEST_LINE
 

@@ -17,7 +17,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import Controller, read_controller
 from toolpath_stiff.nc.geometry import move_lengths
-from toolpath_stiff.nc.moves import ARC, RAPID, Program
+from toolpath_stiff.nc.moves import ARC, RAPID, ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path import move_durations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
@@ -70,7 +70,7 @@ def axes_of(abc: np.ndarray) -> np.ndarray:
     return rotation_matrices(abc)[..., 2]
 
 
-def durations(program: Program) -> dict[int, float]:
+def durations(program: ReadProgram) -> dict[int, float]:
     """Line to the time of its moves, pauses included."""
     moves = program.moves
     times = move_durations(moves) + moves.dwell

@@ -10,7 +10,7 @@ import pytest
 from tests.nc.test_compensation import distance_to
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import Controller, dialect_named
-from toolpath_stiff.nc.moves import RAPID, Program
+from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.path import sample_moves
@@ -20,12 +20,12 @@ ROOT = math.sqrt(2.0)
 TOOLS = {1: ToolEntry(1, 50.0, 2 * RADIUS), 2: ToolEntry(2, 50.0, 9.525)}
 
 
-def read(text: str, dialect: str = "fanuc") -> Program:
+def read(text: str, dialect: str = "fanuc") -> ReadProgram:
     control = Controller(dialect_named(dialect), tools=TOOLS)
     return parse_program(f"G21 G90 G17 G94 F100.\n{text}\nM30\n", controller=control)
 
 
-def ends(program: Program) -> list[tuple[float, float]]:
+def ends(program: ReadProgram) -> list[tuple[float, float]]:
     moves = program.moves
     return [(round(x * 1e3, 6) + 0.0, round(y * 1e3, 6) + 0.0) for x, y in moves.end[moves.motion != RAPID][:, :2]]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolpath_stiff.nc.moves import RAPID, Program
+from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.path import place, place_orientations
 from toolpath_stiff.rotations import rotation_matrices
 
 
-def cutting_moves(program: Program, origin) -> list[tuple]:
+def cutting_moves(program: ReadProgram, origin) -> list[tuple]:
     """Start and end (m), their rotations, arc, line of every cutting move."""
     moves = place(program.moves, origin)
     moves = moves.take(moves.motion != RAPID)
@@ -19,7 +19,7 @@ def cutting_moves(program: Program, origin) -> list[tuple]:
     return list(zip(*columns, moves.line, strict=True))
 
 
-def assert_same_path(program: Program, placement, written: Program, origin, unit_mm: float) -> None:
+def assert_same_path(program: ReadProgram, placement, written: ReadProgram, origin, unit_mm: float) -> None:
     """The cutting moves of both lie on each other but for the rounding to `unit_mm` (mm and degrees).
 
     Half a unit per axis, of start and end each, is 1.7 units; a centre adds its own words and what an R may miss.

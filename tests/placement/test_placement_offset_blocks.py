@@ -13,7 +13,7 @@ from toolpath_stiff.analysis import analyze
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.path import place
-from toolpath_stiff.rewriting.program import offset_blocks
+from toolpath_stiff.rewriting.offset_blocks import offset_blocks
 
 PROGRAMS = Path(__file__).parents[2] / "programs"
 PLACEMENT = (0.030, -0.045, 0.900, 0.0, 0.0, math.radians(37.0))

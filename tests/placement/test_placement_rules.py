@@ -22,11 +22,15 @@ from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path import place
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
-from toolpath_stiff.placement.evaluator import Evaluator, Keepout
+from toolpath_stiff.placement.climb import Climber
+from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.fronts import apart
+from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
+from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.linear_programmes import least_costs
 from toolpath_stiff.placement.paths import representative_path, work_path
-from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
+from toolpath_stiff.placement.search import search_placements
+from toolpath_stiff.placement.working import NO_FLOORS, Search
 from toolpath_stiff.stiffness.model import build_model
 
 ROOT = Path(__file__).parents[2]
@@ -40,7 +44,7 @@ STEP = 8e-3  # m
 
 def searched(program, bounds=README_BOUNDS, present=PRESENT, step=STEP, read=None, **asked):
     path = work_path(program, step, TANGENTIAL, present, read)
-    return search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(**asked), present=np.array(present))
+    return search_placements(Search(MODEL, path, TANGENTIAL, bounds, SearchRules(**asked), present=np.array(present)))
 
 
 @pytest.mark.parametrize(
@@ -135,7 +139,7 @@ def test_the_first_rapid_starts_where_the_control_stands_now():
     turn = np.eye(3)[None]
     here = anchored.placed(turn, np.array([PRESENT[:3]]))[0]
     there = anchored.placed(turn, np.array([[0.2, 0.1, 1.0]]))[0]
-    at_start = np.flatnonzero((anchored.u == 0.0) & ~anchored.follows[0].any(axis=1))
+    at_start = np.flatnonzero((anchored.u == 0.0) & ~anchored.follows[:, 0].any(axis=1))
     assert len(at_start)
     np.testing.assert_allclose(there[at_start], here[at_start])
     np.testing.assert_allclose(here[at_start], np.tile(PRESENT[:3], (len(at_start), 1)))
@@ -204,13 +208,15 @@ def test_where_two_rapids_exclude_each_other_the_error_names_what_failed():
         return parse_program(text, "slabs.nc", origin=origin)
 
     slabs = (
-        Keepout("left", (-2.0, -2.0, 1.1), (0.01, 2.0, 1.12)),
-        Keepout("right", (-0.01, -2.0, 1.2), (2.0, 2.0, 1.22)),
+        KeepOut("left", (-2000, -2000, 1100), (10, 2000, 1120)),
+        KeepOut("right", (-10, -2000, 1200), (2000, 2000, 1220)),
     )
     path = work_path(read(PRESENT), STEP, TANGENTIAL, PRESENT, read)
     bounds = Bounds(np.array([-0.2, 0, 0.8, 0, 0, 0]), np.array([0.2, 0, 0.8, 0, 0, 0]))
     with pytest.raises(UnreachableError, match=r"the rapid of line [67] runs [1-9][\d.]* mm deep into the keep-out"):
-        search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=slabs), present=np.array(PRESENT))
+        search_placements(
+            Search(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=slabs), present=np.array(PRESENT))
+        )
 
 
 @pytest.mark.parametrize("margin", [0.01, 0.2])
@@ -315,7 +321,7 @@ def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt
         for first in firsts
     ]
     found = search_placements(
-        MODEL, path, TANGENTIAL, bounds, SearchRules(objective=objective, allow_extrapolation=True)
+        Search(MODEL, path, TANGENTIAL, bounds, SearchRules(objective=objective, allow_extrapolation=True))
     )
     best = max(np.nanmax(value), *polished)
     assert goal.value(found.best_figures)[0] >= best - 2e-3 * abs(best)
@@ -323,12 +329,12 @@ def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt
 
 def test_a_long_path_is_climbed_on_what_decides(monkeypatch):
     """With every path long, the recommendation is that of the climb on all samples, within two thousandths."""
-    from toolpath_stiff.placement import search
+    from toolpath_stiff.placement import ascents, search
 
     program, goal = program_of("pocket"), Goal(OBJECTIVES["balanced"], NO_FLOORS)
     bounds = Bounds(np.array([-0.1, -0.1, 0.9, 0, 0, 0.3]), np.array([0.1, 0.1, 1.2, 0, 0, 0.3]))
     whole = searched(program, bounds)
-    monkeypatch.setattr(search, "SHORT", 0)
+    monkeypatch.setattr(ascents, "SHORT", 0)
     monkeypatch.setattr(search, "WHOLE_POSES", 0)
     long = searched(program, bounds)
     value, wanted = (float(goal.value(found.best_figures)[0]) for found in (long, whole))

@@ -22,13 +22,19 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, front_rows, thin
-from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures
+from toolpath_stiff.placement.climb import Climber
+from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
+from toolpath_stiff.placement.fronts import front_rows, thin
+from toolpath_stiff.placement.goals import Bounds, Goal, SearchRules
+from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import placed_path, representative_path, work_path
 from toolpath_stiff.placement.result import nothing_better_words
-from toolpath_stiff.placement.search import SearchRules, search_placements
+from toolpath_stiff.placement.search import search_placements
+from toolpath_stiff.placement.task import SearchRecord
+from toolpath_stiff.placement.working import Search
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 ROOT = Path(__file__).parent.parent.parent
@@ -103,7 +109,7 @@ def test_no_placement_of_a_grid_is_better(name):
     x, y, z, c = (g.ravel() for g in np.meshgrid(*axes, indexing="ij"))
     grid = np.column_stack([x, y, z, 0 * x, 0 * x, c])
     brute = Evaluator(MODEL, path, TANGENTIAL, 1000.0).figures(grid)
-    found = search_placements(MODEL, path, TANGENTIAL, BOUNDS)
+    found = search_placements(Search(MODEL, path, TANGENTIAL, BOUNDS))
     kept = (brute.margin >= 0.01) & (brute.rapid_margin >= 0.01)
     best = float(np.max((brute.mean - brute.spread)[kept]))
     ours = float(found.best_figures.mean[0] - found.best_figures.spread[0])
@@ -141,13 +147,13 @@ def test_a_thinned_front_keeps_the_recommended_point_and_no_more_than_asked(poin
 
 def test_keep_outs_and_heights_are_kept():
     path = representative_path(work_path(program_of("case_study"), 5e-3), 60)
-    box = Keepout("vice", (-0.3, -0.3, 0.0), (0.0, 0.3, 2.0))
+    box = KeepOut("vice", (-300, -300, 0), (0, 300, 2000))
     bounds = Bounds(BOUNDS.low, BOUNDS.high, heights=(0.6, 0.8))
-    found = search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=(box,)))
+    found = search_placements(Search(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=(box,))))
 
     for placement in found.front:
         position = placed_path(path, placement)[0]
-        assert not ((position > box.low) & (position < box.high)).all(axis=1).any()
+        assert not ((position > box.corners[0]) & (position < box.corners[1])).all(axis=1).any()
         assert placement[2] in (0.6, 0.8)
 
 
@@ -155,13 +161,13 @@ def test_keep_outs_and_heights_are_kept():
     ("bounds", "keepouts", "words"),
     [
         (Bounds(np.array([2.0, 0, 0.8, 0, 0, 0]), np.array([2.2, 0.1, 0.9, 0, 0, 1.0])), (), "breaks a limit"),
-        (BOUNDS, (Keepout("everything", (-9, -9, -9), (9, 9, 9)),), "into the keep-out everything"),
+        (BOUNDS, (KeepOut("everything", (-9000, -9000, -9000), (9000, 9000, 9000)),), "into the keep-out everything"),
     ],
 )
 def test_nothing_feasible_says_why(bounds, keepouts, words):
     path = representative_path(work_path(program_of("case_study"), 5e-3), 40)
     with pytest.raises(InputError) as caught:
-        search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=keepouts))
+        search_placements(Search(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=keepouts)))
     assert words in str(caught.value)
 
 
@@ -304,7 +310,7 @@ def test_objectives_agree_on_one_front_and_its_ends_are_the_ends():
     path = wide_path("plunges")
     present = np.array(PRESENT)
     found = [
-        search_placements(MODEL, path, TANGENTIAL, WIDE, SearchRules(objective=name), present=present)
+        search_placements(Search(MODEL, path, TANGENTIAL, WIDE, SearchRules(objective=name), present=present))
         for name in ("balanced", "range")
     ]
     one, other = (result.figures.objectives.max(axis=0) for result in found)
@@ -327,12 +333,12 @@ def test_nothing_better_is_said_first_with_how_hard_it_was_looked_for():
     program = program_of("drilling")
     here = np.array(PRESENT)
     path = work_path(program, 4e-3, TANGENTIAL, PRESENT)
-    best = search_placements(MODEL, path, TANGENTIAL, Bounds(here, here + np.array([0, 0, 0.3, 0, 0, 0])))
+    best = search_placements(Search(MODEL, path, TANGENTIAL, Bounds(here, here + np.array([0, 0, 0.3, 0, 0, 0]))))
     at = best.front[-1]
     close = Bounds(at, at + np.array([0, 0, 1e-9, 0, 0, 0]))
-    found = search_placements(MODEL, path, TANGENTIAL, close, present=at)
+    found = search_placements(Search(MODEL, path, TANGENTIAL, close, present=at))
     assert found.alone and found.searches == 3
-    told = nothing_better_words({"searches": found.searches, "pose_evaluations": found.pose_evaluations})
+    told = nothing_better_words(SearchRecord("", "", {}, 1, (), found.pose_evaluations, found.searches))
     assert f"3 searches from the beginning, {found.pose_evaluations} poses" in told
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from tests.moves_factory import make_moves
 from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.nc.moves import RAPID, Program, ToolUse, Unsupported
+from toolpath_stiff.nc.moves import RAPID, ReadProgram, ToolUse, Unsupported
 
 
 def make_analysis(
@@ -22,7 +22,7 @@ def make_analysis(
 ) -> Analysis:
     rows = make_moves(moves)
     lines = source or [f"G1 X{end[0] * 1e3:.3f} Y{end[1] * 1e3:.3f} Z{end[2] * 1e3:.3f}" for end in rows.end]
-    program = Program(
+    program = ReadProgram(
         name=name,
         path=name,
         source=tuple(lines),

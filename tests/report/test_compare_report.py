@@ -20,7 +20,7 @@ from toolpath_stiff.comparison.compare import Comparison, compare
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.readings.measurements import Measurements
-from toolpath_stiff.report.compare.page import QUESTIONS, compare_html, compare_pictures, residuals_csv
+from toolpath_stiff.report.compare.page import PICTURES, QUESTIONS, compare_html, residuals_csv
 from toolpath_stiff.report.compare.page import text as terminal_text
 from toolpath_stiff.report.compare.variables import load_path_png
 
@@ -55,7 +55,7 @@ DATA = {"paper": table_1, "one": one_reading, "oblique": oblique, "wild": with_a
 def compared(name: str) -> tuple[Comparison, dict[str, bytes]]:
     """The comparison and its pictures; of the paper's readings with the draws that the command takes."""
     found = compare(nist(), table_1()) if name == "paper" else quick(DATA[name]())
-    return found, compare_pictures(found)
+    return found, {name: draw(found) for name, draw in PICTURES.items()}
 
 
 @pytest.mark.parametrize("name", DATA)

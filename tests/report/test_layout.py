@@ -22,6 +22,7 @@ from toolpath_stiff.inference.confounding import Confounding
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
 from toolpath_stiff.planning.gap_map import MOST_LEVELS, group_of, height_groups
+from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.visits import Visits
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.report import case_study, figure, machine, plan
@@ -164,7 +165,7 @@ def visits_at(z):
     pose[:, 0], pose[:, 2] = 0.02 * np.arange(count), z
     none, empty = np.zeros(count), np.full(count, "")
     index = np.arange(count)
-    return Visits(pose, none, none, empty, empty, None, empty, index, index, index)
+    return Visits(Menu(), pose, none, none, empty, empty, empty, None, empty, index, index, index)
 
 
 @pytest.mark.parametrize("heights", [[0.43, 0.78, 1.2, 1.49], [0.07, 0.43, 0.78, 1.13, 1.49, 1.2], [0.5]])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness.truss import TIP, platform_nodes, structure_stiffness
 
 FloatArray = NDArray[np.float64]
 AXES = ("x", "y", "z")
@@ -66,3 +67,22 @@ def orthogonal_hexapod(offset: float = 0.0) -> Machine:
         reference_tool_length=0.1,
         strut_law=StrutLaw(1.0, 10e6, 3.0, 30e6),
     )
+
+
+def wrench_compliance(machine: Machine, position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """(6, 6) compliance of the reference truss at the tip: m/N, m/(N m), rad/N, rad/(N m) blocks.
+
+    A truss node has no rotation, so a moment acts through the smallest forces on the six platform joints that
+    add up to it, and the tip's rotation is its work-conjugate, the least-squares rotation of the six joints.
+    """
+    joints = platform_nodes(machine.platform_joints)[:6] @ np.asarray(rotation).T
+    arms = joints - joints.mean(axis=0)
+    inertia = sum(((arm @ arm) * np.eye(3) - np.outer(arm, arm) for arm in arms), np.zeros((3, 3)))
+    loads = np.zeros((24, 6))
+    loads[3 * TIP : 3 * TIP + 3, :3] = np.eye(3)
+    for column in range(3):
+        turn = np.linalg.solve(inertia, np.eye(3)[column])
+        for i, arm in enumerate(arms):
+            loads[3 * i : 3 * i + 3, 3 + column] = np.cross(turn, arm)
+    structure = structure_stiffness(machine, position, rotation)
+    return np.asarray(loads.T @ np.linalg.solve(structure, loads))

@@ -21,9 +21,10 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import core, exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect, Parameter
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, load_path
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model, load_path
 
 POSITION, ROTATION = random_poses(40, seed=11)
 

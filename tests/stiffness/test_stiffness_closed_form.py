@@ -14,8 +14,9 @@ from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness import truss as reference
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model, load_path
+from toolpath_stiff.stiffness.model import build_model, load_path
 
 ORIGIN = np.zeros((1, 3))
 H, KX, KY, KZ = 0.2, 20e6, 40e6, 60e6  # orthogonal hexapod: arm in m, stiffness of each pair of struts in N/m

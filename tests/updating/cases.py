@@ -31,9 +31,9 @@ from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.readings.measurements import Measurements, read_measurements
 from toolpath_stiff.rig import case, exercise
 from toolpath_stiff.rig import hidden as hidden_module
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect
-from toolpath_stiff.stiffness.model import ActiveEffect
 
 FloatArray = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.planning.rivals import Rival
+from toolpath_stiff.planning.forecasts import Rival
 from toolpath_stiff.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.model import ActiveEffect
 
 FloatArray = NDArray[np.float64]
 

@@ -57,26 +57,26 @@ def test_the_nist_machine_is_threefold_and_weak_links_do_not_matter_to_that():
 
 def test_x_and_y_are_alike_on_the_axis_of_a_threefold_machine():
     found, _ = checked(modelled(table_1()))
-    on_axis = [one for one in found if one["check"] == "threefold symmetry on the axis"]
+    on_axis = [one for one in found if one.check == "threefold symmetry on the axis"]
     assert len(on_axis) == 2
-    assert all(one["holds"] and abs(one["percent"]) < 100.0 * ROUND for one in on_axis)
+    assert all(one.holds and abs(one.percent) < 100.0 * ROUND for one in on_axis)
 
 
 def test_a_soft_table_breaks_the_symmetry_on_the_axis():
     found, _ = checked(modelled(table_1(), [active("table_compliance", x=5e-9, y=0.0, z=0.0)]))
-    on_axis = [one for one in found if one["check"] == "threefold symmetry on the axis"]
-    assert all(not one["holds"] and one["percent"] < 0.0 for one in on_axis)
-    assert "not alike" in on_axis[0]["text"]
+    on_axis = [one for one in found if one.check == "threefold symmetry on the axis"]
+    assert all(not one.holds and one.percent < 0.0 for one in on_axis)
+    assert "not alike" in on_axis[0].text
 
 
 def test_turned_poses_are_images_of_each_other():
     found, _ = checked(modelled(turned_poses()))
-    images = [one for one in found if one["check"] == "symmetric images"]
+    images = [one for one in found if one.check == "symmetric images"]
     # Three pairs of poses: Z, the turned X, and the sum of the compliances across the axis.
     assert len(images) >= 8
-    assert all(abs(one["percent"]) < 1e-3 for one in images)
+    assert all(abs(one.percent) < 1e-3 for one in images)
     broken, _ = checked(modelled(turned_poses(), [active("weak_strut", {"strut": 3}, factor=0.7)]))
-    assert any(not one["holds"] for one in broken if one["check"] == "symmetric images")
+    assert any(not one.holds for one in broken if one.check == "symmetric images")
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.1])
@@ -85,9 +85,9 @@ def test_hooke(exponent):
     direction = np.repeat(np.eye(3), 4, axis=0)
     data = readings_by_hand(5e7 * (force / 1000.0) ** exponent, (0.0, 0.0, 0.9), direction, force=force)
     found, _ = checked(data)
-    whole = next(one for one in found if one["text"].startswith("Load doubled, every direction"))
-    assert whole["percent"] == pytest.approx(100.0 * (2.0**exponent - 1.0), abs=1e-9)
-    assert whole["holds"] == (exponent == 0.0)
+    whole = next(one for one in found if one.text.startswith("Load doubled, every direction"))
+    assert whole.percent == pytest.approx(100.0 * (2.0**exponent - 1.0), abs=1e-9)
+    assert whole.holds == (exponent == 0.0)
 
 
 def test_set_ups_at_one_pose():
@@ -95,15 +95,15 @@ def test_set_ups_at_one_pose():
     direction = np.repeat(np.eye(3), 4, axis=0)
     data = readings_by_hand(np.where(np.array(setup) == "riser", 4.5e7, 5e7), (0.0, 0.0, 0.9), direction, setup=setup)
     found, _ = checked(data)
-    between = [one for one in found if one["check"] == "set-ups"]
+    between = [one for one in found if one.check == "set-ups"]
     assert len(between) == 3
-    assert all(one["percent"] == pytest.approx(100.0 * (5.0 / 4.5 - 1.0)) for one in between)
-    assert not any(one["holds"] for one in between)
+    assert all(one.percent == pytest.approx(100.0 * (5.0 / 4.5 - 1.0)) for one in between)
+    assert not any(one.holds for one in between)
 
 
 def test_what_cannot_be_checked_is_said_with_the_reason():
     _, cannot = checked(table_1())
-    reasons = {one["check"]: one["reason"] for one in cannot}
+    reasons = {one.check: one.reason for one in cannot}
     assert "displacement across the load" in reasons["reciprocity"]
     assert reasons["proportionality"] == "no pose was measured at two loads"
     assert reasons["set-ups"] == "no pose was measured in two set-ups"
@@ -115,6 +115,6 @@ def test_few_false_alarms_over_all_checks_together():
     alarms = 0
     for _ in range(100):
         found, _ = checked(replace(exact, stiffness=exact.stiffness * np.exp(rng.normal(0.0, 0.02, len(exact)))))
-        alarms += any(not one["holds"] for one in found)
+        alarms += any(not one.holds for one in found)
     # 12 or more of 100 has a chance of 0.4 % if 5 % is true.
     assert alarms <= 11

@@ -20,9 +20,9 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.hypotheses import Family, score_families
 from toolpath_stiff.inference.quadrature import score_single
 from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect
-from toolpath_stiff.stiffness.model import ActiveEffect
 
 FloatArray = NDArray[np.float64]
 

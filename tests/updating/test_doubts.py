@@ -13,7 +13,7 @@ from toolpath_stiff.inference import candidates
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.doubts import noise_doubt
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate
+from toolpath_stiff.inference.gates import Forms, absolute_gate, simulate
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import from_repeats, repeat_groups
@@ -47,7 +47,7 @@ def test_a_stiffness_in_another_unit_is_named() -> None:
     (found,) = suspects(replace(DATA, stiffness=stiffness))
     assert found.rows == (40,) and found.clear and "lbf/in" in found.words
     (entry,) = suspect_entries((found,), DATA, left_out=(found,))
-    assert entry["row"] == 41 and entry["lines"] == [42] and entry["left_out"] and "left out" in entry["words"]
+    assert entry.row == 41 and entry.lines == [42] and entry.left_out and "left out" in entry.words
 
 
 def test_exchanged_readings_are_named() -> None:
@@ -58,15 +58,15 @@ def test_exchanged_readings_are_named() -> None:
     stiffness = DATA.stiffness.copy()
     stiffness[[alike[a], alike[b]]] = stiffness[[alike[b], alike[a]]]
     (found,) = suspects(replace(DATA, stiffness=stiffness))
-    assert set(found.rows) == {alike[a], alike[b]} and found.column == "direction"
+    assert set(found.rows) == {alike[a], alike[b]} and found.slip.column == "direction"
 
 
 def test_a_wrong_sign_in_all_rows_of_a_clamping_is_named() -> None:
     rows, angles = most_tilted(), DATA.angles.copy()
     angles[rows, 1] *= -1.0
     (found,) = suspects(replace(DATA, angles=angles))
-    assert set(found.rows) == set(rows.tolist()) and found.column == "b_deg" and found.clear
-    assert float(found.meant) == pytest.approx(np.degrees(DATA.angles[rows[0], 1]))
+    assert set(found.rows) == set(rows.tolist()) and found.slip.column == "b_deg" and found.clear
+    assert float(found.slip.meant) == pytest.approx(np.degrees(DATA.angles[rows[0], 1]))
     spoiled = replace(DATA, angles=angles)
     assert mended(spoiled, (found,)).angles == pytest.approx(DATA.angles)
     # As all that there is of a tool, the readings cannot say whether they slipped or the tool does something.
@@ -82,7 +82,7 @@ def test_rows_are_left_out_where_that_explains_all_and_else_stay() -> None:
     angles[rows, 1] *= -1.0
     slipped = examined(nist(), replace(DATA, angles=angles))
     assert slipped.verdict == "adequate" and len(slipped.data) == len(DATA) - len(rows)
-    assert [entry["left_out"] for entry in slipped.suspects] == [True]
+    assert [entry.left_out for entry in slipped.suspects] == [True]
     quiet = Nuisances(repeat=0.01, clamping=0.005)
     bent = campaign(0, "tilted", "pallet_overhang", 0.15, quiet)[0]
     (noise,) = noise_models(bent)
@@ -91,8 +91,8 @@ def test_rows_are_left_out_where_that_explains_all_and_else_stay() -> None:
     assert any(suspect.clear for suspect in suspect_rows(problem, judgement.likeliest))
     unknown = examined(nist(), bent)
     assert unknown.verdict == "unexplained" and len(unknown.data) == len(bent)
-    assert not any(entry["left_out"] for entry in unknown.suspects)
-    assert any("what is missing from the model" in entry["words"] for entry in unknown.suspects)
+    assert not any(entry.left_out for entry in unknown.suspects)
+    assert any("what is missing from the model" in entry.words for entry in unknown.suspects)
 
 
 @pytest.mark.parametrize(("scatter", "shows"), [(0.003, True), (0.08, False)])
@@ -173,9 +173,7 @@ def test_a_stated_noise_that_nothing_but_the_misfit_contradicts(factor: float, v
     problem = Problem.of(Predictor(nist(), data), noise)
     base = problem.score_base()
     forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
-    gate = absolute_gate(
-        problem, base.residual, base.jacobian, Simulator.of(noise, problem.scatter.covariance, 0), forms
-    )
+    gate = absolute_gate(problem, base.residual, base.jacobian, simulate(noise, problem.scatter.covariance, 0), forms)
     words, times = noise_doubt(problem, noise, gate, verdict, 0)
     assert said in words and bool(words) == bool(said)
     # What was stated times what is said comes to what is there: squares of 42 readings tell it within 11 %.

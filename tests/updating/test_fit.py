@@ -19,8 +19,8 @@ from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.model import ActiveEffect
 
 FloatArray = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolpath_stiff.correction.machines import recover_geometry, recovery_text
+from toolpath_stiff.correction.geometry import recover_geometry, recovery_text
 
 # Found before, by another program (the project's reference notes), mm; its own standard errors.
 REFERENCE = [304.77, 296.97, 2414.61, 3013.45, 2080.72, 3313.35]

@@ -14,16 +14,22 @@ from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.comparison.compare import compare
+from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.readings.dates import date_text, day_of
-from toolpath_stiff.readings.history import DRAWS, Readings, history
+from toolpath_stiff.readings.history import history
 from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.readings.strut_series import DRAWS, StrutReadings
 from toolpath_stiff.report.compare.page import text
 from toolpath_stiff.report.history import history_png
 
 DATES = ("2018-03-01", "2018-09-10", "2019-04-02", "2019-06-11", "2020-01-15", "2020-08-03", "2021-02-11")
 DAYS = np.array([day_of(text) for text in DATES])
 FORCES = [*range(0, 1001, 250), *range(750, -1001, -250), *range(-750, 1, 250)]
+
+
+def of_struts(*columns, seed: int = 0):
+    return to_dict(history(StrutReadings(*columns), seed=seed))
 
 
 def series(seed: int, *, step: float = 0.0, drift: float = 0.0, sd: float = 0.01, dates: int = 10, struts: int = 6):
@@ -34,7 +40,7 @@ def series(seed: int, *, step: float = 0.0, drift: float = 0.0, sd: float = 0.01
     ln[min(2, struts - 1)] += step * (np.arange(dates) >= dates // 2) + drift * (day - day[0]) / np.ptp(day)
     names = np.repeat([f"strut {i + 1} alone" for i in range(struts)], dates)
     n = struts * dates
-    return history(Readings(names, np.tile(day, struts), ln.ravel(), np.zeros(n)), seed=seed), day
+    return of_struts(names, np.tile(day, struts), ln.ravel(), np.zeros(n), seed=seed), day
 
 
 def changes(found):
@@ -85,7 +91,7 @@ def test_one_wild_date_is_no_change():
     ln = np.tile(np.log(40e6) + 0.002 * np.sin(np.arange(10.0)), 2)
     ln[1] -= 0.3
     names = np.repeat(["strut 1 alone", "strut 2 alone"], 10)
-    found = history(Readings(names, np.tile(np.arange(10.0) * 30.0, 2), ln, np.zeros(20)))
+    found = of_struts(names, np.tile(np.arange(10.0) * 30.0, 2), ln, np.zeros(20))
     assert not changes(found) and found["struts"][0]["wild_dates"] == ["1970-01-31"]
 
 
@@ -94,7 +100,7 @@ def test_tension_against_compression_by_hand():
     day = np.repeat(np.arange(8.0) * 100.0, 2)
     side = np.tile([1.0, -1.0], 8)
     ln = np.where(side > 0.0, np.log(30e6), np.log(40e6)) + 0.003 * np.sin(np.arange(16.0))
-    found = history(Readings(np.full(16, "strut 2 alone"), day, ln, side))["struts"][0]
+    found = of_struts(np.full(16, "strut 2 alone"), day, ln, side)["struts"][0]
     assert found["sides"]["difference_percent"] == pytest.approx(-25.0, abs=0.5)
     assert found["sides"]["text"].startswith("strut 2 is 25 % softer in tension") and not found["changes"]
 
@@ -173,7 +179,7 @@ def test_bench_records_to_a_history_and_back(tmp_path, monkeypatch, capsys):
     assert not two["changes"] and two["sides"]["p"] > 0.05
     (change,) = three["changes"]
     assert (change["kind"], change["after"], change["before"]) == ("step", "2019-04-02", "2019-06-11")
-    assert history_png(told["history"]).startswith(b"\x89PNG")
+    assert history_png(found.history).startswith(b"\x89PNG")
     assert "strut 3 became 12 % softer between 2019-04-02 and 2019-06-11 (95 %)" in str(found)
 
     data = read_measurements("bench_measurements.csv", nist())

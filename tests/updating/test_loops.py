@@ -9,15 +9,16 @@ from scipy.stats import multivariate_normal
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.comparison.compare import compare
-from toolpath_stiff.correction.document import document as update_document
 from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.planning.next_visit import TABLES, Tables, Taken, conditioned, next_visit, tables_of
+from toolpath_stiff.planning.menu import Menu
+from toolpath_stiff.planning.next_visit import Taken, conditioned, next_visit
 from toolpath_stiff.planning.result import plan
 from toolpath_stiff.planning.rows import plan_csv, plan_rows
+from toolpath_stiff.planning.tables import TABLES, Tables, tables_of
 from toolpath_stiff.readings.measurements import measured_path, model_stiffness, read_measurements
 from toolpath_stiff.report.compare.page import text
 from toolpath_stiff.rig.case import again, draw_case
@@ -27,10 +28,11 @@ from toolpath_stiff.rig.loops import true_displacements
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop, measuring_loop
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.stiffness.model import build_model
 
 POSES = np.array([[0.05, -0.1, 0.6, 0.1, -0.2, 0.05], [-0.2, 0.15, 1.1, -0.3, 0.1, 0.0], [0.0, 0.0, 0.8, 0, 0, 0]])
 DIRECTIONS = np.array([[1.0, 0, 0], [0, 0.6, 0.8], [0, 0, 1.0]])
@@ -255,19 +257,25 @@ def test_compare_shows_loops_in_a_section_of_their_own(joints):
 def test_update_counts_errors_over_the_tip_as_compare_does(joints):
     data = read_measurements(list(joints), nist())
     compared, found = compare(nist(), data, draws=20).document, update(nist(), data, strut_law=True)
-    written = update_document(found)
-    assert written["readings"] == compared["readings"] == 42 < len(found.update.data)
+    written = found.document
+    assert written["readings"] == compared["readings"] == 42 < len(found.data)
     step, given = compared["baseline"], written["steps"][0]
     for name in ("mean_abs_error_percent", "bias_percent", "rms_percent"):
         assert given[name] == pytest.approx(step[name], abs=1e-3)
     assert sum(one["readings"] for one in given["by_direction"].values()) == 42
     assert found.provenance["mean_error_before_percent"] == pytest.approx(step["mean_abs_error_percent"], abs=1e-3)
-    assert len(residuals_csv(found.update).splitlines()) == 1 + 42
+    assert len(residuals_csv(found).splitlines()) == 1 + 42
 
 
 def test_a_plan_sets_an_indicator_where_the_tip_tells_less():
-    found = plan(nist(), between=("joint_compliance", "none"), n=3, noise=0.02, indicators=True)
-    loops = {found.choice.visits.across(visit) for visit in found.choice.chosen}
+    found = plan(
+        nist(),
+        between=("joint_compliance", "none"),
+        n=3,
+        noise=0.02,
+        menu=Menu(setups=("table", "riser"), indicators=True),
+    )
+    loops = {found.choice.visits.loop[visit] for visit in found.choice.chosen}
     # A size that is known to half of itself keeps any gap near two.
     assert loops == {"joint 1"} and found.choice.pairs[0].separation_sigma > 2.0
     rows = found.rows
@@ -276,7 +284,7 @@ def test_a_plan_sets_an_indicator_where_the_tip_tells_less():
         row["direction"] for row in rows if row["clamp"] == 1 and not row["loop"]
     ]
     without = plan(nist(), between=("joint_compliance", "none"), n=3, noise=0.02)
-    assert not any(without.choice.visits.across(visit) for visit in without.choice.chosen)
+    assert not any(without.choice.visits.loop[visit] for visit in without.choice.chosen)
     assert without.choice.pairs[0].separation_sigma < 0.7 * found.choice.pairs[0].separation_sigma
 
 
@@ -288,7 +296,7 @@ def step_by_step(tmp_path_factory):
     """A plan's folder."""
     folder = tmp_path_factory.mktemp("next")
     found = plan(nist(), between=("spindle_compliance", "table_compliance", "none"), n=2, noise=0.02)
-    (folder / TABLES).write_bytes(tables_of(found))
+    (folder / TABLES).write_bytes(tables_of(found.choice))
     (folder / "plan.csv").write_text(plan_csv(found.rows))
     return found, folder
 

@@ -305,6 +305,6 @@ def test_whatever_stands_in_a_file_is_read_or_refused(tmp_path_factory, rows, lo
         if long:
             assert len(read_measurements(file, nist())) >= 1
         else:
-            assert len(read_raw(parse_table(text, "data.csv", COLUMNS)).loops) >= 1
+            assert len(read_raw(parse_table(text, "data.csv", COLUMNS))[0]) >= 1
     except (InputError, InputErrors) as error:
         assert "data.csv" in str(error)

@@ -20,10 +20,9 @@ from tests.updating.cases import VERDICTS as CASES
 from tests.updating.cases import campaign, diagnosed, examined, table_1
 from toolpath_stiff.comparison.compare import Comparison, compare
 from toolpath_stiff.correction.additions import parse_addition
-from toolpath_stiff.correction.document import document as update_document
 from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.ladder import _Work, build_ladder
-from toolpath_stiff.correction.update import Correction
+from toolpath_stiff.correction.result import Update
 from toolpath_stiff.diagnosis import words as verdict_words
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.rows import odds_words
@@ -60,9 +59,12 @@ def told(verdict: str) -> dict[str, Any]:
 
 def updated(data: Measurements, *names: str, **options: Any) -> dict[str, Any]:
     """The document of an update."""
+    return update_of(data, *names, **options).document
+
+
+def update_of(data: Measurements, *names: str, **options: Any) -> Update:
     found = build_ladder(nist(), data, [parse_addition(name, data) for name in names], **options)
-    machine = found.fitted(PROVENANCE) if found.accepted else None
-    return update_document(Correction(found, machine, PROVENANCE, ("a.csv",), None, seed=0))
+    return replace(found, provenance=PROVENANCE, names=("a.csv",))
 
 
 # -- one baseline ------------------------------------------------------------------------------------------------------
@@ -85,7 +87,7 @@ def test_all_commands_start_from_the_same_two_errors(verdict):
 def test_every_text_prints_these_two_errors():
     diagnosis, found = diagnosed(*CASES["identified"]), told("identified")
     comparison = compared(diagnosis.data)
-    update_told = updated(diagnosis.data, diagnosis.best)
+    update = update_of(diagnosis.data, diagnosis.best)
     story = f"as given {found['baseline']['as_given'][MEAN]:.2f} %, strut law refitted {found['baseline'][MEAN]:.2f} %"
     last = f", with {diagnosis.best} {found['candidates'][0][MEAN]:.2f} %"
     texts = [
@@ -93,7 +95,7 @@ def test_every_text_prints_these_two_errors():
         (compare_html(comparison, dict.fromkeys(COMPARE_QUESTIONS, b"")), ""),
         (diagnose_report.text(diagnosis), last),
         (diagnose_html(diagnosis, {}), last),
-        (update_report.text(update_told), last),
+        (update_report.text(update), last),
     ]
     for text, rest in texts:
         assert story + rest in re.sub(r"\s+", " ", text)
@@ -158,7 +160,7 @@ def test_minus_is_softer_than_modelled_everywhere(factor, sign):
     compliance = np.mean(1.0 / data.stiffness) / np.mean(np.exp(-found.log_model))
     signs += [stiffness_deviation_percent(float(compliance))]
     found_update = build_ladder(nist(), data, strut_law=True)
-    told_update = update_document(Correction(found_update, None, PROVENANCE, (), None, seed=0))["steps"][0]
+    told_update = replace(found_update, provenance=PROVENANCE).document["steps"][0]
     signs += [told_update["bias_percent"], *(one["bias_percent"] for one in told_update["by_direction"].values())]
     rows = list(csv.DictReader(io.StringIO(residuals_csv(found_update))))
     signs += [np.mean([float(row["as_given_deviation_percent"]) for row in rows])]

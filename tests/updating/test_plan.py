@@ -13,17 +13,20 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.stats import norm
 
+from benchmarks.random_visits import random_visits
 from tests.stiffness.cases import nist
 from tests.updating.planning import READING_SD, active, rival, rivals, table_1_design
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.planning.gaps import ReadingNoise, expected_outcome, pair_shares
-from toolpath_stiff.planning.plan import RivalPlan, plan_measurements, plan_text, random_visits
+from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all, joint_columns
+from toolpath_stiff.planning.gaps import ReadingNoise, pair_shares
+from toolpath_stiff.planning.menu import Costs, Menu
+from toolpath_stiff.planning.outlook import expected_outcome
+from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.result import Plan
-from toolpath_stiff.planning.rivals import Forecast, Rival, forecast_all, joint_columns
-from toolpath_stiff.planning.visits import Costs, Matters, Menu, possible_visits
+from toolpath_stiff.planning.visits import Matters, possible_visits
 from toolpath_stiff.report.plan import text
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.nominal import reachable as rig_reachable
@@ -193,19 +196,19 @@ def test_a_constant_joint_compliance_is_never_told_from_the_struts_own(other):
     assert pair.separation_sigma < 1.0 and not pair.separable and not found.separable
     assert "strut end" in pair.indicator_across["joints"]
     assert found.after.truth < 0.8 and found.after.settled < 0.2
-    assert any("indicator" in line for line in plan_text(found))
+    assert any("indicator" in line for line in found.sentences)
 
 
 def test_a_plan_that_gains_nothing_says_so_first() -> None:
     """Joints against the struts' own softness: a chance of about a half, before and after."""
     found = plan_for("joint_compliance", "none")
     first = "nothing worth measuring at the tip; an indicator across a joint would tell joint_compliance from none"
-    assert not found.gains and plan_text(found)[0].startswith(first)
-    assert not any("is expected to rise" in line for line in plan_text(found))
-    whole = Plan(nist(), None, found, Menu(), Costs(), 0.02, "", {}, (), (), 0)
+    assert not found.gains and found.sentences[0].startswith(first)
+    assert not any("is expected to rise" in line for line in found.sentences)
+    whole = Plan(nist(), None, found, (), 0)
     assert text(whole).startswith(first) and not whole.to_dict()["worth_measuring"]
     worth = plan_for("spindle_compliance", "table_compliance")
-    assert worth.gains and "is expected to rise" in plan_text(worth)[0]
+    assert worth.gains and "is expected to rise" in worth.sentences[0]
 
 
 def test_a_plan_beats_visits_drawn_at_random():
@@ -238,7 +241,7 @@ def test_poses_are_tilted_no_further_and_lie_no_wider_than_allowed():
 def test_places_are_different_and_the_same_seed_gives_the_same_plan():
     first = plan_for("frame_compliance", "joint_moment_stiffness")
     again = plan_for.__wrapped__("frame_compliance", "joint_moment_stiffness")
-    assert first.chosen == again.chosen and plan_text(first) == plan_text(again) and first.pairs == again.pairs
+    assert first.chosen == again.chosen and first.sentences == again.sentences and first.pairs == again.pairs
     places = {(v.pose[k].tobytes(), v.extension[k], v.setup[k]) for v in [first.visits] for k in first.chosen}
     assert len(places) == len(first.chosen) == 6
 
@@ -246,8 +249,8 @@ def test_places_are_different_and_the_same_seed_gives_the_same_plan():
 def test_what_is_dear_is_avoided():
     """The longer tool helps here, but not if changing it costs a day."""
     pair = rivals("frame_compliance", "joint_moment_stiffness")
-    cheap = plan_measurements(nist(), pair, 0.02, menu=menu(), costs=Costs(tool=0.0))
-    dear = plan_measurements(nist(), pair, 0.02, menu=menu(), costs=Costs(tool=480.0))
+    cheap = plan_measurements(nist(), pair, 0.02, menu=menu(costs=Costs(tool=0.0)))
+    dear = plan_measurements(nist(), pair, 0.02, menu=menu(costs=Costs(tool=480.0)))
     assert cheap.visits.extension[list(cheap.chosen)].any()
     assert not dear.visits.extension[list(dear.chosen)].any()
     assert dear.minutes < 480.0

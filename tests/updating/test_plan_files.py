@@ -18,9 +18,9 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.planning.campaign import Campaign, first_campaign
+from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import plan_measurements
 from toolpath_stiff.planning.rows import plan_csv, plan_rows
-from toolpath_stiff.planning.visits import Menu
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import exercise as rig
 from toolpath_stiff.rig.nominal import load_nominal
@@ -137,7 +137,8 @@ def test_two_poses_are_clamped_three_times_in_each_set_up(campaign):
         standard = [k for k in rows if found.visits.extension[k] == 0.0]
         assert Counter(found.visits.setup[standard].tolist()) == {"table": 3, "riser": 3}
         for setup in ("table", "riser"):
-            assert sorted(found.repeats[k] for k in standard if found.visits.setup[k] == setup) == [1, 2, 3]
+            repeats = [found.visits.rounds[found.visits.rows(k)[0]] for k in standard if found.visits.setup[k] == setup]
+            assert sorted(repeats) == [1, 2, 3]
 
 
 def test_a_first_campaign_is_reachable_and_its_file_is_read(campaign, tmp_path):
@@ -145,7 +146,7 @@ def test_a_first_campaign_is_reachable_and_its_file_is_read(campaign, tmp_path):
     visits = found.visits
     assert rig_reachable(load_nominal(machine), visits.pose[:, :3], visits.pose[:, 3:], visits.extension).all()
     file = tmp_path / "plan.csv"
-    file.write_text(plan_csv(plan_rows(visits, range(len(visits)), repeats=found.repeats)))
+    file.write_text(plan_csv(plan_rows(visits, found.chosen)))
     data = read_measurements(file, load_machine(machine), planned=True)
     assert len(data) == 6 * len(visits) and not data.warnings
     for column in ("force_N", "setup", "clamp", "repeat", "point", "time_min", "tool_extension_mm"):

@@ -8,8 +8,8 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.planning import rivals, table_1_design
 from toolpath_stiff.planning.gap_map import gap_map, top_pair
+from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import plan_measurements
-from toolpath_stiff.planning.visits import Menu
 from toolpath_stiff.report.plan import plan_picture
 
 
@@ -17,7 +17,7 @@ from toolpath_stiff.report.plan import plan_picture
 def mapped():
     menu = Menu.of(table_1_design())
     plan = plan_measurements(nist(), rivals("frame_compliance", "joint_moment_stiffness"), 0.02, 4, menu=menu)
-    return plan, gap_map(nist(), plan, menu)
+    return plan, gap_map(nist(), plan)
 
 
 def test_the_map_shows_the_gap_of_a_visit_there(mapped):
@@ -28,7 +28,7 @@ def test_the_map_shows_the_gap_of_a_visit_there(mapped):
     offered = Menu(
         measured=poses, labels=tuple(map(str, places)), oblique=False, rounds=1, tool_extensions=(0.0,), timed=False
     )
-    again = plan_measurements(nist(), plan.rivals, plan.noise, 1, menu=offered)
+    again = plan_measurements(nist(), plan.rivals, (plan.scatter.repeat, plan.scatter.clamping), 1, menu=offered)
     gaps = again.shares[found.pair if found.pair in again.shares else found.pair[::-1]].gaps_with(())
     for place, (k, i, j) in zip(offered.labels, places, strict=True):
         there = gaps[again.visits.label == place]

@@ -23,7 +23,7 @@ from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
 from toolpath_stiff.portrait.words import term_words
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case, exercise
-from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.term_effect import effect_of
 from toolpath_stiff.stiffness.terms import LINKS, SHAPES, VARIABLES, Term
 
@@ -47,7 +47,7 @@ def folder(tmp_path_factory):
 
 def forces(predictor: Predictor) -> np.ndarray:
     """(n, 6) strut forces per unit load, of J^T f = w solved here."""
-    struts = predictor.full_path().struts
+    struts = predictor.full_path.struts
     jacobian = np.concatenate([struts.directions, np.cross(struts.arms, struts.directions)], axis=-1)
     wrench = np.concatenate([predictor.data.direction, np.zeros_like(predictor.data.direction)], axis=1)
     return np.linalg.solve(np.swapaxes(jacobian, 1, 2), wrench[..., None])[..., 0]
@@ -112,7 +112,7 @@ def test_joints_that_turn_less_easily_under_small_loads_are_recognised(folder):
 
 def test_joints_that_give_along_a_pin_are_recognised(folder):
     predictor = sound(2, folder)
-    path = predictor.full_path()
+    path = predictor.full_path
     joints = path.machine.platform_joints[:, :2]
     pins = np.zeros((6, 3))
     pins[:, :2] = joints / np.linalg.norm(joints, axis=1, keepdims=True)
@@ -208,7 +208,7 @@ def test_two_causes_are_found_wherever_the_search_begins(folder):
 def test_a_strut_that_is_softer_in_tension_is_recognised(folder):
     predictor = sound(2, folder)
     own = forces(predictor)[:, 4]
-    stiffness = predictor.machine.strut_law.stiffness(predictor.full_path().struts.lengths[:, 4])
+    stiffness = predictor.machine.strut_law.stiffness(predictor.full_path.struts.lengths[:, 4])
     found = portrait_with(predictor, 0.5 * own**2 * (own > 0.0) / stiffness)
     assert found.links[0][0] == "one strut"
     assert found.terms[0].term.where == 5

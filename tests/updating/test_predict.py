@@ -21,7 +21,8 @@ from tests.updating.cases import (
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import JOINT_STEP, Predictor
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.rig.case import rows_of, tilted_campaign
+from toolpath_stiff.rig.campaigns import tilted_campaign
+from toolpath_stiff.rig.case import rows_of
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import load_nominal
 

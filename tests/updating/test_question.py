@@ -10,7 +10,6 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, examined, predictor_for, table_1
 from toolpath_stiff.comparison.compare import compare
-from toolpath_stiff.correction.document import document
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.question import question
@@ -72,25 +71,25 @@ def test_the_verdict_is_unexplained_and_the_question_is_put():
 
 def test_nothing_is_written_of_readings_of_something_else_but_by_force():
     refused, forced = (update(nist(), TENFOLD, strut_law=True, force=force) for force in (False, True))
-    assert refused.machine is None and forced.machine is not None
-    assert [document(one)["verdict"] for one in (refused, forced)] == ["refused", "forced"]
-    assert all(ASKED in document(one)["text"] for one in (refused, forced))
+    assert refused.corrected is None and forced.corrected is not None
+    assert [one.verdict for one in (refused, forced)] == ["refused", "forced"]
+    assert all(ASKED in one.document["text"] for one in (refused, forced))
 
 
 def test_a_machine_that_fits_worse_is_never_written():
     """The strut law of the second packaged machine, fitted to the paper's readings: 77 to 388 %."""
     found = update(load_machine("nategh_agheli"), TABLE, strut_law=True, force=True)
-    before, after = (step.fit.errors.mean() for step in found.update.steps)
+    before, after = (step.fit.errors.mean() for step in found.steps)
     assert after > 2.0 * before
-    assert found.update.worse and found.machine is None
-    assert "would fit worse" in document(found)["text"] and document(found)["verdict"] == "refused"
+    assert found.worse and found.corrected is None
+    assert "would fit worse" in found.document["text"] and found.verdict == "refused"
 
 
 def test_a_mean_error_that_rises_within_rounding_is_no_worse_fit():
     found = update(nist(), TABLE, strut_law=True)
-    before, after = (step.fit.errors.mean() for step in found.update.steps)
+    before, after = (step.fit.errors.mean() for step in found.steps)
     assert after > before  # 9.62 to 9.72 %: likelier, by fewer readings far off
-    assert not found.update.worse and found.machine is not None
+    assert not found.worse and found.corrected is not None
 
 
 @pytest.mark.parametrize("command", [compare, update])
@@ -100,5 +99,5 @@ def test_repeats_that_agree_exactly_tell_nothing_of_the_scatter(command):
     options = {"strut_law": True} if command is update else {"draws": 50} if command is compare else {}
     found = command(nist(), few, **options)
     origins = [one["origin"] for one in found.document["noise"]] if command is compare else []
-    origins += [found.update.noise.origin] if command is update else []
+    origins += [found.noise.origin] if command is update else []
     assert origins and all("agree exactly" in origin for origin in origins)

@@ -38,7 +38,7 @@ def records(stiffness: float, gauge: float, gap: float = 0.0, friction: float = 
 
 
 def reduced(text: str):
-    (loop,) = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS)).loops
+    (loop,) = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS))[0]
     return reduce_loop(loop)
 
 
@@ -90,7 +90,7 @@ def test_drift_opens_the_loop():
 
 def test_loops_are_told_apart_and_come_in_order():
     text = records(40.0, 30.0, where="0,0,800,Z,B") + records(30.0, 30.0) + records(35.0, 30.0, where="0,0,800,Y,B")
-    loops = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS)).loops
+    loops = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS))[0]
     assert [loop.place["direction"] + loop.place["point"] for loop in loops] == ["ZB", "XA", "YB"]
     assert [round(reduce_loop(loop).stiffness / 1e6, 6) for loop in loops] == [40.0, 30.0, 35.0]
 

@@ -54,7 +54,7 @@ def test_the_best_pair_and_its_components_are_found_among_all() -> None:
     assert len(search.ranked) == len(NAMES) * (len(NAMES) - 1) // 2  # every pair of effects, each once
     # A third effect adds nothing: by chance the linear search likes one better in two draws of five, and the evidence,
     # in which a size costs, is lower by 4 to 80.
-    more = search_triples(problem, search, base, only_better=True)
+    more = search_triples(search, only_better=True)
     assert all(triple.score.log_evidence < pairs[0].score.log_evidence for triple in more)
 
 
@@ -63,13 +63,13 @@ def test_triples_hold_one_of_the_best_pairs() -> None:
     problem = problem_with(WEAK, TABLE, DRIFT)
     base = problem.score_base()
     _, search = search_pairs(problem, families_of(problem), base)
-    best = search_triples(problem, search, base, only_better=True)[0]
+    best = search_triples(search, only_better=True)[0]
     assert best.names == ("table_compliance", "thermal_drift", "weak_strut")
 
 
 def test_sizes_within_bounds_are_those_of_least_squares() -> None:
     problem = problem_with(WEAK, TABLE)
-    search = LinearSearch.of(problem, families_of(problem), problem.score_base())
+    search = LinearSearch(problem, families_of(problem), problem.score_base())
     rng = np.random.default_rng(1)
     root = rng.standard_normal((60, search.columns.shape[0] * search.columns.shape[1]))
     target = rng.standard_normal(60)

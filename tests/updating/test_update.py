@@ -11,10 +11,9 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.correction.additions import parse_addition
-from toolpath_stiff.correction.document import document, residuals_csv
+from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.ladder import build_ladder
-from toolpath_stiff.correction.strut_law import update_by_mean_error
-from toolpath_stiff.correction.update import Correction
+from toolpath_stiff.correction.update import update_by_mean_error
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import parse_machine
@@ -155,7 +154,7 @@ def test_what_is_not_there_is_refused_unless_forced():
         assert not found.accepted
         assert found.supports[0].reasons
     assert updated(data, name, strut_law=True, force=True).accepted
-    told = document(Correction(found, None, PROVENANCE, ("a.csv",), None, seed=0))
+    told = replace(found, provenance=PROVENANCE, names=("a.csv",)).document
     assert told["verdict"] == "refused"
     assert found.supports[0].reasons[0] in told["text"]
     assert not build_ladder(nist(), data, auto=True, strut_law=True).last.fit.names
@@ -217,13 +216,13 @@ def test_a_users_own_effect(tmp_path):
 
 
 def test_the_papers_own_estimation():
-    found, search = update_by_mean_error(nist(), table_1(), seed=1)
+    found = update_by_mean_error(nist(), table_1(), seed=1)
     first, last = (step.fit.errors.mean() for step in found.steps)
     assert (first, last) == (pytest.approx(0.0962, abs=5e-5), pytest.approx(0.0942, abs=5e-5))
     # Fitted to the points themselves, the law does worse at points that it has not seen.
     assert found.last.held.mean_error > last
     machine = found.fitted(PROVENANCE)
-    ends = [(law.stiffness_1, law.stiffness_2) for law in (machine.strut_law, search.strut_law)]
+    ends = [(law.stiffness_1, law.stiffness_2) for law in (machine.strut_law, found.search.strut_law)]
     assert ends[0] == pytest.approx(ends[1], rel=1e-8)
     assert machine.uncertainty.names == ("strut_law.stiffness_1_N_per_um", "strut_law.stiffness_2_N_per_um")
     # The printed constants lie well within what 14 points can tell.
@@ -233,7 +232,7 @@ def test_the_papers_own_estimation():
 
 
 def test_the_document_and_the_residuals_agree_with_the_fit(weak):
-    told = document(Correction(weak, weak.fitted(PROVENANCE), PROVENANCE, ("a.csv",), "m.toml", seed=0))
+    told = replace(weak, provenance=PROVENANCE, names=("a.csv",)).document
     assert told["verdict"] == "updated"
     assert [step["name"] for step in told["steps"]] == ["as given", "strut law refitted", "+ weak_strut (strut 3)"]
     assert set(told["steps"][0]["by_direction"]) == {"X", "Y", "Z"}

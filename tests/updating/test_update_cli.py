@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import toolpath_stiff as tps
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, table_1
 from toolpath_stiff.cli.main import main
@@ -33,6 +35,11 @@ def weak_csv(tmp_path_factory):
     return str(file)
 
 
+def test_a_name_is_no_markup_on_the_page():
+    named = replace(tps.update("nist-table1", strut_law=True), names=("<b>x</b>.csv",))
+    assert "&lt;b&gt;x" in update_html(named, {}) and "<b>x</b>" not in update_html(named, {})
+
+
 def test_the_error_falls_and_the_machine_is_used(weak_csv, tmp_path, capsys):
     out = tmp_path / "update"
     assert main(["update", weak_csv, *WEAK, "--out", str(out)]) == 0
@@ -48,7 +55,6 @@ def test_the_error_falls_and_the_machine_is_used(weak_csv, tmp_path, capsys):
     page = (out / "report.html").read_text()
     assert page.count("<svg viewBox=") == 2
     assert "{{" not in page
-    assert "<b>x</b>" not in update_html({**told, "data": ["<b>x</b>.csv"]}, {})
     machine = load_machine(out / "machine.toml")
     assert machine.effects[0].provenance["data_sha256"] == told["provenance"]["data_sha256"]
     program = tmp_path / "part.nc"

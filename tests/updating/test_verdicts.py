@@ -19,7 +19,7 @@ from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
 from toolpath_stiff.diagnosis.diagnose import common_verdict
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.gates import Forms, Simulator, absolute_gate
+from toolpath_stiff.inference.gates import Forms, absolute_gate, simulate
 from toolpath_stiff.inference.judgement import (
     FALSE_ALARM,
     NONE,
@@ -45,7 +45,7 @@ def naive_gate(seed: int) -> float:
     spread = covariance(naive, predictor)
     problem = Problem(predictor, Scatter.of(naive, spread))
     base = problem.score_base()
-    simulator = Simulator.of(naive, spread, seed=0)
+    simulator = simulate(naive, spread, seed=0)
     forms = Forms(discrepancy_forms(predictor), spread.precision)
     return absolute_gate(problem, base.residual, base.jacobian, simulator, forms).probability
 

@@ -28,15 +28,14 @@ class Preview:
     """
 
     def __init__(self, asked: Question) -> None:
-        from toolpath_stiff.comparison.compare import ByHand
+        from toolpath_stiff.inference.evidence import Problem
+        from toolpath_stiff.inference.noise import noise_models
+        from toolpath_stiff.inference.prediction import Predictor
 
-        self._hand = ByHand(
-            asked.model,
-            asked.readings,
-            noise=asked.noise,
-            strut_spread=asked.strut_spread,
-            effect_files=asked.on.effect_files,
-        )
+        data = asked.readings
+        # Under the noise that a diagnosis writes out in full.
+        noise = max(noise_models(data, asked.noise, asked.strut_spread), key=lambda noise: noise.typical)
+        self._problem = Problem.of(Predictor(asked.model, data, asked.on.effect_files), noise)
         self._on = asked.on
         self._near: tuple[Mapping[str, Mapping[str, Any]], Fit] | None = None
 
@@ -45,7 +44,7 @@ class Preview:
         from toolpath_stiff.inference.prediction import scaled_law
 
         given = self._on.model.given or self._on.model.machine
-        return with_effects(self._on, effects, scaled_law(given.strut_law, self._hand.fit(_entries(effects)).law))
+        return with_effects(self._on, effects, scaled_law(given.strut_law, self._fit(effects).law))
 
     def at(
         self,
@@ -82,8 +81,8 @@ class Preview:
         from toolpath_stiff.inference.errors import deviation_percent, error_figures
         from toolpath_stiff.units import n_per_mm_from_n_per_m
 
-        fit = self._hand.fit(_entries(effects or {}), strut_law, None if near is None else self._fit_near(near))
-        modelled = n_per_mm_from_n_per_m(np.exp(self._hand.problem.observed - fit.residual))
+        fit = self._fit(effects or {}, strut_law, None if near is None else self._fit_near(near))
+        modelled = n_per_mm_from_n_per_m(np.exp(self._problem.observed - fit.residual))
         return {
             **error_figures(fit.residual),
             "deviation_percent": deviation_percent(fit.residual).tolist(),
@@ -94,8 +93,38 @@ class Preview:
         """The fit beside these effects; the last one is kept."""
         asked = {name: dict(keys) for name, keys in effects.items()}
         if self._near is None or self._near[0] != asked:
-            self._near = (asked, self._hand.fit(_entries(asked)))
+            self._near = (asked, self._fit(asked))
         return self._near[1]
+
+    def _fit(self, effects: Mapping[str, Mapping[str, Any]], law_free: bool = True, near: Fit | None = None) -> Fit:
+        """The strut law fitted beside effects of these sizes, or left as it is.
+
+        With `near`, a fit of other sizes, from its law on and with the readings wild that are wild there: to find out
+        which are takes most of the time where readings are many.
+        """
+        import numpy as np
+
+        from toolpath_stiff.inference.candidates import Candidate, Component
+        from toolpath_stiff.inference.fits import fit_effects
+        from toolpath_stiff.stiffness.catalogue import find_effect
+        from toolpath_stiff.stiffness.parameters import read_parameters
+
+        candidates, sizes = [], []
+        for entry in _entries(effects):
+            effect = find_effect(entry.name, self._problem.predictor.effect_files)
+            values = read_parameters(effect, entry, "by hand")
+            real = tuple(Component.of(parameter) for parameter in effect.parameters if not parameter.discrete)
+            choice = tuple((one.name, values[one.name]) for one in effect.parameters if one.discrete)
+            candidates.append(Candidate(effect, choice, real))
+            sizes.append(np.array([component.size(values[component.parameter.name]) for component in real]))
+        if near is not None:
+            return fit_effects(self._problem, candidates, sizes, (), near.law, near.scatter, law_free)
+        scatter = self._problem.scatter
+        fit = fit_effects(self._problem, candidates, sizes, (), np.zeros(2), scatter, law_free)
+        again = scatter.with_wild(fit.residual)
+        if law_free and again.wild != fit.scatter.wild:
+            fit = fit_effects(self._problem, candidates, sizes, (), fit.law, again, law_free)
+        return fit
 
 
 def with_effects(

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolpath_stiff.api.inputs import Program, Step, pose_si, program_from
+from toolpath_stiff.api.inputs import Step, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import checked
 from toolpath_stiff.units import m_from_mm
 
@@ -59,31 +60,26 @@ def case_study(
     on = machine_from(machine)
     part = None if program is None else program_from(program)
     model = on.running(part)
-    default = model.machine.default_origin
-    step = m_from_mm(step_mm)
-    read = None if part is None else lambda origin: part.moves(origin, default)
-    where, files = _regions(regions)
-    return run_case_study(model, step, read, where, (*(part.inputs if part else ()), *files, *on.inputs))
+    read = None if part is None else lambda origin: part.moves(origin, model.machine.default_origin)
+    file = (str(regions),) if isinstance(regions, str | Path) else ()
+    inputs = (*(part.inputs if part else ()), *file, *on.inputs)
+    return run_case_study(model, m_from_mm(step_mm), read, None if regions is None else _regions(regions), inputs)
 
 
-def _regions(
-    given: Mapping[str, Sequence[float]] | str | Path | None,
-) -> tuple[dict[str, Region] | None, tuple[str, ...]]:
-    """Regions by name in mm and degrees, checked, and the file that they come from."""
+def _regions(given: Mapping[str, Sequence[float]] | str | Path) -> dict[str, Region]:
+    """Regions by name in mm and degrees, checked."""
     from toolpath_stiff.placement.case_study import MOST_REGIONS, read_regions
 
-    if given is None:
-        return None, ()
-    files: tuple[str, ...] = (str(given),) if isinstance(given, str | Path) else ()
-    named: Mapping[str, Sequence[float]] = read_regions(files[0]) if isinstance(given, str | Path) else given
+    file = "" if isinstance(given, Mapping) else str(given)
+    named: Mapping[str, Sequence[float]] = given if isinstance(given, Mapping) else read_regions(file)
     if not 0 < len(named) <= MOST_REGIONS:
-        raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}", file=files[0] if files else "")
-    found = {}
+        raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}", file=file)
+    regions = {}
     for name, place in named.items():
         numbers = [float(value) for value in place]
         if len(numbers) not in (3, 4):
             raise InputError(f"region {name} of {len(numbers)} numbers", expected="x, y, z in mm, and the turn")
         x, y, z, turn = [*numbers, 0.0][:4]
         pose_si(f"region {name}", (x, y, z, 0.0, 0.0, turn))
-        found[str(name)] = (x, y, z, turn)
-    return found, files
+        regions[str(name)] = (x, y, z, turn)
+    return regions

@@ -2,145 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated
 
 from toolpath_stiff.api.diagnosis import Data, NoisePercent, Question, Seed, StrutSpread
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import options
 from toolpath_stiff.options import Option, checked, distinct_numbers, finite_number, names
-from toolpath_stiff.results import FolderResult, Progress, one_of, teller
+from toolpath_stiff.results import Progress, one_of, teller
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from toolpath_stiff.correction.update import Correction
+    from toolpath_stiff.correction.result import Update
     from toolpath_stiff.diagnosis.result import Diagnosis
+    from toolpath_stiff.machine.model import Machine as MachineModel
     from toolpath_stiff.planning.result import Plan
 
 COSTS = ("reading", "pose", "tool", "setup", "indicator")
-
-
-class Update(FolderResult):
-    """A machine's model corrected by measurements, or why it was not.
-
-    Attributes
-    ----------
-    correction
-        Steps and fits, with arrays in SI.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> found = tps.update("nist-table1", "nist", strut_law=True, noise_percent=5)
-    >>> found
-    <Update: updated, mean error 9.62 to 9.67 %>
-    >>> found.accepted, found.to_dict()["objective"]
-    (True, 'likelihood')
-    >>> found.to_frame()["mean_abs_error_percent"].round(2).tolist()
-    [9.62, 9.67]
-    >>> print(found.machine_text().splitlines()[0][:24])
-    # Machine nist, updated.
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = found.save_machine(pathlib.Path(folder, "mine.toml"))
-    ...     tps.Machine.load(file).name == found.machine.name
-    True
-    >>> print(found.next[0])
-    what is left:
-    tps compare nist-table1 --machine machine.toml --noise 5
-    >>> list(found.files(plots=False)), type(found.plot()).__name__
-    (['update.json', 'residuals.csv', 'machine.toml'], 'Figure')
-    """
-
-    command: ClassVar[str] = "update"
-
-    def __init__(self, correction: Correction, asked: Question) -> None:
-        from toolpath_stiff.correction.document import document
-
-        self.correction, self._asked, self.inputs = correction, asked, asked.inputs
-        self._document = document(correction)
-
-    @property
-    def accepted(self) -> bool:
-        """Whether the data support what was added."""
-        return self.correction.machine is not None
-
-    @property
-    def machine(self) -> Machine:
-        """The machine that carries what was added; raises `InputError` where it was refused."""
-        from toolpath_stiff.stiffness.model import build_model
-
-        if self.correction.machine is None:
-            worse = self.correction.update.worse
-            raise InputError(
-                f"the update was refused: {self._document['text']}",
-                hint="" if worse else "force=True keeps it all the same",
-            )
-        on = self._asked.on
-        model = replace(build_model(self.correction.machine, on.effect_files), unchecked=on.model.unchecked)
-        return Machine(model, on.asked, on.effect_files, allow_unchecked_effects=on.allow_unchecked_effects)
-
-    @property
-    def next(self) -> list[str]:
-        """Commands that go on from here."""
-        return list(self.correction.next)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of update.json."""
-        return dict(self._document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The steps, one a row: as given, strut law refitted, each effect; errors in per cent."""
-        import pandas as pd
-
-        return pd.DataFrame(self._document["steps"])
-
-    def plot(self) -> Figure:
-        """What each step does to the error."""
-        from toolpath_stiff.report.update.page import ladder
-        from toolpath_stiff.report.update.pictures import error_ladder_png
-
-        return error_ladder_png.figure(*ladder(self._document))
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.update.page import text
-
-        return text(self._document)
-
-    def _short(self) -> str:
-        first, last = (self._document["steps"][i]["mean_abs_error_percent"] for i in (0, -1))
-        return f"{self._document['verdict']}, mean error {first:.2f} to {last:.2f} %"
-
-    def machine_text(self) -> str:
-        """The new machine file, with where its fitted values come from; raises `InputError` where it was refused."""
-        from toolpath_stiff.machine.writer import machine_toml
-        from toolpath_stiff.report.update.page import machine_heading
-
-        model = self.machine.model
-        return machine_toml(model.given or model.machine, machine_heading(self._document))
-
-    def save_machine(self, file: str | Path) -> Path:
-        """Write the new machine file, whole or not at all."""
-        from toolpath_stiff.files import write_atomically
-
-        return write_atomically(file, self.machine_text())
-
-    def files(self, *, plots: bool = True, machine: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps update`; the machine file too, unless it is said not."""
-        from toolpath_stiff.report.update.page import files
-
-        found = self.correction
-        return files(
-            found.update, self._document, machine=found.machine if machine else None, bars=found.bars, plots=plots
-        )
 
 
 @checked
@@ -197,29 +79,26 @@ def update(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.update("nist-table1", "nist", strut_law=True)
-    >>> found.to_frame()["name"].tolist()
+    >>> update = tps.update("nist-table1", "nist", strut_law=True)
+    >>> update.to_frame()["name"].tolist()
     ['as given', 'strut law refitted']
     """
     from toolpath_stiff.correction.update import update as update_machine
+    from toolpath_stiff.stiffness.model import build_model
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
-    found = update_machine(
-        asked.model,
-        asked.readings,
-        [add] if isinstance(add, str) else list(add),
-        strut_law=strut_law,
-        keep_strut_law=keep_strut_law,
-        auto=auto,
-        force=force,
-        objective=objective,
-        files=asked.files,
-        machine_file=str(machine_file),
-        asked=asked.asked,
-        progress=teller(progress),
-        **asked.common,
-    )
-    return Update(found, asked)
+    on = asked.on
+
+    def opened(corrected: MachineModel) -> Machine:
+        model = replace(build_model(corrected, on.effect_files), unchecked=on.model.unchecked)
+        return Machine(model, on.asked, on.effect_files, allow_unchecked_effects=on.allow_unchecked_effects)
+
+    corrected = update_machine(
+        asked.model, asked.readings, [add] if isinstance(add, str) else list(add), strut_law=strut_law,
+        keep_strut_law=keep_strut_law, auto=auto, force=force, objective=objective, files=asked.files,
+        machine_file=str(machine_file), asked=asked.asked, progress=teller(progress), **asked.common,
+    )  # fmt: skip
+    return replace(corrected, inputs=asked.inputs, opened=opened)
 
 
 @checked
@@ -293,29 +172,27 @@ def plan(
     >>> list(found.files(plots=False)), len(found.rows) == len(found.to_frame())
     (['plan.csv', 'plan.json', 'plan_tables.npz'], True)
     """
+    from toolpath_stiff.planning.menu import Costs
     from toolpath_stiff.planning.result import plan as plan_visits
-    from toolpath_stiff.planning.visits import Costs
+    from toolpath_stiff.planning.result import usual_menu
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
-    costs = _costs(minutes or {})
-    own = _own_words(
-        between=between or None,
-        n=n,
-        radius=radius_mm,
-        heights=heights_mm,
-        max_tilt=max_tilt_deg,
-        loads=loads_N,
-        tools=tool_extensions_mm,
-        setups=setups,
-        cost=[f"{name}={_word(value)}" for name, value in (minutes or {}).items()],
-        seed=seed or None,
-    )
-    own += ["--indicators"] if indicators else []
-    return plan_visits(
-        asked.model,
-        None if asked.data is None else asked.readings,
-        between=tuple(between),
-        n=n,
+    minutes = {name: float(value) for name, value in (minutes or {}).items()}
+    for name, value in minutes.items():
+        one_of("minutes", name, COSTS)
+        if not value >= 0.0:
+            raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
+    line = asked.asked.command(
+        "plan",
+        *options(
+            between=_word(between or None), n=n, radius=_word(radius_mm), heights=_word(heights_mm),
+            max_tilt=_word(max_tilt_deg), loads=_word(loads_N), tools=_word(tool_extensions_mm), setups=_word(setups),
+            cost=[f"{name}={_word(value)}" for name, value in minutes.items()], seed=seed or None,
+            indicators=indicators,
+        ),
+    )  # fmt: skip
+    readings = None if asked.data is None else asked.readings
+    menu = usual_menu(readings).with_options(
         radius=None if radius_mm is None else m_from_mm(radius_mm),
         heights=_in_metres(heights_mm),
         max_tilt=None if max_tilt_deg is None else rad_from_deg(max_tilt_deg),
@@ -323,13 +200,13 @@ def plan(
         tool_extensions=_in_metres(tool_extensions_mm),
         setups=setups,
         indicators=indicators,
-        costs=Costs(**costs),
-        judgement=None if diagnosis is None else diagnosis.main,
-        names=asked.files,
-        line=asked.asked.command("plan", *own),
-        inputs=asked.inputs,
-        **asked.common,
+        costs=Costs(**minutes),
     )
+    judgement = None if diagnosis is None else diagnosis.main
+    proposal = plan_visits(
+        asked.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **asked.common
+    )
+    return replace(proposal, names=asked.files, line=line, inputs=asked.inputs)
 
 
 def _cost(text: str) -> tuple[str, float]:
@@ -338,30 +215,14 @@ def _cost(text: str) -> tuple[str, float]:
     return name, finite_number(value)
 
 
-def _costs(minutes: Mapping[str, float]) -> dict[str, float]:
-    """Minutes of each kind of work, checked."""
-    for name, value in minutes.items():
-        one_of("minutes", name, COSTS)
-        if not value >= 0.0:
-            raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
-    return {name: float(value) for name, value in minutes.items()}
-
-
 def _in_metres(values_mm: Sequence[float] | None) -> tuple[float, ...] | None:
     return None if values_mm is None else tuple(m_from_mm(float(value)) for value in values_mm)
 
 
-def _own_words(**given: object) -> list[str]:
-    """Options of a command: numbers as they are typed, lists with commas, --cost once an entry."""
-    words: dict[str, object] = {}
-    for name, value in given.items():
-        if isinstance(value, list | tuple) and name != "cost":
-            words[name] = ",".join(map(_word, value))
-        else:
-            words[name] = value if isinstance(value, list) or value is None else _word(value)
-    return options(**words)
-
-
-def _word(value: object) -> str:
-    """A value as an option takes it."""
+def _word(value: object) -> str | None:
+    """A value as an option takes it: a number as it is typed, several with commas."""
+    if value is None:
+        return None
+    if isinstance(value, list | tuple):
+        return ",".join(str(_word(part)) for part in value)
     return f"{value:.10g}" if isinstance(value, int | float) else str(value)

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.api.diagnosis import Data, NoisePercent, Question, Seed, StrutSpread
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.hints import options
 from toolpath_stiff.options import checked
-from toolpath_stiff.results import Progress, Result, teller
+from toolpath_stiff.results import Progress, teller
 
 if TYPE_CHECKING:
-    from toolpath_stiff.correction.draft import Draft
-    from toolpath_stiff.diagnosis.result import Diagnosis
+    from toolpath_stiff.correction.draft import EffectDraft
     from toolpath_stiff.stiffness.catalogue import EffectCatalogue
+    from toolpath_stiff.stiffness.effect_file import EffectFile
     from toolpath_stiff.stiffness.trial import EffectCheck
 
 
@@ -67,97 +67,6 @@ def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> E
     return EffectCheck(str(file), on.name, trials)
 
 
-class EffectFile(Result):
-    """The text of a file with an effect.
-
-    Attributes
-    ----------
-    name, text
-        The effect's name; the file.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> template = tps.effect_template("my_screw")
-    >>> template.to_dict()["effect"], template.text == str(template)
-    ('my_screw', True)
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = template.save(pathlib.Path(folder, "my_screw.py"))
-    ...     tps.effects([file])["my_screw"].link
-    'struts'
-    """
-
-    command: ClassVar[str] = "effects"
-
-    def __init__(self, name: str, text: str) -> None:
-        self.name, self.text = name, text
-
-    def to_dict(self) -> dict[str, Any]:
-        """Name and text."""
-        return {"effect": self.name, "text": self.text}
-
-    def __str__(self) -> str:
-        return self.text
-
-    def _short(self) -> str:
-        return f"{self.name}, {len(self.text.splitlines())} lines"
-
-    def save(self, file: str | Path) -> Path:
-        """Write the file, whole or not at all."""
-        from toolpath_stiff.files import write_atomically
-
-        return write_atomically(file, self.text)
-
-
-class EffectDraft(EffectFile):
-    """What a diagnosis leaves unexplained, as the text of an effect file.
-
-    Attributes
-    ----------
-    name, text
-        Name of the effect; the file, "" where there is nothing to describe.
-    effects
-        Names of all effects in it.
-    reason
-        Why nothing is drafted, a sentence; "" where something is.
-    diagnosis
-        The diagnosis that it was drawn from.
-    next
-        Commands that go on from here.
-    """
-
-    def __init__(self, name: str, draft: Draft, diagnosis: Diagnosis, commands: Sequence[str]) -> None:
-        super().__init__(name, draft.text)
-        self.effects, self.reason = list(draft.effects), draft.reason
-        self.diagnosis, self.next = diagnosis, list(commands) if draft.text else []
-
-    def to_dict(self) -> dict[str, Any]:
-        """Names and text, the verdict and the portrait; `reason` where nothing is drafted."""
-        said = self.diagnosis.to_dict()
-        return {
-            "effect": self.name if self.text else None,
-            "effects": self.effects,
-            "text": self.text,
-            "reason": self.reason,
-            "verdict": said["verdict"],
-            "portrait": said["portrait"],
-            "next": self.next,
-        }
-
-    def __str__(self) -> str:
-        return self.text or self.reason
-
-    def _short(self) -> str:
-        return super()._short() if self.text else self.reason
-
-    def save(self, file: str | Path) -> Path:
-        """Write the file, whole or not at all; raises `InputError` where nothing is drafted."""
-        if not self.text:
-            raise InputError(f"nothing is drafted: {self.reason}")
-        return super().save(file)
-
-
 def effect_template(name: str) -> EffectFile:
     """A commented, working example of an effect to change into one's own.
 
@@ -173,6 +82,8 @@ def effect_template(name: str) -> EffectFile:
     'my_screw'
     """
     from importlib import resources
+
+    from toolpath_stiff.stiffness.effect_file import EffectFile
 
     if not name.isidentifier():
         raise InputError(f"{name!r} cannot be an effect's name", expected="a name such as my_screw")
@@ -210,30 +121,34 @@ def draft_effect(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.draft_effect("nist-table1", "nist", noise_percent=20)
-    >>> found.reason
+    >>> drafted = tps.draft_effect("nist-table1", "nist", noise_percent=20)
+    >>> drafted.reason
     'Nothing is missing that these data could show: there is nothing to describe.'
-    >>> found.to_dict()["effect"] is None, found.text  # `found.save(FILE)` raises InputError then
+    >>> drafted.to_dict()["effect"] is None, drafted.text  # `drafted.save(FILE)` raises InputError then
     (True, '')
     """
     from toolpath_stiff.correction.draft import draft
     from toolpath_stiff.diagnosis.diagnose import diagnose
     from toolpath_stiff.stiffness.catalogue import known_effects
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    question = Question(machine, data, noise_percent, strut_spread_percent, seed)
     name = effect_name(file, ".toml")
-    if name in known_effects(asked.on.effect_files):
+    if name in known_effects(question.on.effect_files):
         raise InputError(f"effect {name} exists already", hint="give the draft another file name")
-    found = replace(
+    diagnosis = replace(
         diagnose(
-            asked.model, asked.readings, plan_next=False, names=asked.files, progress=teller(progress), **asked.common
+            question.model,
+            question.readings,
+            plan_next=False,
+            names=question.files,
+            progress=teller(progress),
+            **question.common,
         ),
-        line=asked.asked.command("diagnose", *options(seed=seed or None)),
-        asked=asked.asked,
-        inputs=asked.inputs,
+        line=question.asked.command("diagnose", *options(seed=seed or None)),
+        asked=question.asked,
+        inputs=question.inputs,
     )
-    drafted = draft(found, str(file))
-    return EffectDraft(name, drafted, found, next_of_draft(asked.asked, str(file)))
+    return draft(diagnosis, str(file))
 
 
 def effect_name(file: str | Path, ending: str = ".py") -> str:
@@ -242,12 +157,3 @@ def effect_name(file: str | Path, ending: str = ".py") -> str:
     if path.suffix != ending or not path.stem.isidentifier():
         raise InputError(f"{str(file)!r} cannot hold an effect", expected=f"a name such as my_screw{ending}")
     return path.stem
-
-
-def next_of_draft(asked: Asked, file: str) -> list[str]:
-    """What to do with a drafted file, as hints."""
-    return [
-        hint("read it, change it, then try it", command_line("effects", "check", file)),
-        hint("let it compete with the catalogue", asked.command("diagnose", effects=[file])),
-        hint("measure where it would show, or fail", asked.command("plan", effects=[file])),
-    ]

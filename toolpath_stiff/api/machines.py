@@ -1,4 +1,4 @@
-"""A machine with the effects that act on it, slips in its file, the file itself."""
+"""A machine with the effects that act on it, and slips in its file."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from toolpath_stiff.api.inputs import Program, pose_si
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.api.inputs import pose_si
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.options import Option, checked
-from toolpath_stiff.results import Result, TextResult, notebook_text
-from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm, pose_in_si
+from toolpath_stiff.results import Result
+from toolpath_stiff.units import mm_from_m, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.machine.kinematics import Struts
     from toolpath_stiff.machine.limits import Reach
     from toolpath_stiff.machine.model import Machine as MachineData
+    from toolpath_stiff.nc.program import Program
     from toolpath_stiff.stiffness.contract import Conditions
     from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -56,7 +57,7 @@ FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the pap
 
 
 @dataclass(frozen=True)
-class Machine:
+class Machine(Result):
     """A machine with the physical effects that act on it, and what it runs under.
 
     `Machine.load` makes one from a packaged machine or a machine file.
@@ -91,6 +92,9 @@ class Machine:
     >>> [round(value) for value in machine.joints_mm["frame"][0]], machine.joints_mm["tool"]
     ([1207, 2091, 3013], 150.0)
     """
+
+    command: ClassVar[str] = "machine"
+    shown_by: ClassVar[str] = "machine"
 
     model: StiffnessModel
     asked: str
@@ -138,10 +142,10 @@ class Machine:
         """
         files = tuple(map(str, effects))
         model = _checked_model(str(machine), files, allow_unchecked_effects)
-        found = cls(model, str(machine), files, allow_unchecked_effects=allow_unchecked_effects)
-        found = found.under(setup, temperature_C)
-        found.running()
-        return found
+        loaded = cls(model, str(machine), files, allow_unchecked_effects=allow_unchecked_effects)
+        loaded = loaded.under(setup, temperature_C)
+        loaded.running()
+        return loaded
 
     @checked
     def under(self, setup: Setup = None, temperature_C: Temperature = None) -> Machine:
@@ -160,9 +164,9 @@ class Machine:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For another process: effects of one's own travel as their files, a class of such a file cannot."""
-        files = tuple(str(Path(file).absolute()) for file in self.effect_files)
-        built_from = (self.model.given or self.model.machine, files, self.model.conditions)
-        return _machine_again, (*built_from, self.asked, self.setup, self.temperature_C, self.model.unchecked)
+        model, files = self.model, tuple(str(Path(file).absolute()) for file in self.effect_files)
+        fields = (self.asked, files, self.setup, self.temperature_C, bool(model.unchecked))
+        return _machine_again, (model.given or model.machine, model.conditions, model.unchecked, fields)
 
     @staticmethod
     def names() -> list[str]:
@@ -179,8 +183,13 @@ class Machine:
         return list(packaged_machines())
 
     def __repr__(self) -> str:
-        acting = ", ".join(self.effects) or "no effects"
-        return f"<Machine {self.name}: 6 struts, {acting}>"
+        return f"<Machine {self.name}: {self._short()}>"
+
+    def _short(self) -> str:
+        return f"6 struts, {', '.join(self.effects) or 'no effects'}"
+
+    def __str__(self) -> str:
+        return self.text()
 
     @property
     def name(self) -> str:
@@ -234,12 +243,9 @@ class Machine:
             setup, said_by = program.controller.setup, str(program.said.get("controller"))
         check_setup(model.conditions.setup or "", f"machine {self.name}, [setup] name", model)
         check_setup(setup or "", said_by, model, *(other.model for other in beside))
-        asked = "" if setup == NO_SETUP else setup
-        conditions = Conditions(
-            model.conditions.setup if asked is None else asked,
-            model.conditions.temperature if self.temperature_C is None else self.temperature_C,
-        )
-        return replace(model, conditions=conditions)
+        chosen = "" if setup == NO_SETUP else setup
+        temperature = model.conditions.temperature if self.temperature_C is None else self.temperature_C
+        return replace(model, conditions=Conditions(model.conditions.setup if chosen is None else chosen, temperature))
 
     def like(self, machine: str | Path) -> Machine:
         """Another machine with the same effect files, set-up and temperature.
@@ -285,9 +291,7 @@ class Machine:
         """
         import pandas as pd
 
-        from toolpath_stiff.report.machine import figure_entries
-
-        return pd.DataFrame(figure_entries(self.model.machine))
+        return pd.DataFrame(self.to_dict()["figures"])
 
     def plot(self, pose_mm_deg: Sequence[float] | None = None) -> Figure:
         """The machine at a pose, from three sides.
@@ -299,9 +303,8 @@ class Machine:
         >>> type(machine.plot((0, 0, 800))).__name__
         'Figure'
         """
-        from toolpath_stiff.report.machine import machine_picture
-
-        return machine_picture.figure(self.model.machine, *self.standing(pose_mm_deg)[:2])
+        figure: Figure = self.view.machine_picture.figure(self.model.machine, *self.standing(pose_mm_deg)[:2])
+        return figure
 
     def standing(self, pose_mm_deg: Sequence[float] | None = None) -> tuple[FloatArray, Struts, Reach]:
         """A pose (6,) in SI (unless given, the paper's Figure 2 or the default origin), struts and reach there.
@@ -314,21 +317,12 @@ class Machine:
         >>> pose.tolist(), struts.lengths.shape, bool(reach.reachable[0])
         ([0.0, 0.0, 0.8, 0.0, 0.0, 0.0], (1, 6), True)
         """
-        import numpy as np
-
-        from toolpath_stiff.machine.kinematics import solve_struts
-        from toolpath_stiff.machine.limits import reach
-        from toolpath_stiff.rotations import rotation_matrices
+        from toolpath_stiff.machine.limits import stand
 
         machine = self.model.machine
-        given = self._shown_pose() if pose_mm_deg is None else pose_si("pose", pose_mm_deg)
-        pose = np.array(given)
-        turn = rotation_matrices(pose[3:])
-        struts = solve_struts(machine, pose[:3], turn)
-        return pose, struts, reach(machine, pose[:3], struts, turn[None])
-
-    def _shown_pose(self) -> Pose:
-        return pose_in_si(FIGURE_2_MM_DEG) if self.name == "nist" else self.model.machine.default_origin
+        if pose_mm_deg is None:
+            return stand(machine, pose_in_si(FIGURE_2_MM_DEG) if self.name == "nist" else machine.default_origin)
+        return stand(machine, pose_si("pose", pose_mm_deg))
 
     @property
     def joints_mm(self) -> dict[str, Any]:
@@ -359,16 +353,13 @@ class Machine:
         from toolpath_stiff.analysis.poses import reach_along
         from toolpath_stiff.rotations import rotation_matrices
 
-        pose = np.array(pose_si("pose", from_mm_deg))
-        rays = np.asarray(directions, dtype=float)
+        pose, rays = np.array(pose_si("pose", from_mm_deg)), np.asarray(directions, dtype=float)
         rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
         return mm_from_m(reach_along(self.model.machine, pose[:3], rays, rotation_matrices(pose[3:])))
 
     def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
         """What `plot` draws as a PNG."""
-        from toolpath_stiff.report.machine import machine_picture
-
-        return machine_picture(self.model.machine, *self.standing(pose_mm_deg)[:2])
+        return bytes(self.view.machine_picture(self.model.machine, *self.standing(pose_mm_deg)[:2]))
 
     def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
         """Its figures with their origin, and how far the limits are at a pose.
@@ -380,12 +371,7 @@ class Machine:
         >>> print(machine.text().splitlines()[0])
         NIST Ingersoll Octahedral Hexapod
         """
-        from toolpath_stiff.report.machine import text
-
-        return text(self.model.machine, self.standing(pose_mm_deg)[2])
-
-    def __str__(self) -> str:
-        return self.text()
+        return str(self.view.text(self.model.machine, self.standing(pose_mm_deg)[2]))
 
     def to_dict(self) -> dict[str, Any]:
         """Name, title, source, effects, and its figures as `to_frame` has them, each with its unit and origin.
@@ -397,19 +383,13 @@ class Machine:
         >>> found["name"], found["effects"], found["figures"][-1]["unit"]
         ('nist', [], 'mm/min')
         """
-        from toolpath_stiff.report.machine import figure_entries
-
         return {
             "name": self.name,
             "title": self.title,
             "source": self.source,
             "effects": self.effects,
-            "figures": figure_entries(self.model.machine),
+            "figures": self.view.figure_entries(self.model.machine),
         }
-
-    def _repr_html_(self) -> str:
-        """For notebooks."""
-        return notebook_text(str(self))
 
     def check(self) -> MachineCheck:
         """Look for slips in the figures: units, signs, mirrored joints; what its effects lack.
@@ -435,26 +415,18 @@ class Machine:
         ...     tps.Machine.load(file).name
         'nist'
         """
-        from toolpath_stiff.files import write_atomically
         from toolpath_stiff.machine.writer import machine_toml
 
-        return write_atomically(Path(file), machine_toml(self.model.given or self.model.machine))
+        return write_atomically(file, machine_toml(self.model.given or self.model.machine))
 
 
 def _machine_again(
-    given: MachineData,
-    files: tuple[str, ...],
-    conditions: Conditions,
-    asked: str,
-    setup: str | None,
-    temperature_C: float | None,
-    unchecked: tuple[str, ...],
+    given: MachineData, conditions: Conditions, unchecked: tuple[str, ...], fields: tuple[Any, ...]
 ) -> Machine:
     """A machine in another process."""
     from toolpath_stiff.stiffness.model import build_model
 
-    model = replace(build_model(given, files, conditions=conditions), unchecked=unchecked)
-    return Machine(model, asked, files, setup, temperature_C, bool(unchecked))
+    return Machine(replace(build_model(given, fields[1], conditions=conditions), unchecked=unchecked), *fields)
 
 
 def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects: bool) -> StiffnessModel:
@@ -494,137 +466,3 @@ def check_machine(machine: Machine | str | Path) -> MachineCheck:
 
     on = machine_from(machine)
     return look(on.running(), on.asked)
-
-
-class MachineFile(Result):
-    """The text of a machine file.
-
-    Attributes
-    ----------
-    name, text, notes
-        The machine's name; the file; what was assumed in making it.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> template = tps.machine_template("mill.toml")
-    >>> template.name, template.to_dict()["notes"]
-    ('mill', [])
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = template.save(pathlib.Path(folder, "mill.toml"))
-    ...     tps.Machine.load(file)
-    <Machine mill: 6 struts, no effects>
-    """
-
-    command: ClassVar[str] = "machine"
-
-    def __init__(self, name: str, text: str, notes: Sequence[str] = ()) -> None:
-        self.name, self.text, self.notes = name, text, list(notes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The text and the notes."""
-        return {"machine": self.name, "text": self.text, "notes": self.notes}
-
-    def __str__(self) -> str:
-        return self.text
-
-    def _short(self) -> str:
-        return f"{self.name}, {len(self.text.splitlines())} lines"
-
-    def save(self, file: str | Path) -> Path:
-        """Write the file, whole or not at all."""
-        from toolpath_stiff.files import write_atomically
-
-        return write_atomically(file, self.text)
-
-
-def machine_template(file: str | Path = "mine.toml") -> MachineFile:
-    """A commented machine file to edit, named after its file; nothing is written before `save`.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_template("mill.toml").name
-    'mill'
-    """
-    from importlib import resources
-
-    from toolpath_stiff.machine.writer import TEMPLATE_REMARK, toml_text
-
-    target = Path(file)
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")
-    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
-    return MachineFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
-
-
-@checked
-def machine_from_linuxcnc(
-    file: str | Path, units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None
-) -> MachineFile:
-    """The machine of the genhexkins pins in a LinuxCNC HAL file.
-
-    Parameters
-    ----------
-    file
-        The HAL file.
-    units
-        Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, lacks pins, or nobody says the unit.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_linuxcnc("nowhere.hal")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.FileError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
-    """
-    from toolpath_stiff.files import read_bytes
-    from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
-    from toolpath_stiff.machine.writer import machine_toml
-
-    path = Path(file)
-    text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
-    unit = units or units_of(path)
-    if unit is None:
-        raise InputError(
-            "the unit of the pins is not known (no ini file beside it that says LINEAR_UNITS)",
-            hint="give it with --units mm or --units inch",
-            file=str(file),
-        )
-    machine, notes = machine_from_hal(text, unit, path.name)
-    heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
-    return MachineFile(machine.name, machine_toml(machine, heading), notes)
-
-
-@checked
-def recover_geometry(
-    *,
-    starts: Annotated[int, Option("--starts", at_least=1, at_most=1000)] = 20,
-    seed: Annotated[int, Option("--seed", at_least=0)] = 1,
-) -> TextResult:
-    """Fit the NIST geometry to the paper's Table 1 anew, from scattered starting points.
-
-    Parameters
-    ----------
-    starts
-        How many starting points.
-    seed
-        Of where they lie.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.recover_geometry(starts=1)
-    >>> found.to_dict()["starts"]
-    1
-    """
-    from toolpath_stiff.correction.machines import recover_geometry as recover
-    from toolpath_stiff.correction.machines import recovery_text
-
-    found = recover(starts=starts, seed=seed)
-    return TextResult(recovery_text(found), found, f"the NIST geometry from {starts} starts")

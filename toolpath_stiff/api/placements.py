@@ -1,63 +1,34 @@
-"""Where the work should sit: the search, any placement tried, the program written for a placement."""
+"""Placements of the work: the search, any placement tried, the program written for a placement."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
-from toolpath_stiff.api.inputs import (
-    FARTHEST_MM,
-    Force,
-    Linearised,
-    LoadDirection,
-    Origin,
-    Program,
-    Step,
-    origin_si,
-    pose_si,
-    program_from,
-)
+from toolpath_stiff.api.inputs import FARTHEST_MM, Force, Linearised, LoadDirection, Origin, Step, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
+from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, low_high, numbers
-from toolpath_stiff.results import Progress, Result, counter
+from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
 if TYPE_CHECKING:
-    from toolpath_stiff.analysis.loads import Load
     from toolpath_stiff.machine.model import Machine as MachineModel
-    from toolpath_stiff.nc.moves import Program as ReadProgram
-    from toolpath_stiff.placement.climb import Bounds
-    from toolpath_stiff.placement.paths import WorkPath
+    from toolpath_stiff.nc.moves import ReadProgram
+    from toolpath_stiff.placement.evaluator import Evaluator
+    from toolpath_stiff.placement.goals import Bounds
+    from toolpath_stiff.placement.keep_out import KeepOut
     from toolpath_stiff.placement.result import Placement
-    from toolpath_stiff.placement.search import SearchRules
     from toolpath_stiff.placement.task import Rewriting
-    from toolpath_stiff.stiffness.model import StiffnessModel
+    from toolpath_stiff.rewriting.program import RewrittenProgram
 
 FARTHEST_TURN_DEG = 720.0
 MOST_FRONT_POINTS = 1000
 Range = tuple[float, float] | float
-
-
-@dataclass(frozen=True)
-class KeepOut:
-    """A box that the tool tip stays out of, rapids included: its name, two corners in machine coordinates, mm.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.KeepOut("vice", (-100, -50, 600), (100, 50, 700)).high_mm
-    (100, 50, 700)
-    """
-
-    name: str
-    low_mm: tuple[float, float, float]
-    high_mm: tuple[float, float, float]
 
 
 @checked
@@ -149,142 +120,83 @@ def place(
     []
     """
     from toolpath_stiff.analysis.loads import parse_load
+    from toolpath_stiff.placement.goals import SearchRules
     from toolpath_stiff.placement.placing import place_again, place_program
-    from toolpath_stiff.placement.task import Task
+    from toolpath_stiff.placement.task import SearchedFront, Task
 
     on, part = machine_from(machine), program_from(program)
-    if write is None and (decimals is not None or linearise_mm is not None):
-        option = "decimals" if decimals is not None else "linearise"
-        raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
-    rules = _rules(objective, margin_percent, allow_extrapolation, keep_out, seed, points)
     model = on.running(part)
     default = model.machine.default_origin
-    asked = origin_si(origin_mm_deg)
-    read = part.moves(asked, default)
+    origin = origin_si(origin_mm_deg)
+    read = part.moves(origin, default)
     task = Task(
         model=model,
         program=read,
-        present=asked or (read.origin if read.origin_source == "program" else default),
+        present=origin or (read.origin if read.origin_source == "program" else default),
         read=lambda origin: part.moves(origin, default),
         bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
-        rules=rules,
+        rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
         step=m_from_mm(step_mm),
         force=force_N,
-        rewriting=None if write is None else _rewriting(part, str(write), decimals, linearise_mm),
+        rewriting=_rewriting(part, write, decimals, linearise_mm),
     )
     if pick is None:
         placed = place_program(task, counter(progress, f"{part.name}: search"))
     else:
-        placed = place_again(task, _earlier(earlier), pick)
+        placed = place_again(task, SearchedFront.of(earlier), pick)
     return replace(placed, inputs=(*part.inputs, *on.inputs))
 
 
-def _rules(
-    objective: str,
-    margin_percent: float,
-    allow_extrapolation: bool,
-    keep_out: Iterable[KeepOut],
-    seed: int,
-    points: int,
-) -> SearchRules:
-    """What a placement must keep and be good at, in SI."""
-    from toolpath_stiff.placement.evaluator import Keepout
-    from toolpath_stiff.placement.search import SearchRules
+def _rewriting(
+    part: Program, write: str | Path | None, decimals: int | None, linearise_mm: float | None
+) -> Rewriting | None:
+    from toolpath_stiff.placement.task import Rewriting
 
-    return SearchRules(
-        objective=objective,
-        margin=margin_percent / 100.0,
-        allow_extrapolation=allow_extrapolation,
-        keepouts=tuple(
-            Keepout(box.name, _corner(box.low_mm), _corner(box.high_mm)) for box in map(_checked_box, keep_out)
-        ),
-        seed=seed,
-        points=points,
-    )
+    if write is not None:
+        chord = None if linearise_mm is None else m_from_mm(linearise_mm)
+        return Rewriting(str(write), decimals, chord, part.read_as)
+    if decimals is not None or linearise_mm is not None:
+        option = "decimals" if decimals is not None else "linearise"
+        raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
+    return None
 
 
 def _keep_out(text: str) -> KeepOut:
     """`NAME:X0,Y0,Z0,X1,Y1,Z1`."""
+    from toolpath_stiff.placement.keep_out import KeepOut
+
     name, _, corners = text.rpartition(":")
     values = numbers(corners)
     if not name or len(values) != 6:
         raise ValueError("NAME:X0,Y0,Z0,X1,Y1,Z1")
-    return _checked_box(KeepOut(name, values[:3], values[3:]))
-
-
-def _corner(corner_mm: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = (m_from_mm(float(v)) for v in corner_mm)
-    return x, y, z
-
-
-def _checked_box(box: KeepOut) -> KeepOut:
-    for low, high, axis in zip(box.low_mm, box.high_mm, "XYZ", strict=True):
-        if low >= high:
-            raise InputError(f"keep-out {box.name}: {axis}1 = {high:g} is not above {axis}0 = {low:g}")
-    return box
-
-
-def _rewriting(part: Program, file: str, decimals: int | None, linearise_mm: float | None) -> Rewriting:
-    from toolpath_stiff.placement.task import Rewriting
-
-    chord = None
-    if linearise_mm is not None:
-        chord = m_from_mm(linearise_mm)
-    return Rewriting(file, decimals, chord, part.read_as)
-
-
-def _earlier(earlier: Placement | str | Path | Mapping[str, Any] | None) -> dict[str, Any]:
-    """The document of an earlier search."""
-    from toolpath_stiff.files import read_text
-    from toolpath_stiff.placement.result import Placement
-
-    if isinstance(earlier, Placement):
-        return earlier.to_dict()
-    if isinstance(earlier, Mapping):
-        return dict(earlier)
-    if earlier is None:
-        raise InputError("--pick without an earlier search", hint="search first, without --pick")
-    file = Path(earlier)
-    if not file.exists():
-        raise InputError(
-            f"--pick: there is no earlier search in {file.parent} (no {file.name})",
-            hint=f"search first, without --pick, or name the search's folder with {both_names('--out')}",
-        )
-    try:
-        found = json.loads(read_text(file, "the earlier search"))
-    except ValueError as error:
-        raise InputError(f"--pick: {file} is no JSON: {error}", hint="search again, without --pick") from None
-    if not isinstance(found, dict):
-        raise InputError(f"--pick: {file} is no result of a search", hint="search again, without --pick")
-    return found
+    return KeepOut(name, values[:3], values[3:])
 
 
 def _bounds(
     machine: MachineModel, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
 ) -> Bounds:
-    """What may vary, in SI; where nothing is said, the machine's workspace."""
+    """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     import numpy as np
 
-    from toolpath_stiff.placement.climb import Bounds
+    from toolpath_stiff.placement.goals import Bounds
 
     heights = sorted(set(map(float, heights_mm)))
-    asked = [None if one is None else _pair(one) for one in box]
+    sides = [None if side is None else _pair(side) for side in box]
     if heights:
-        asked[2] = (heights[0], heights[-1])
-    low, high = (mm_from_m(corner) for corner in machine.limits.workspace)
-    sides = []
-    for name, side, lo, hi in zip("xyz", asked, low, high, strict=True):
-        if side is None and not np.isfinite(hi - lo):
-            raise InputError(f"the machine file bounds no workspace in {name}", hint=f"give --{name} LO:HI")
-        sides.append(side if side is not None else (float(lo), float(hi)))
-    if not max(abs(v) for side in sides for v in side) <= FARTHEST_MM:
+        sides[2] = (heights[0], heights[-1])
+    workspace = mm_from_m(machine.limits.workspace).T.tolist()
+    for i, (low, high) in enumerate(workspace):
+        if sides[i] is None and not np.isfinite(high - low):
+            raise InputError(f"the machine file bounds no workspace in {'xyz'[i]}", hint=f"give --{'xyz'[i]} LO:HI")
+    lengths = np.array([side or reach for side, reach in zip(sides, workspace, strict=True)])
+    angles = np.array([_pair(turn) for turn in turns])
+    if not np.abs(lengths).max() <= FARTHEST_MM:
         raise InputError("bounds beyond 100 m", expected="mm")
-    angles = [_pair(turn) for turn in turns]
-    if not max(abs(v) for pair in angles for v in pair) <= FARTHEST_TURN_DEG:
+    if not np.abs(angles).max() <= FARTHEST_TURN_DEG:
         raise InputError(f"a turn or tilt beyond {FARTHEST_TURN_DEG:g} degrees", expected="at most two whole turns")
-    ends = [[*(m_from_mm(s[end]) for s in sides), *(rad_from_deg(t[end]) for t in angles)] for end in (0, 1)]
-    return Bounds(np.array(ends[0]), np.array(ends[1]), tuple(m_from_mm(z) for z in heights))
+    low, high = np.concatenate([m_from_mm(lengths), rad_from_deg(angles)]).T
+    return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
 
 
 def _pair(given: Range) -> tuple[float, float]:
@@ -308,11 +220,9 @@ class PlacementTrial:
     True
     """
 
-    def __init__(self, model: StiffnessModel, program: ReadProgram, path: WorkPath, load: Load, force: float) -> None:
-        from toolpath_stiff.placement.evaluator import Evaluator
-
-        self._evaluator = Evaluator(model, path, load, force)
-        self.program, self.samples = program, len(path)
+    def __init__(self, program: ReadProgram, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+        self.program, self.samples = program, len(evaluator.path)
 
     def at(self, origin_mm_deg: Sequence[float]) -> dict[str, float | None]:
         """Mean, range and weakest in N/mm, margins as shares of a limit's span; None where a cut is out of reach."""
@@ -320,11 +230,11 @@ class PlacementTrial:
 
         from toolpath_stiff.units import n_per_mm_from_n_per_m
 
-        found = self._evaluator.figures(np.array([pose_si("origin", origin_mm_deg)]))
-        names = {"mean_N_per_mm": found.mean, "range_N_per_mm": found.spread, "min_N_per_mm": found.lowest}
-        stiffnesses = {name: float(n_per_mm_from_n_per_m(values[0])) for name, values in names.items()}
-        margins = {"margin": float(found.margin[0]), "rapid_margin": float(found.rapid_margin[0])}
-        return {name: value if np.isfinite(value) else None for name, value in {**stiffnesses, **margins}.items()}
+        figures = self._evaluator.figures(np.array([pose_si("origin", origin_mm_deg)]))
+        names = {"mean_N_per_mm": figures.mean, "range_N_per_mm": figures.spread, "min_N_per_mm": figures.lowest}
+        values = {name: float(n_per_mm_from_n_per_m(value[0])) for name, value in names.items()}
+        values |= {"margin": float(figures.margin[0]), "rapid_margin": float(figures.rapid_margin[0])}
+        return {name: value if np.isfinite(value) else None for name, value in values.items()}
 
 
 @checked
@@ -336,7 +246,7 @@ def try_placement(
     step_mm: Step = 1.0,
     force_N: Force = FORCE,
 ) -> PlacementTrial:
-    r"""What a program does wherever it is put: read and sampled once, then the figures of any placement at once.
+    r"""A program that can be put anywhere: read and sampled once, then the figures of any placement at once.
 
     The figures are those of `place` and of `analyze` with the same step. Arguments and errors as of `analyze`.
 
@@ -348,59 +258,16 @@ def try_placement(
     54353
     """
     from toolpath_stiff.analysis.loads import parse_load
+    from toolpath_stiff.placement.evaluator import Evaluator
     from toolpath_stiff.placement.paths import work_path
 
     on, part = machine_from(machine), program_from(program)
-    model, asked = on.running(part), parse_load(load)
+    model, direction = on.running(part), parse_load(load)
     default = model.machine.default_origin
     read = part.moves(None, default)
     present = read.origin if read.origin_source == "program" else default
-    step = m_from_mm(step_mm)
-    path = work_path(read, step, asked, present, lambda origin: part.moves(origin, default))
-    return PlacementTrial(model, read, path, asked, force_N)
-
-
-class RewrittenProgram(Result):
-    r"""A program written for another placement.
-
-    Attributes
-    ----------
-    name, content, notes
-        The program's name, the new file's bytes, what the user should hear of.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> moved = tps.rewrite(slot, to_mm_deg=(10, 0, 0))
-    >>> moved.content.splitlines()[3], moved.to_dict()["notes"]
-    (b'G1 X50', [])
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     moved.save(pathlib.Path(folder, "moved.nc")).name
-    'moved.nc'
-    """
-
-    command: ClassVar[str] = "place"
-
-    def __init__(self, name: str, content: bytes, encoding: str, notes: Sequence[str]) -> None:
-        self.name, self.content, self.encoding, self.notes = name, content, encoding, list(notes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return {"program": self.name, "text": self.content.decode(self.encoding), "notes": self.notes}
-
-    def __str__(self) -> str:
-        return self.content.decode(self.encoding)
-
-    def _short(self) -> str:
-        return f"{self.name}, {len(str(self).splitlines())} lines"
-
-    def save(self, file: str | Path) -> Path:
-        """Write the program, whole or not at all."""
-        from toolpath_stiff.files import write_atomically
-
-        return write_atomically(file, self.content)
+    path = work_path(read, m_from_mm(step_mm), direction, present, lambda origin: part.moves(origin, default))
+    return PlacementTrial(read, Evaluator(model, path, direction, force_N))
 
 
 def rewrite(
@@ -445,5 +312,4 @@ def rewrite(
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    written = rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
-    return RewrittenProgram(part.name, written.content, written.encoding, written.notes)
+    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)

@@ -69,11 +69,15 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
     columns = [(i, table.heading.index(c), c) for i, c in enumerate(POSE_COLUMNS) if c in table.heading]
     poses, errors = np.zeros((len(table.rows), 6)), []
     for row, (line, cells) in enumerate(table.rows):
-        for i, at, column in columns:
-            text = cells[at] if at < len(cells) else ""
+        for i, place, column in columns:
+            text = cells[place] if place < len(cells) else ""
             try:
-                poses[row, i] = _coordinate(text)
+                value = float(text)
             except ValueError:
+                value = np.nan
+            if abs(value) <= FARTHEST:
+                poses[row, i] = value
+            else:
                 expected = f"a number within +-{FARTHEST:g}"
                 errors.append(InputError(f"row {row + 1}, {column}: {text!r}", expected=expected, file=name, line=line))
     if errors:
@@ -81,21 +85,8 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
     return poses, tuple(table.notes)
 
 
-def _coordinate(text: str) -> float:
-    """A finite number within reason. Raises `ValueError`."""
-    value = float(text)
-    if not abs(value) <= FARTHEST:
-        raise ValueError(text)
-    return value
-
-
 @checked
-def pose(
-    pose_mm_deg: ArrayLike,
-    machine: Machine | str | Path = "nist",
-    *,
-    force_N: Force = FORCE,
-) -> PoseStiffness:
+def pose(pose_mm_deg: ArrayLike, machine: Machine | str | Path = "nist", *, force_N: Force = FORCE) -> PoseStiffness:
     """Stiffness at a pose, or at many.
 
     Parameters
@@ -141,16 +132,12 @@ def pose(
     poses = np.concatenate([rows, np.zeros((len(rows), 6 - rows.shape[1]))], axis=1)
     if not np.abs(poses).max(initial=0.0) <= FARTHEST:
         raise InputError(f"a pose of {np.abs(poses).max():g} mm or degrees", expected=f"numbers within +-{FARTHEST:g}")
-    model = on.running()
-    force = force_N
-    found = evaluate_poses(model, m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force)
-    found = replace(found, pose_mm_deg=poses, single=single)
-    if single and not found.reach.reachable[0]:
-        raise UnreachableError(
-            f"the pose is out of reach on machine {on.name}: {found.reach.describe(0)}",
-            hint=f"`{command_line('machine', 'show', on.asked)}` lists the limits",
-        )
-    return found
+    stiffness = evaluate_poses(on.running(), m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force_N)
+    stiffness = replace(stiffness, pose_mm_deg=poses, single=single)
+    if single and not stiffness.reach.reachable[0]:
+        mistake = f"the pose is out of reach on machine {on.name}: {stiffness.reach.describe(0)}"
+        raise UnreachableError(mistake, hint=f"`{command_line('machine', 'show', on.asked)}` lists the limits")
+    return stiffness
 
 
 def _angles(text: str) -> tuple[float, ...]:
@@ -220,18 +207,8 @@ def map_stiffness(
         raise InputError(f"heights {heights}: one appears twice", expected="each height once")
     if not max(abs(v) for v in (*x_mm, *y_mm, *heights)) <= FARTHEST_MM:
         raise InputError("a map beyond 100 m", expected="mm")
-    model = on.running()
     a, b, c = (rad_from_deg(float(v)) for v in tilt_deg)
     x, y = ((m_from_mm(float(low)), m_from_mm(float(high))) for low, high in (x_mm, y_mm))
-    grid = evaluate_grid(
-        model,
-        x,
-        y,
-        [m_from_mm(z) for z in heights],
-        parse_load(load),
-        points,
-        (a, b, c),
-        force_N,
-        counter(progress, "map: poses"),
-    )
+    levels, tell = [m_from_mm(z) for z in heights], counter(progress, "map: poses")
+    grid = evaluate_grid(on.running(), x, y, levels, parse_load(load), points, (a, b, c), force_N, tell)
     return replace(grid, inputs=on.inputs)

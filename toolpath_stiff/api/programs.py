@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
-from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Program, Step, origin_si, program_from
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
+from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked
-from toolpath_stiff.results import Progress, Result, counter
+from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import (
     m_from_mm,
     m_per_s_from_mm_per_min,
@@ -22,11 +22,9 @@ from toolpath_stiff.units import (
 )
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from toolpath_stiff.analysis import Analysis
     from toolpath_stiff.analysis.program_check import ProgramCheck
-    from toolpath_stiff.path import Samples
+    from toolpath_stiff.path import SampledPath
 
 RequiredStiffness = Annotated[
     float | None,
@@ -122,10 +120,10 @@ def analyze(
         second = compare_with if isinstance(compare_with, Machine) else first.like(compare_with)
     options, required = path_options(origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm)
 
-    def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> Analysis:
-        model = one.running(part, [other] if other else [])
+    def on(machine: Machine, other: Machine | None, progress: Callable[[int, int], None] | None) -> Analysis:
+        model = machine.running(part, [other] if other else [])
         read = part.moves(options["origin"], model.machine.default_origin)
-        return analyze(model, read, progress=told, **options)
+        return analyze(model, read, progress=progress, **options)
 
     return replace(
         on(first, second, counter(progress, f"{part.name}: samples")),
@@ -160,77 +158,6 @@ def path_options(
     return options, required
 
 
-class SampledPath(Result):
-    r"""The sampled path of a program, without a machine.
-
-    Attributes
-    ----------
-    samples
-        Arrays in SI.
-    name, warnings, unsupported
-        The program's; what deserves a look; "line:column: word: reason" of what was not acted upon.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> path = tps.sample_path(slot, step_mm=10)
-    >>> path
-    <SampledPath: slot.nc, 9 samples>
-    >>> path.to_dict()["x_mm"][-2:]
-    [30.0, 40.0]
-    >>> b"".join(path.csv()).decode().splitlines()[0][:26]
-    'line,motion,tool,s_mm,t_s,'
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path.save(pathlib.Path(folder, "path.csv")).name
-    'path.csv'
-    """
-
-    command: ClassVar[str] = "path"
-
-    def __init__(self, name: str, samples: Samples, warnings: Sequence[str], unsupported: Sequence[str]) -> None:
-        self.name, self.samples = name, samples
-        self.warnings, self.unsupported = list(warnings), list(unsupported)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        columns = self.to_frame()
-        return {
-            "program": self.name,
-            "warnings": self.warnings,
-            "unsupported": self.unsupported,
-            **{str(name): columns[name].astype(object).where(columns[name].notna(), None).tolist() for name in columns},
-        }
-
-    def to_frame(self) -> pd.DataFrame:
-        """The samples, one a row."""
-        import pandas as pd
-
-        from toolpath_stiff.path import path_columns
-
-        return pd.DataFrame(path_columns(self.samples))
-
-    def csv(self) -> Any:
-        """The table as the command writes it, in pieces of bytes."""
-        from toolpath_stiff.column_files import csv_pieces
-        from toolpath_stiff.path import PATH_COLUMNS, path_columns
-
-        return csv_pieces(partial(path_columns, self.samples), len(self.samples), PATH_COLUMNS)
-
-    def __str__(self) -> str:
-        return b"".join(self.csv()).decode()
-
-    def _short(self) -> str:
-        return f"{self.name}, {len(self.samples)} samples"
-
-    def save(self, file: str | Path) -> Path:
-        """Write the table as CSV, whole or not at all."""
-        from toolpath_stiff.files import write_atomically
-
-        return write_atomically(file, self.csv())
-
-
 @checked
 def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, step_mm: Step = 1.0) -> SampledPath:
     r"""The tool's path, sampled along its true shape.
@@ -256,16 +183,14 @@ def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, 
     >>> tps.sample_path(slot, step_mm=10).to_frame()[["motion", "x_mm", "z_mm"]].tail(2).values.tolist()
     [['feed', 30.0, 0.0], ['feed', 40.0, 0.0]]
     """
-    from toolpath_stiff.path import place, sample_moves
+    from toolpath_stiff.path import SampledPath, place, sample_moves
 
-    part = program_from(program)
-    asked = origin_si(origin_mm_deg)
-    step = m_from_mm(step_mm)
-    read = part.moves(asked)
-    origin = asked or read.origin
-    samples = sample_moves(place(read.moves, origin), step=step, origin=origin)
+    origin = origin_si(origin_mm_deg)
+    read = program_from(program).moves(origin)
+    origin = origin or read.origin
+    samples = sample_moves(place(read.moves, origin), step=m_from_mm(step_mm), origin=origin)
     left = [f"{read.name}:{word.line}:{word.column}: {word.word}: {word.reason}" for word in read.unsupported]
-    return SampledPath(read.name, samples, read.warnings, left)
+    return SampledPath(read.name, samples, list(read.warnings), left)
 
 
 @checked

@@ -14,12 +14,14 @@ The state is what the steps up to `done` have made of it; undo and redo move `do
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si
+from toolpath_stiff.api.inputs import finite, pose_si
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.programs import analyze
 from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.case.contents import reading_arguments
 from toolpath_stiff.case.exercise import BlindExercise
@@ -34,16 +36,21 @@ from toolpath_stiff.case.files import (
     without_lines,
     write_files,
 )
-from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES, read_case
+from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES, read_case, recorded
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import FileError, InputError, TpsError
 from toolpath_stiff.files import read_bytes, reason
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.machine.model import EffectEntry
+from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import arguments_of
+from toolpath_stiff.report.words import counted
+from toolpath_stiff.results import Progress
+from toolpath_stiff.stiffness.catalogue import find_effect
+from toolpath_stiff.stiffness.parameters import read_parameters
 
 if TYPE_CHECKING:
-    from toolpath_stiff.api.effects import EffectDraft
-from toolpath_stiff.results import Progress
+    from toolpath_stiff.correction.draft import EffectDraft
 
 
 class Case(BlindExercise):
@@ -113,19 +120,20 @@ class Case(BlindExercise):
         except OSError as error:  # a name that is too long, a circle of links
             raise FileError(f"cannot open the case {str(folder)!r}: {reason(error)}") from None
         if there:
-            found = cls(place, *read_case(place / CASE_FILE))
-            found.check_files()
+            case = cls(place, *read_case(place / CASE_FILE))
+            case.check_files()
         else:
-            found = cls(place, [], 0, "")
-            found.set_machine(machine)
+            case = cls(place, [], 0, "")
+            case.set_machine(machine)
         if trust := tuple(trust):
-            found.trust(*trust)
-        return found
+            case.trust(*trust)
+        return case
 
     def __repr__(self) -> str:
         off = f", without {', '.join(self.not_agreed)}: not agreed to" if self.not_agreed else ""
         return f"<Case {self.folder.name}: {self._done} steps{off}>"
 
+    @recorded
     def set_machine(self, machine: str | Path) -> None:
         """Use another machine: a name or a file, of which the case keeps a copy.
 
@@ -147,16 +155,14 @@ class Case(BlindExercise):
         except TpsError:
             drop(self.folder, name)
             raise
-        python = f"case.set_machine({str(machine)!r})"
-        if not self.history:
-            python = f"case = tps.Case.open({self.folder.resolve().name!r}, {str(machine)!r})"
+        begun = f"case = tps.Case.open({self.folder.resolve().name!r}, {str(machine)!r})"
         self.record(
             "machine",
             f"machine {Path(machine).name}",
             change={"machine": name, "on": {}},
             files=[name],
             command=command_line("machine", "check", name),
-            python=python,
+            python="" if self.history else begun,
         )
 
     def trust(self, *names: str) -> None:
@@ -194,6 +200,7 @@ class Case(BlindExercise):
             withdraw(content)
             raise
 
+    @recorded
     def add_effects(self, file: str | Path) -> None:
         """Use a Python file with effects of one's own. Its code is run: to add it is to agree to that, as of `trust`.
 
@@ -209,17 +216,17 @@ class Case(BlindExercise):
         ('effects/my_screw-2.py',)
         """
         name = copied(self.folder, file, "effects")
-        self._take_effects(name, "", f"own effects of {Path(file).name}", f"case.add_effects({str(file)!r})")
+        self._take_effects(name, "", f"own effects of {Path(file).name}")
 
+    @recorded
     def change_effects(self, name: str, file: str | Path) -> None:
         """Use an edited file in place of a file of own effects of the case (its name there). Its code is run."""
         if name not in self.state.effects:
             raise InputError(f"{name} is no file of own effects of this case", expected=", ".join(self.state.effects))
         new = copied(self.folder, first_name(name), "effects", read_bytes(file, "the file"))
-        text = f"own effects of {Path(name).name}, edited"
-        self._take_effects(new, name, text, f"case.change_effects({name!r}, {str(file)!r})")
+        self._take_effects(new, name, f"own effects of {Path(name).name}, edited")
 
-    def _take_effects(self, new: str, old: str, text: str, python: str) -> None:
+    def _take_effects(self, new: str, old: str, text: str) -> None:
         """Put a file of the case among the effects, in place of `old` if there is one; drop it where it is at fault."""
         state, recorded = self.state, self.recorded
         files = [*(one for one in state.effects if one != old), new]
@@ -234,9 +241,9 @@ class Case(BlindExercise):
             "effects": (*(one for one in recorded.effects if one != old), new),
             "on": {name: keys for name, keys in recorded.on.items() if name not in lost},
         }
-        command = command_line("effects", "check", new)
-        self.record("effects", text, change=change, files=[new], command=command, python=python)
+        self.record("effects", text, change=change, files=[new], command=command_line("effects", "check", new))
 
+    @recorded
     def add_data(self, *files: str | Path) -> None:
         """Add measurement files; the case keeps copies, and nothing is kept of a file that cannot be used.
 
@@ -250,8 +257,6 @@ class Case(BlindExercise):
         ...     case.data_files, len(case.data.to_frame()), case.question("compare").split()[:2]
         (('data/nist-table1.csv',), 42, ['tps', 'compare'])
         """
-        from toolpath_stiff.report.words import counted
-
         names = [copied(self.folder, file, "data", measurements_csv(file, self.machine)) for file in files]
         after = (*self.state.data, *names)
         try:
@@ -260,38 +265,25 @@ class Case(BlindExercise):
             drop(self.folder, *names)
             raise
         text = f"{', '.join(Path(file).name for file in files)} added: {counted(count, 'reading')} in all"
-        self.record(
-            "data",
-            text,
-            change={"data": after},
-            files=names,
-            command=self._ask("compare", after),
-            python=f"case.add_data({', '.join(repr(str(file)) for file in files)})",
-        )
+        self.record("data", text, change={"data": after}, files=names, command=self._line("compare", after))
 
+    @recorded
     def set_aside(self, file: str, line: int, back: bool = False) -> None:
         """Leave out the readings of a line of a measurement file of the case; `back`: use them again."""
         state, entry = self.state, f"{file}:{line}"
         if file not in state.data or (entry in state.aside) is not back:
             raise InputError(f"{entry} is no reading that is {'set aside' if back else 'in use'}")
-        aside = tuple(one for one in state.aside if one != entry) if back else (*state.aside, entry)
-        touched = without_lines(
-            self.folder / file, [int(one.rpartition(":")[2]) for one in aside if one.startswith(file + ":")]
-        )
-        write_files(self.folder, {used_name(file): touched})
+        aside = tuple(other for other in state.aside if other != entry) if back else (*state.aside, entry)
+        lines = replace(state, aside=aside).lines_aside.get(file, [])
+        write_files(self.folder, {used_name(file): without_lines(self.folder / file, lines)})
         if not back:
             self._check_aside(file, line)
+        words = " ".join(f"-e '{number}s/^/# /'" for number in lines)
+        command = f"sed {words} {file} > {used_name(file)}" if words else self._line("compare", state.data)
         text = f"{file} line {line} {'used again' if back else 'set aside'}"
-        words = [f"-e '{one.rpartition(':')[2]}s/^/# /'" for one in aside if one.startswith(file + ":")]
-        sed = f"sed {' '.join(words)} {file} > {used_name(file)}" if words else self._ask("compare", state.data)
-        self.record(
-            "aside",
-            text,
-            change={"aside": aside},
-            command=sed,
-            python=f"case.set_aside({file!r}, {line}{', back=True' if back else ''})",
-        )
+        self.record("aside", text, change={"aside": aside}, command=command)
 
+    @recorded
     def switch(self, effect: str, values: Mapping[str, Any] | None) -> None:
         """Switch an effect on with these values (keys as in a machine file), or off with None.
 
@@ -311,29 +303,21 @@ class Case(BlindExercise):
         on = {name: dict(keys) for name, keys in self.recorded.on.items() if name != effect}
         if values is not None:
             on[effect] = dict(values)
-        name = self._machine_by_hand(self._known(on, self.state.effects))
-        said = ", ".join(f"{key} {_short(value)}" for key, value in (values or {}).items())
+        acting, name = self._known(on, self.state.effects), self.state.machine
+        if acting:
+            name = free_name(self.folder, "machines/by-hand.toml")
+            self.machine_with(acting).save(self.folder / name)
+        sizes = ", ".join(f"{key} {_short(value)}" for key, value in (values or {}).items())
+        asked = self.question("compare", name) if self.state.data else command_line("machine", "check", name)
         self.record(
             "switch",
-            f"{effect} on: {said}" if values is not None else f"{effect} off",
+            f"{effect} off" if values is None else f"{effect} on: {sizes}",
             change={"on": on},
             files=[name] if name != self.state.machine else [],
-            command=self._of_machine(name),
-            python=f"case.switch({effect!r}, {dict(values) if values is not None else None!r})",
+            command=asked,
         )
 
-    def _of_machine(self, name: str) -> str:
-        """What asks a machine file for its errors; without readings, for its slips."""
-        return self.question("compare", machine=name) if self.state.data else command_line("machine", "check", name)
-
-    def _machine_by_hand(self, on: Mapping[str, Mapping[str, Any]]) -> str:
-        """The file of the machine with these effects, written for whoever asks the commands; as it stands with none."""
-        if not on:
-            return self.state.machine
-        name = free_name(self.folder, "machines/by-hand.toml")
-        self.machine_with(on).save(self.folder / name)
-        return name
-
+    @recorded
     def accept(self, file: str | Path) -> None:
         """Go on with the machine file that an update of this case wrote.
 
@@ -356,9 +340,9 @@ class Case(BlindExercise):
             change={"machine": name, "on": {}},
             files=[name],
             command=f"{command} -o {name}" if command else "",
-            python=f"case.accept({str(file)!r})",
         )
 
+    @recorded
     def add_program(self, file: str | Path, **reading: Unpack[Reading]) -> None:
         r"""Use an NC program or cutter-location file.
 
@@ -377,14 +361,14 @@ class Case(BlindExercise):
         ...     case.add_program(file, tools=tools)
         ...     case.place_at((0, 0, 850))
         ...     case.require(50000)
-        ...     found = case.analyze()
-        ...     case.program, found.complete, case.latest("analyze"), case.history[-1].command[:30]
+        ...     analysis = case.analyze()
+        ...     case.program, analysis.complete, case.latest("analyze"), case.history[-1].command[:30]
         (<Program slot.nc>, True, 'results/005-analyze', 'tps analyze programs/slot.nc -')
         """
         name = copied(self.folder, file, "programs")
-        python = f"case.add_program({', '.join([repr(str(file)), *_arguments(reading)])})"
-        self._take_program(name, reading, [name], "program", f"program {Path(file).name}", python)
+        self._take_program(name, reading, [name], "program", f"program {Path(file).name}")
 
+    @recorded
     def read_programs(self, **reading: Unpack[Reading]) -> None:
         r"""Read the programs of the case with another tool table, offsets, controller file: arguments of `add_program`.
 
@@ -401,12 +385,9 @@ class Case(BlindExercise):
         {'tools': 'programs/my.tbl'}
         """
         text = ", ".join(f"{TABLES.get(name, name)} {Path(str(value)).name}" for name, value in reading.items())
-        python = f"case.read_programs({', '.join(_arguments(reading))})"
-        self._take_program(self.state.program, reading, [], "reading", f"programs are read with {text}", python)
+        self._take_program(self.state.program, reading, [], "reading", f"programs are read with {text}")
 
-    def _take_program(
-        self, program: str, given: Mapping[str, Any], files: list[str], kind: str, text: str, python: str
-    ) -> None:
+    def _take_program(self, program: str, given: Mapping[str, Any], files: list[str], kind: str, text: str) -> None:
         """Read a program of the case with what it has and what is given; drop the files where it cannot be read."""
         state, reading = self.state, dict(self.state.reading)
         try:
@@ -430,56 +411,40 @@ class Case(BlindExercise):
         change: dict[str, Any] = {"reading": reading} if reading != state.reading else {}
         if program != state.program:
             change |= {"program": program, "origin": ()}
-        command = self._analyze_line(program, change.get("origin", state.origin), reading=reading) if program else ""
-        self.record(kind, text, change=change, files=files, command=command, python=python)
+        self.record(kind, text, change=change, files=files, command=self.program_line(change=change))
 
+    @recorded
     def place_at(self, origin_mm_deg: Sequence[float]) -> None:
         """Put program zero somewhere: X, Y, Z, A, B, C in machine coordinates."""
         pose_si("origin", origin_mm_deg)
         origin = tuple(round(float(value), 6) for value in origin_mm_deg)
         word = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", origin, strict=False))
-        self.record(
-            "place_at",
-            f"program zero at {word}",
-            change={"origin": origin},
-            command=self._analyze_line(self.state.program, origin),
-            python=f"case.place_at({origin})",
-        )
+        change = {"origin": origin}
+        self.record("place_at", f"program zero at {word}", change=change, command=self.program_line(change=change))
 
+    @recorded
     def require(self, stiffness_N_per_mm: float) -> None:
         """Ask a stiffness of every cut; 0: none."""
-        from toolpath_stiff.api.programs import analyze
+        required = finite("required", stiffness_N_per_mm)
+        if required:
+            arguments_of(analyze)["require_N_per_mm"].check(required)
+        change = {"require": required}
+        self.record("require", f"{required:g} N/mm required", change=change, command=self.program_line(change=change))
 
-        asked = finite("required", stiffness_N_per_mm)
-        if asked:
-            arguments_of(analyze)["require_N_per_mm"].check(asked)
-        self.record(
-            "require",
-            f"{asked:g} N/mm required",
-            change={"require": asked},
-            command=self._analyze_line(self.state.program, self.state.origin, require=asked)
-            if self.state.program
-            else "",
-            python=f"case.require({asked:g})",
-        )
-
+    @recorded
     def draft(self, progress: Progress | None = None) -> EffectDraft:
         """What a diagnosis leaves unexplained as an effect file, as `tps.draft_effect`; the case uses it from then on.
 
         It competes like an effect of one's own; without new readings it is `described` at best.
         """
         result = self.next_result("draft")
-        found, command = self.draft_in(result, progress)
-        self.record("draft", found._short(), command=command, python="case.draft()", result=result)
-        if found.text:
-            self.add_effects(self.folder / result / f"{found.name}.toml")
-        return found
+        draft, command = self._draft(result, progress)
+        self.record("draft", draft._short(), command=command, result=result)
+        if draft.text:
+            self.add_effects(self.folder / result / f"{draft.name}.toml")
+        return draft
 
     def _check_effect(self, name: str, values: Mapping[str, Any], on: bool) -> None:
-        from toolpath_stiff.machine.model import EffectEntry
-        from toolpath_stiff.stiffness.catalogue import find_effect
-        from toolpath_stiff.stiffness.contract import read_parameters
-
         effect = find_effect(name, [self.path(one) for one in self.state.effects])
         if on:
             read_parameters(effect, EffectEntry(name, dict(values)), "by hand")
@@ -497,11 +462,6 @@ class Case(BlindExercise):
         if not good:
             self._rewrite_used()
             raise InputError(f"{file} line {line} cannot be left out by itself")
-
-
-def _arguments(given: Mapping[str, Any]) -> list[str]:
-    """Arguments as a Python line has them."""
-    return [f"{name}={str(value) if isinstance(value, Path) else value!r}" for name, value in given.items()]
 
 
 def _short(value: Any) -> str:

@@ -5,27 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from types import MappingProxyType
+from typing import Any, cast
 
 from toolpath_stiff.api.by_hand import Preview, preview, with_effects
 from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.inputs import Program, Reading
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.case.files import used_name
 from toolpath_stiff.case.steps import TABLES, History
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
-
-if TYPE_CHECKING:
-    from toolpath_stiff.case.steps import Step
-
+from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.program import Program, Reading
+from toolpath_stiff.stiffness.catalogue import known_effects
+from toolpath_stiff.stiffness.model import Idle, build_model
 
 NOT_AGREED = "its code is not run, as you have not agreed to it"
 
 
-def reading_words(reading: Mapping[str, Any]) -> list[str]:
-    """How a program is read, as options of a command."""
-    return options(**{name.removesuffix("_mm_per_min"): value for name, value in reading.items()})
+NO_CHANGE: Mapping[str, Any] = MappingProxyType({})
 
 
 def reading_arguments(folder: Path, reading: Mapping[str, Any]) -> Reading:
@@ -39,9 +37,7 @@ def reading_arguments(folder: Path, reading: Mapping[str, Any]) -> Reading:
 class Contents(History):
     """Machine, readings and program of a case."""
 
-    def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
-        super().__init__(folder, steps, done, text)
-        self._preview: tuple[object, Preview] | None = None
+    _preview: tuple[object, Preview] | None = None
 
     @property
     def machine(self) -> Machine:
@@ -60,10 +56,6 @@ class Contents(History):
         ...     case.machine_of(case.state.machine)
         <Machine nist: 6 struts, no effects>
         """
-        from toolpath_stiff.machine.file import load_machine
-        from toolpath_stiff.stiffness.catalogue import known_effects
-        from toolpath_stiff.stiffness.model import Idle, build_model
-
         path, files = self.path(file), tuple(map(self.path, self.state.effects))
         if not self.not_agreed:
             return Machine.load(path, effects=files)
@@ -78,8 +70,7 @@ class Contents(History):
     def data_files(self) -> tuple[str, ...]:
         """The files of the readings in use; those with readings set aside are in used/."""
         state = self.state
-        touched = {entry.rpartition(":")[0] for entry in state.aside}
-        return tuple(used_name(name) if name in touched else name for name in state.data)
+        return tuple(used_name(name) if name in state.lines_aside else name for name in state.data)
 
     @property
     def data(self) -> Measurements:
@@ -111,8 +102,8 @@ class Contents(History):
         machine = self.machine
         if not on:
             return machine
-        found = self.preview.machine(on) if self.state.data else with_effects(machine, on)
-        return replace(found, model=replace(found.model, withheld=machine.model.withheld))
+        changed = self.preview.machine(on) if self.state.data else with_effects(machine, on)
+        return replace(changed, model=replace(changed.model, withheld=machine.model.withheld))
 
     @property
     def program(self) -> Program:
@@ -128,26 +119,23 @@ class Contents(History):
         """Folder of the latest result of a kind among the steps that hold; "" without one."""
         return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
 
-    def question(self, name: str, **own: Any) -> str:
+    def question(self, name: str, machine: str = "", **own: Any) -> str:
         """The command line that asks this of the readings in use."""
-        return self._ask(name, self.data_files, **own)
+        return self._line(name, self.data_files, machine, **own)
 
-    def _ask(self, name: str, files: Sequence[str], machine: str = "", **own: Any) -> str:
-        state = self.state
-        asked = options(machine=machine or state.machine, **own, effects=list(state.effects))
-        return command_line(name, *files, *asked)
-
-    def _analyze_line(
-        self,
-        program: str,
-        origin: Sequence[float],
-        name: str = "analyze",
-        machine: str = "",
-        require: float | None = None,
-        reading: Mapping[str, Any] | None = None,
+    def program_line(
+        self, name: str = "analyze", machine: str = "", change: Mapping[str, Any] = NO_CHANGE, **own: Any
     ) -> str:
-        state, word = self.state, ",".join(f"{value:.10g}" for value in origin) or None
-        need = state.require if require is None else require
-        own: dict[str, Any] = {"partial": True, "require": f"{need:g}" if need else None} if name == "analyze" else {}
-        asked = options(machine=machine or state.machine, origin=word, **own, effects=list(state.effects))
-        return command_line(name, program, *asked, *reading_words(state.reading if reading is None else reading))
+        """The command line that asks this of the program, after a change of the state; "" without a program."""
+        state = replace(self.state, **change)
+        if not state.program:
+            return ""
+        if name == "analyze":
+            own |= {"partial": True, "require": f"{state.require:g}" if state.require else None}
+        origin = ",".join(f"{value:.10g}" for value in state.origin) or None
+        reading = options(**{name.removesuffix("_mm_per_min"): value for name, value in state.reading.items()})
+        return self._line(name, [state.program], machine, *reading, origin=origin, **own)
+
+    def _line(self, name: str, files: Sequence[str], machine: str = "", *last: str, **own: Any) -> str:
+        given = options(machine=machine or self.state.machine, **own, effects=list(self.state.effects))
+        return command_line(*name.split(), *files, *given, *last)

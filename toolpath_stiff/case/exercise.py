@@ -7,77 +7,68 @@ from typing import Any
 
 from toolpath_stiff.case.files import free_name, write_files
 from toolpath_stiff.case.findings import Findings
+from toolpath_stiff.case.steps import recorded
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.report.words import counted
+from toolpath_stiff.results import json_text
+from toolpath_stiff.rig.exercise import measure_again, new_exercise, reveal
 
 
 class BlindExercise(Findings):
     """A case whose machine may be a simulated one."""
 
+    @recorded
     def start_exercise(self, seed: int, hidden: str | None = None, layout: str = "tilted") -> None:
         """Begin a blind exercise: a simulated machine that hides something, and what was measured on it.
 
         `hidden` and `layout` as of `tps rig new`.
         """
-        from toolpath_stiff.rig.exercise import new_exercise
-
         folder = free_name(self.folder, "exercise")
         new_exercise(self.folder / folder, seed, layout, hidden)
-        machine, data = free_name(self.folder, "machines/machine.toml"), free_name(self.folder, "data/measurements.csv")
-        write_files(
-            self.folder,
-            {
-                machine: (self.folder / folder / "machine.toml").read_bytes(),
-                data: (self.folder / folder / "measurements.csv").read_bytes(),
-            },
-        )
-        change = {"machine": machine, "data": (data,), "aside": (), "on": {}, "exercise": folder}
-        other = {"hidden": hidden, "layout": layout if layout != "tilted" else None}
-        words = "".join(f", {name}={value!r}" for name, value in other.items() if value)
+        copies = {
+            free_name(self.folder, f"{room}/{name}"): (self.folder / folder / name).read_bytes()
+            for room, name in (("machines", "machine.toml"), ("data", "measurements.csv"))
+        }
+        write_files(self.folder, copies)
+        machine, data = copies
+        drawn = options(seed=seed, out=folder, hidden=hidden, layout=layout if layout != "tilted" else None)
         self.record(
             "exercise",
             f"blind exercise, seed {seed}",
-            change=change,
+            change={"machine": machine, "data": (data,), "aside": (), "on": {}, "exercise": folder},
             files=[machine, data],
-            command=command_line("rig", "new", *options(seed=seed, out=folder, **other)),
-            python=f"case.start_exercise({seed}{words})",
+            command=command_line("rig", "new", *drawn),
         )
 
+    @recorded
     def measure(self, plan_file: str | Path) -> None:
         """Measure the exercise's machine at the poses of a plan; the readings are added."""
-        from toolpath_stiff.report.words import counted
-        from toolpath_stiff.rig.exercise import measure_again
-
         name = free_name(self.folder, "data/measured.csv")
         visit = 1 + sum(step.kind == "measure" for step in self.history)
         (self.folder / "data").mkdir(exist_ok=True)
         count = measure_again(self.folder / self._exercise(), str(plan_file), str(self.folder / name), visit)
-        line = command_line("rig", "measure", self._exercise(), *options(at=plan_file, out=name, visit=visit))
         self.record(
             "measure",
             f"{counted(count, 'reading')} measured",
             change={"data": (*self.state.data, name)},
             files=[name],
-            command=line,
-            python=f"case.measure({str(plan_file)!r})",
+            command=command_line("rig", "measure", self._exercise(), *options(at=plan_file, out=name, visit=visit)),
         )
 
+    @recorded
     def claim(self, effects: str) -> dict[str, Any]:
         """Open the seal of the exercise and score a claim: names of effects with commas, "none" or "outside"."""
-        from toolpath_stiff.results import json_text
-        from toolpath_stiff.rig.exercise import reveal
-
-        found = reveal(self.folder / self._exercise(), effects)
+        score = reveal(self.folder / self._exercise(), effects)
         result = self.next_result("reveal")
-        write_files(self.folder, {f"{result}/reveal.json": json_text(found)})
+        write_files(self.folder, {f"{result}/reveal.json": json_text(score)})
         self.record(
             "reveal",
-            f"claimed {effects}: {found['verdict']}",
+            f"claimed {effects}: {score['verdict']}",
             result=result,
             command=command_line("rig", "reveal", self._exercise(), *options(claim=effects)),
-            python=f"case.claim({effects!r})",
         )
-        return found
+        return score
 
     def _exercise(self) -> str:
         if not self.state.exercise:

@@ -5,11 +5,15 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 
 from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import announce, forget, read_bytes, write_atomically
+from toolpath_stiff.readings.measurements import NIST_TABLE_1
 
 JOURNAL = ".tps-adding"  # what a step is about to bring into these rooms, until case.toml names it
 
@@ -31,27 +35,23 @@ ENTRY = re.compile(r".+:[0-9]{1,9}")  # a reading that was set aside: file and l
 
 def free_name(folder: Path, name: str) -> str:
     """The name, or the next one with a number that the folder does not have yet; noted, where it is of a room."""
-    from toolpath_stiff.files import announce
-
     path, number = Path(name), 1
     while (folder / name).exists():
         number += 1
         name = str(path.with_name(f"{path.stem}-{number}{path.suffix}"))
-    if _room(name) in ROOMS:
+    if room_of(name) in ROOMS:
         announce(folder / JOURNAL, name)
     return name
 
 
 def drop(folder: Path, *names: str) -> None:
     """Take files away again that turned out to be of no use."""
-    from toolpath_stiff.files import forget
-
     for name in names:
         (folder / name).unlink()
     forget(folder / JOURNAL)
 
 
-def _room(name: str) -> str:
+def room_of(name: str) -> str:
     """The room of a case that a file is in; "exercise" and "exercise-2" are one."""
     return name.partition("/")[0].partition("-")[0]
 
@@ -64,16 +64,12 @@ def first_name(name: str) -> str:
 
 def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> None:
     """Write files of a folder, each whole or not at all."""
-    from toolpath_stiff.files import write_atomically
-
     for name, content in contents.items():
         write_atomically(folder / name, content)
 
 
 def copied(folder: Path, file: str | Path, room: str, content: bytes | None = None) -> str:
     """Copy a file, or this content under its name, into a room of the case under a name that is free; the name."""
-    from toolpath_stiff.files import read_bytes
-
     content = read_bytes(file, "the file") if content is None else content
     source = Path(str(file).partition("#")[0])
     suffix = ".csv" if room == "data" else UNSAFE.sub("_", source.suffix)
@@ -84,10 +80,6 @@ def copied(folder: Path, file: str | Path, room: str, content: bytes | None = No
 
 def measurements_csv(file: str | Path, machine: Machine) -> bytes:
     """A measurement file as CSV: a CSV file as it stands, a workbook or packaged data as a table."""
-    from toolpath_stiff.column_files import csv_text
-    from toolpath_stiff.files import read_bytes
-    from toolpath_stiff.readings.measurements import NIST_TABLE_1
-
     name = str(file)
     if name != NIST_TABLE_1 and ".xlsx" not in name.lower():
         return read_bytes(name, "measurements")
@@ -97,13 +89,8 @@ def measurements_csv(file: str | Path, machine: Machine) -> bytes:
 
 def machine_bytes(machine: str | Path) -> bytes:
     """The content of a machine file, packaged or one's own."""
-    from importlib import resources
-
-    from toolpath_stiff.files import read_bytes
-
     if str(machine) in Machine.names():
-        packaged = resources.files("toolpath_stiff") / "data" / "machines" / f"{machine}.toml"
-        return packaged.read_bytes()
+        return (resources.files("toolpath_stiff") / "data" / "machines" / f"{machine}.toml").read_bytes()
     return read_bytes(machine, "machine file")
 
 

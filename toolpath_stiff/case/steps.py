@@ -6,8 +6,9 @@ import math
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from toolpath_stiff.api.effects import effects
 from toolpath_stiff.api.trust import is_agreed
@@ -16,8 +17,8 @@ from toolpath_stiff.case.files import (
     EXERCISE,
     JOURNAL,
     ROOMS,
-    _room,
     free_name,
+    room_of,
     sha256,
     used_name,
     without_lines,
@@ -25,6 +26,9 @@ from toolpath_stiff.case.files import (
 )
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import beside, forget, is_file, is_left, read_text, remove_parts, write_atomically
+from toolpath_stiff.machine.writer import toml_text
+from toolpath_stiff.results_folder import clear_up
 from toolpath_stiff.toml_reader import TomlReader, is_number, shortened
 
 CASE_FILE = "case.toml"
@@ -100,6 +104,15 @@ class CaseState:
     require: float = 0.0
     exercise: str = ""
 
+    @property
+    def lines_aside(self) -> dict[str, list[int]]:
+        """File -> lines of its readings that were set aside."""
+        lines: dict[str, list[int]] = {}
+        for entry in self.aside:
+            file, _, line = entry.rpartition(":")
+            lines.setdefault(file, []).append(int(line))
+        return lines
+
 
 def case_text(steps: Sequence[Step], done: int) -> str:
     """The content of case.toml."""
@@ -110,8 +123,6 @@ def case_text(steps: Sequence[Step], done: int) -> str:
 
 
 def _toml(value: Any) -> str:
-    from toolpath_stiff.machine.writer import toml_text
-
     if isinstance(value, str):
         return toml_text(value)
     if isinstance(value, Mapping):
@@ -202,6 +213,34 @@ def _check_names(change: Mapping[str, Any], entry: Mapping[str, Any], file: str,
             raise InputError(f"step {number} names {name!r}", expected="a file within the case's folder", file=file)
 
 
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+def python_line(name: str, positional: Sequence[Any], named: Mapping[str, Any]) -> str:
+    """A call of a method of the case; without what only watches it."""
+    shown = [_python(value) for value in positional if not callable(value)]
+    shown += [f"{key}={_python(value)}" for key, value in named.items() if not callable(value) and key != "progress"]
+    return f"case.{name}({', '.join(shown)})"
+
+
+def _python(value: Any) -> str:
+    return repr(str(value) if isinstance(value, Path) else value)
+
+
+def recorded(method: Method) -> Method:
+    """The method; the step that it records has its call as the Python line."""
+
+    @wraps(method)
+    def call(self: History, *args: Any, **named: Any) -> Any:
+        outer, self._call = self._call, python_line(method.__name__, args, named)
+        try:
+            return method(self, *args, **named)
+        finally:
+            self._call = outer
+
+    return cast("Method", call)
+
+
 class History:
     """The steps of a case and the files that they wrote.
 
@@ -213,16 +252,15 @@ class History:
         A folder that the Python lines leave out, with its last "/": where files lie that a page has sent.
     """
 
+    sent_to = ""
+    _call = ""  # the method that is at work, as a Python line
+
     def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
         self.folder, self._steps, self._done, self._written = folder, list(steps), done, text
-        self.sent_to = ""
         self._clear_up()
 
     def _clear_up(self) -> None:
         """Take away what a killed step brought, and no step names."""
-        from toolpath_stiff.files import beside, forget, is_left, read_text, remove_parts
-        from toolpath_stiff.results_folder import clear_up
-
         journal = self.folder / JOURNAL
         if not is_left(journal):
             return
@@ -233,12 +271,12 @@ class History:
             file = self.folder / name
             # A case may come from somebody else: nothing outside its rooms is touched.
             inside = file.parent.is_dir() and file.parent.resolve().is_relative_to(here) and ".." not in file.parts
-            if not inside or _room(name) not in ROOMS:
+            if not inside or room_of(name) not in ROOMS:
                 continue
             remove_parts(beside(file, "part-"))
             if name not in known and file.is_file():
                 file.unlink()
-            elif name not in known and _room(name) == EXERCISE and file.parent == self.folder:
+            elif name not in known and room_of(name) == EXERCISE and file.parent == self.folder:
                 clear_up([file])
                 shutil.rmtree(file, ignore_errors=True)
         forget(journal)
@@ -256,19 +294,19 @@ class History:
     @property
     def recorded(self) -> CaseState:
         """What holds now as the steps say it."""
-        found = CaseState()
+        state = CaseState()
         for step in self.history:
-            found = replace(found, **step.change)
-        return found
+            state = replace(state, **step.change)
+        return state
 
     @property
     def state(self) -> CaseState:
         """What holds now: without the files of own effects that this user has not agreed to run, and their effects."""
-        found, off = self.recorded, self.not_agreed
+        state, off = self.recorded, self.not_agreed
         if not off:
-            return found
-        kept = tuple(name for name in found.effects if name not in off)
-        return replace(found, effects=kept, on=self._known(found.on, kept))
+            return state
+        kept = tuple(name for name in state.effects if name not in off)
+        return replace(state, effects=kept, on=self._known(state.on, kept))
 
     def _known(self, on: Mapping[str, Mapping[str, Any]], files: Iterable[str]) -> dict[str, Mapping[str, Any]]:
         """Those of the effects that are known with these files of own ones."""
@@ -278,14 +316,8 @@ class History:
     @property
     def not_agreed(self) -> tuple[str, ...]:
         """The files of own effects whose code is not run: this user has not agreed to what they hold; see `trust`."""
-        return tuple(name for name in self.recorded.effects if not self._is_agreed(self.folder / name))
-
-    @staticmethod
-    def _is_agreed(file: Path) -> bool:
-        try:
-            return is_agreed(file.read_bytes())
-        except OSError:
-            return False
+        files = {name: self.folder / name for name in self.recorded.effects}
+        return tuple(name for name, file in files.items() if not is_file(file) or not is_agreed(file.read_bytes()))
 
     def path(self, name: str) -> str:
         """A file of the case, as functions and commands take it."""
@@ -293,23 +325,21 @@ class History:
 
     def undo(self) -> Step | None:
         """Take back the last step that changed something, and what was found since; None where there is none."""
-        at = next((n for n in range(self._done - 1, 0, -1) if self._steps[n].change), None)
-        if at is None:
+        last = next((n for n in range(self._done - 1, 0, -1) if self._steps[n].change), None)
+        if last is None:
             return None
-        self._done = at
+        self._done = last
         self._save()
-        return self._steps[at]
+        return self._steps[last]
 
     def redo(self) -> Step | None:
         """Do again the next step that was undone, and what was found after it; None where nothing was."""
-        found = next((step for step in self.undone if step.change), None)
-        if found is None:
+        changes = [n for n in range(self._done, len(self._steps)) if self._steps[n].change]
+        if not changes:
             return None
-        first = self._steps.index(found, self._done)
-        later = (n for n in range(first + 1, len(self._steps)) if self._steps[n].change)
-        self._done = next(later, len(self._steps))
+        self._done = changes[1] if changes[1:] else len(self._steps)
         self._save()
-        return found
+        return self._steps[changes[0]]
 
     def record(
         self,
@@ -322,11 +352,12 @@ class History:
         python: str = "",
         result: str = "",
     ) -> None:
-        """Add a step and write the case. `files`: those that the step wrote.
+        """Add a step and write the case. `files`: those that the step wrote; `python`: unless given, the call at work.
 
         A step that changes something forgets what was undone; one that only finds something out does not.
         """
         sums = {name: sha256((self.folder / name).read_bytes()) for name in files}
+        python = python or self._call
         python = python.replace(self.sent_to, "") if self.sent_to else python
         step = Step(kind, text, command, python, dict(change or {}), sums, result)
         self._steps = [*self.history, step, *(() if change else self.undone)]
@@ -349,16 +380,12 @@ class History:
                 what = "is not what was put into the case" if file.is_file() else "is gone"
                 raise InputError(f"{name} {what}", hint="bring the file back, or begin another case", file=str(file))
 
-    def _rewrite_used(self) -> None:
+    def _rewrite_used(self, state: CaseState | None = None) -> None:
         """Files in used/ as the state has them: after undo and redo too."""
-        aside = self.state.aside
-        for file in {entry.rpartition(":")[0] for entry in aside}:
-            lines = [int(entry.rpartition(":")[2]) for entry in aside if entry.startswith(file + ":")]
+        for file, lines in (state or self.state).lines_aside.items():
             write_files(self.folder, {used_name(file): without_lines(self.folder / file, lines)})
 
     def _save(self) -> None:
-        from toolpath_stiff.files import forget, write_atomically
-
         file = self.folder / CASE_FILE
         if file.is_file() and file.read_text("utf-8") != self._written:
             raise InputError(

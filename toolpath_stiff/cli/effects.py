@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 
-from toolpath_stiff.api import effects
-from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.cli.measurements import measured
-from toolpath_stiff.cli.outputs import check_new, check_written, keep
-from toolpath_stiff.cli.parser import DATA, JSON, REPLACE, Command, given, own
-from toolpath_stiff.cli.progress import progress_line
+import toolpath_stiff as tps
+from toolpath_stiff.api.effects import effect_name
+from toolpath_stiff.cli.outputs import check_new, check_single, keep, show
+from toolpath_stiff.cli.parser import DATA, JSON, REPLACE, Command, call, own
 from toolpath_stiff.hints import command_line, hint, options
 from toolpath_stiff.options import arguments_of
 
@@ -31,34 +27,30 @@ Machine files carry effects as [[effect]], those that act on readings as [[instr
 
 def list_effects(args: Namespace) -> int:
     """All effects, in the order of the load path."""
-    catalogue = effects.effects(args.effects)
-    sys.stdout.write(catalogue.to_json() if args.json else f"{catalogue}\n")
-    return 0
+    return show(args, tps.effects(args.effects))
 
 
 def show_effect(args: Namespace) -> int:
     """Equation, parameters, units, bounds, typical values and their source."""
     from toolpath_stiff.report.effects import describe_effect, effect_details
-    from toolpath_stiff.results import json_text
     from toolpath_stiff.stiffness.catalogue import find_effect
 
     effect = find_effect(args.name, args.effects)
-    sys.stdout.write(json_text(describe_effect(effect)) if args.json else f"{effect_details(effect)}\n")
-    return 0
+    return show(args, effect_details(effect), document=lambda: describe_effect(effect))
 
 
 def check_effects(args: Namespace) -> int:
     """Try the effects of a file against the contract; exit code 1 if one fails."""
-    check = effects.check_effects(args.file, args.machine)
-    sys.stdout.write(check.to_json() if args.json else f"{check}\n")
+    check = tps.check_effects(args.file, args.machine)
+    show(args, check)
     return 0 if check.passed else CHECK_FAILED
 
 
 def new_effect(args: Namespace) -> int:
     """Write a commented, working example of an effect."""
-    name = effects.effect_name(args.file)
+    name = effect_name(args.file)
     keep(check_new(args, args.file))
-    effects.effect_template(name).save(args.file)
+    tps.effect_template(name).save(args.file)
     line = command_line("effects", "show", name, *options(effects=args.file))
     print(f"wrote {args.file}\n{hint('read it back', line)}")
     return 0
@@ -66,25 +58,18 @@ def new_effect(args: Namespace) -> int:
 
 def draft_effect(args: Namespace) -> int:
     """Write what a diagnosis leaves unexplained as an effect to edit."""
-    check_written(args, [args.output])
+    check_single(args, args.output)
     replaced = check_new(args, args.output)
-    with progress_line(quiet=args.json) as progress:
-        draft = effects.draft_effect(
-            *measured(args), args.output, progress=progress, **given(args, effects.draft_effect)
-        )
-    if draft.text:
-        keep(replaced, quiet=args.json)
-        draft.save(args.output)
-    if args.json:
-        sys.stdout.write(draft.to_json())
-    elif not draft.text:
-        print(draft.reason)
-    else:
-        print("\n".join([draft.diagnosis.to_dict()["portrait"]["text"], f"wrote {args.output}", *draft.next]))
-    return 0
+    draft = call(args, tps.draft_effect, file=args.output)
+    if not draft.text:
+        return show(args, draft)
+    keep(replaced, quiet=args.json)
+    draft.save(args.output)
+    lines = [draft.diagnosis.to_dict()["portrait"]["text"], f"wrote {args.output}", *draft.next]
+    return show(args, "\n".join(lines), document=draft.to_dict)
 
 
-MACHINE, EFFECTS = (arguments_of(Machine.load)[name] for name in ("machine", "effects"))
+MACHINE, EFFECTS = (arguments_of(tps.Machine.load)[name] for name in ("machine", "effects"))
 FILE = own("FILE.py", "file with your own physical effects", name="file")
 COMMANDS = {
     "effects list": Command(list_effects, EFFECTS, JSON),
@@ -93,9 +78,9 @@ COMMANDS = {
     "effects draft": Command(
         draft_effect,
         DATA,
-        Machine.load,
-        Measurements.read,
-        effects.draft_effect,
+        tps.Machine.load,
+        tps.Measurements.read,
+        tps.draft_effect,
         own("-o --output FILE.toml", "file to write", default="missing.toml"),
         REPLACE,
         JSON,

@@ -7,22 +7,10 @@ from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from toolpath_stiff.api import machines, poses
+import toolpath_stiff as tps
 from toolpath_stiff.api.inputs import pose_si
-from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.cli.outputs import (
-    check_made,
-    check_new,
-    check_single,
-    check_written,
-    destination,
-    keep,
-    show,
-    written_text,
-)
-from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, Command, given, own
-from toolpath_stiff.cli.program import machine_for
-from toolpath_stiff.cli.progress import progress_line
+from toolpath_stiff.cli.outputs import check_new, check_single, destination, keep, show, tell, write_made, written_text
+from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, Command, call, given, own
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, hint
 from toolpath_stiff.options import finite_number, numbers
@@ -55,19 +43,14 @@ def pose(args: Namespace) -> int:
             "give either a pose or --csv FILE" if args.csv is None else "give a pose or --csv FILE, not both",
             expected="tps pose X Y Z [A B C], or tps pose --csv FILE",
         )
-    machine = machine_for(args)
     if args.csv is None:
-        single = poses.pose(args.pose, machine, force_N=args.force_N)
-        sys.stdout.write(single.to_json() if args.json else f"{single}\n")
-        return 0
-    table, notes = poses.read_poses(args.csv)
-    for note in notes:
-        print(f"tps: note: {note}", file=sys.stderr)
-    stiffnesses = poses.pose(table, machine, force_N=args.force_N)
-    sys.stdout.write(stiffnesses.to_json() if args.json else stiffnesses.csv())
-    for warning in (*stiffnesses.warnings, *stiffnesses.out_of_reach(MOST_NAMED)):
-        print(f"tps: warning: {warning}", file=sys.stderr)
-    return 0 if stiffnesses.reachable.all() else OUT_OF_REACH
+        return show(args, call(args, tps.pose, pose_mm_deg=args.pose))
+    table, notes = tps.read_poses(args.csv)
+    tell("note", notes)
+    stiffness = call(args, tps.pose, pose_mm_deg=table)
+    sys.stdout.write(stiffness.to_json() if args.json else stiffness.csv())
+    tell("warning", (*stiffness.warnings, *stiffness.out_of_reach(MOST_NAMED)))
+    return 0 if stiffness.reachable.all() else OUT_OF_REACH
 
 
 def map(args: Namespace) -> int:
@@ -80,13 +63,9 @@ def map(args: Namespace) -> int:
 
     files written to --out: map.csv (x_mm,y_mm,z_mm,stiffness_N_per_mm,reachable), map.json, map.png, map.html (3-D)
     """
-    from toolpath_stiff.report.map import names
-
-    target = destination(args, "map", [args.machine], "-map").check(names(not args.no_plots))
-    planes = given(args, poses.map_stiffness) | ({"z_mm": args.slices} if args.slices else {})
-    with progress_line(quiet=args.json) as progress:
-        stiffness = poses.map_stiffness(machine_for(args), progress=progress, **planes)
-    return show(args, stiffness, target)
+    target = destination(args, tps.StiffnessMap, [args.machine])
+    stiffness = call(args, tps.map_stiffness, **({"z_mm": args.slices} if args.slices else {}))
+    return show(args, stiffness, written_text(target.write(stiffness, plots=not args.no_plots)))
 
 
 def _heights(text: str) -> list[float]:
@@ -98,34 +77,19 @@ def _heights(text: str) -> list[float]:
 
 def list_machines(args: Namespace) -> int:
     """Packaged machines."""
-    from toolpath_stiff.results import json_text
-
-    loaded = [Machine.load(name) for name in Machine.names()]
-    if args.json:
-        sys.stdout.write(json_text([{"name": m.asked, "title": m.title, "source": m.source} for m in loaded]))
-    else:
-        print("\n".join(f"{m.asked:<16} {m.title}\n{'':<16} {m.source}" for m in loaded))
-    return 0
+    machines = [tps.Machine.load(name) for name in tps.Machine.names()]
+    text = "\n".join(f"{m.asked:<16} {m.title}\n{'':<16} {m.source}" for m in machines)
+    return show(
+        args, text, document=lambda: [{"name": m.asked, "title": m.title, "source": m.source} for m in machines]
+    )
 
 
 def show_machine(args: Namespace) -> int:
     """Figures of a machine with their origin, and a picture of it."""
-    from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.results import json_text
-
-    machine = Machine.load(args.machine)
-    if args.json:
-        sys.stdout.write(json_text(machine.to_frame().to_dict("records")))
-    else:
-        print(machine.text(args.pose))
-    if args.out or not args.json:
-        target = _picture_file(args.out, machine.name)
-        check_written(args, [target])
-        picture = machine.picture(args.pose)
-        keep(check_made(args, {target: picture}), quiet=args.json)
-        written = write_atomically(target, picture)
-        if not args.json:
-            print(written_text([written]))
+    machine = tps.Machine.load(args.machine)
+    drawn = {_picture_file(args.out, machine.name): machine.picture(args.pose)} if args.out or not args.json else {}
+    written = write_made(args, drawn)
+    show(args, machine.text(args.pose), written_text(written), document=lambda: machine.to_dict()["figures"])
     return 0 if machine.standing(args.pose)[2].reachable[0] else OUT_OF_REACH
 
 
@@ -147,30 +111,21 @@ def _picture_file(out: str | None, name: str) -> Path:
 
 def check_machine(args: Namespace) -> int:
     """Check a machine file for mistakes, draw it; exit code 1 if it cannot be right."""
-    from toolpath_stiff.files import write_atomically
-
     if not Path(args.file).is_file():
         new = command_line("machine", "new", args.file)
         raise InputError(f"cannot read machine file {args.file!r}", hint=f"`{new}` writes a template")
     target = _picture_file(args.out, f"{Path(args.file).stem}_machine")
-    drawn = bool(args.out) or not args.json
-    check_written(args, [target] if drawn else [])
-    check = Machine.load(Path(args.file), **given(args, Machine.load)).check()
-    files = {target: check.picture()} if drawn else {}
-    keep(check_made(args, files), quiet=args.json)
-    written = [write_atomically(file, content) for file, content in files.items()]
-    if args.json:
-        sys.stdout.write(check.to_json())
-    else:
-        print(f"{check}\n{written_text(written)}")
+    check = tps.Machine.load(Path(args.file), **given(args, tps.Machine.load)).check()
+    written = write_made(args, {target: check.picture()} if args.out or not args.json else {})
+    show(args, check, written_text(written))
     return 0 if check.good else NOT_GOOD
 
 
 def new_machine(args: Namespace) -> int:
     """Write a commented template."""
-    target, replaced = Path(args.file), check_new(args, args.file)
-    keep(replaced)
-    written = machines.machine_template(target).save(target)
+    target = Path(args.file)
+    keep(check_new(args, args.file))
+    written = tps.machine_template(target).save(target)
     print(f"{written_text([written])}\n{hint('edit it, then', command_line('machine', 'check', target))}")
     return 0
 
@@ -178,23 +133,20 @@ def new_machine(args: Namespace) -> int:
 def from_linuxcnc(args: Namespace) -> int:
     """Read the genhexkins pins of a LinuxCNC HAL file."""
     replaced = check_single(args, args.out)
-    machine_file = machines.machine_from_linuxcnc(args.file, args.units)
+    machine_file = tps.machine_from_linuxcnc(args.file, args.units)
     if args.out:
         keep(replaced)
         print(written_text([machine_file.save(args.out)]))
         print(hint("next", command_line("machine", "check", args.out)))
     else:
         sys.stdout.write(str(machine_file))
-    for note in machine_file.notes:
-        print(f"tps: note: {note}", file=sys.stderr)
+    tell("note", machine_file.notes)
     return 0
 
 
 def recover(args: Namespace) -> int:
     """Fit the NIST geometry to the paper's Table 1 anew."""
-    geometry = machines.recover_geometry(starts=args.starts, seed=args.seed)
-    sys.stdout.write(geometry.to_json() if args.json else f"{geometry}\n")
-    return 0
+    return show(args, call(args, tps.recover_geometry))
 
 
 PICTURE = own("--out FILE.png|DIR", "the picture, or its folder (default: reports)")
@@ -206,17 +158,17 @@ COMMANDS = {
             "X Y Z [A B C]", "tool tip in mm, angles in degrees", name="pose", read=finite_number, count="*", default=()
         ),
         own("--csv FILE", "read poses from a table (CSV, or FILE.xlsx[#SHEET]), write CSV to standard output"),
-        poses.pose,
-        Machine.load,
-        Machine.under,
+        tps.pose,
+        tps.Machine.load,
+        tps.Machine.under,
         JSON,
     ),
     "map": Command(
         map,
         own("--slices Z,Z,...", "several heights, mm", read=_heights, instead_of="z_mm"),
-        poses.map_stiffness,
-        Machine.load,
-        Machine.under,
+        tps.map_stiffness,
+        tps.Machine.load,
+        tps.Machine.under,
         *FOLDER,
     ),
     "machine list": Command(list_machines, JSON),
@@ -228,14 +180,14 @@ COMMANDS = {
         REPLACE,
         JSON,
     ),
-    "machine check": Command(check_machine, FILE, Machine.load, PICTURE, REPLACE, JSON, without=["machine"]),
+    "machine check": Command(check_machine, FILE, tps.Machine.load, PICTURE, REPLACE, JSON, without=["machine"]),
     "machine new": Command(new_machine, FILE, REPLACE),
     "machine from-linuxcnc": Command(
         from_linuxcnc,
         own("FILE.hal", name="file"),
         own("-o --out FILE", "machine file to write (default: standard output)"),
-        machines.machine_from_linuxcnc,
+        tps.machine_from_linuxcnc,
         REPLACE,
     ),
-    "machine recover": Command(recover, machines.recover_geometry, JSON),
+    "machine recover": Command(recover, tps.recover_geometry, JSON),
 }

@@ -15,12 +15,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
-from toolpath_stiff.cli.outputs import read_folders, tell_incomplete
-from toolpath_stiff.cli.parser import Command
 from toolpath_stiff.defaults import THREADS, VERSION
 from toolpath_stiff.errors import FileError, InputError, TpsError, harmless
+
+if TYPE_CHECKING:
+    from toolpath_stiff.cli.parser import Command
 
 # Module -> its commands, each with its line in the help.
 GROUPS = {
@@ -97,11 +98,6 @@ class Screen:
         self._do(lambda: self.stream.write(harmless(text)))
         return len(text)
 
-    def writelines(self, lines: Iterable[str]) -> None:
-        """The same of several texts."""
-        for line in lines:
-            self.write(line)
-
     def flush(self) -> None:
         """Hand on what is held back."""
         self._do(self.stream.flush)
@@ -173,9 +169,7 @@ def _run(words: list[str]) -> int:
         raise InputError(f"{title} {action}".strip(), hint=_nearest(action, actions, f"{title} "))
     if action:
         title = f"{title} {words.pop(0)}"
-    args = actions[action].read(title, words)
-    tell_incomplete(read_folders(args))
-    return actions[action].run(args)
+    return actions[action](title, words)
 
 
 def _nearest(word: str, known: Iterable[str], before: str) -> str:

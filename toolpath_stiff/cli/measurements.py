@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
-from toolpath_stiff.api import correction, diagnosis
-from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.inputs import Program
-from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.cli.outputs import check_made, check_single, destination, keep, show, written_text
-from toolpath_stiff.cli.parser import DATA, FOLDER, JSON, NO_PLOTS, REPLACE, Command, given, own
-from toolpath_stiff.cli.program import program_for
-from toolpath_stiff.cli.progress import progress_line
-from toolpath_stiff.files import write_atomically
-
-
-def measured(args: Namespace) -> tuple[Measurements, Machine]:
-    """The measurements, and the machine with its effect files."""
-    machine = Machine.load(**given(args, Machine.load))
-    return Measurements(args.data, args.columns), machine
+import toolpath_stiff as tps
+from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell, write_made, written_text
+from toolpath_stiff.cli.parser import DATA, FOLDER, JSON, NO_PLOTS, REPLACE, Command, call, own
+from toolpath_stiff.results import FolderResult
+from toolpath_stiff.workbooks import split_name
 
 
 def reduce(args: Namespace) -> int:
@@ -43,26 +35,30 @@ def reduce(args: Namespace) -> int:
     equation 12); on a bench, force over displacement between the extremes of the force, tension and stretch positive.
     Struts measured on several dates: which of them changed, and when.
     """
-    from toolpath_stiff.readings.raw import reduce as reduced
-    from toolpath_stiff.results import json_text
-    from toolpath_stiff.workbooks import split_name
-
-    reduction = reduced(*args.raw, columns=args.columns, compression_positive=args.compression_positive)
+    reduction = tps.reduce(*args.raw, columns=args.columns, compression_positive=args.compression_positive)
     first = Path(split_name(args.raw[0])[0])
     name = first.stem if first.is_file() else first.resolve().name
     out = Path(args.out or f"{name or 'raw'}_measurements.csv")
-    files = reduction.files(out, plots=not args.no_plots)
-    keep(check_made(args, files), quiet=args.json)
-    written = [str(write_atomically(name, content)) for name, content in files.items()]
+    written = [str(file) for file in write_made(args, reduction.files(out, plots=not args.no_plots))]
     for line in reduction.read_as:
         print(f"tps: {line}", file=sys.stderr)
-    for note in reduction.notes:
-        print(f"tps: note: {note}", file=sys.stderr)
-    if args.json:
-        sys.stdout.write(json_text({**reduction.to_dict(), "files": written}))
-    else:
-        print(f"{reduction}\n\nwrote {' and '.join(written)}")
-    return 0
+    tell("note", reduction.notes)
+    return show(
+        args, reduction, f"\nwrote {' and '.join(written)}", document=lambda: {**reduction.to_dict(), "files": written}
+    )
+
+
+def _run(
+    args: Namespace,
+    function: Callable[..., FolderResult],
+    kind: type[FolderResult],
+    sources: Sequence[str],
+    **more: Any,
+) -> int:
+    """Make a result, write its folder, print it."""
+    target = destination(args, kind, sources)
+    result = call(args, function, **more)
+    return show(args, result, written_text(target.write(result, plots=not args.no_plots)))
 
 
 def compare(args: Namespace) -> int:
@@ -78,12 +74,7 @@ def compare(args: Namespace) -> int:
     Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, strips.png, planes.png,
     machine.png, variables.png, load_path.png.
     """
-    from toolpath_stiff.report.compare.page import names
-
-    target = destination(args, "compare", args.data, "-compare").check(names(not args.no_plots))
-    with progress_line(quiet=args.json) as progress:
-        comparison = diagnosis.compare(*measured(args), progress=progress, **given(args, diagnosis.compare))
-        return show(args, comparison, target)
+    return _run(args, tps.compare, tps.Comparison, args.data)
 
 
 def diagnose(args: Namespace) -> int:
@@ -99,16 +90,7 @@ def diagnose(args: Namespace) -> int:
     missing that no effect of the catalogue describes). Files written to --out: diagnose.json, residuals.csv,
     ladder.png, portrait.png, confounding.png, detectable.png, before_after.png, envelope.png, report.html.
     """
-    from toolpath_stiff.report.diagnose.page import names
-
-    target = destination(args, "diagnose", args.data, "-diagnose").check(names(not args.no_plots))
-    data, machine = measured(args)
-    options = given(args, diagnosis.diagnose)
-    with progress_line(quiet=args.json) as progress:
-        if args.program:
-            options["program"] = program_for(args, args.program)
-        verdict = diagnosis.diagnose(data, machine.under(**given(args, Machine.under)), progress=progress, **options)
-        return show(args, verdict, target)
+    return _run(args, tps.diagnose, tps.Diagnosis, args.data)
 
 
 def update(args: Namespace) -> int:
@@ -124,28 +106,16 @@ def update(args: Namespace) -> int:
     the same. Files written to --out: update.json, residuals.csv, machine.toml (unless refused or -o names another
     place), ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
     """
-    from toolpath_stiff.report.update.page import MACHINE_FILE, names
-
     args.replace |= args.force
     replaced = check_single(args, args.output, mark=b"# Command: tps update")
-    target = destination(args, "update", args.data, "-update")
-    target.check(names(not args.no_plots, machine=args.output is None))
-    with progress_line(quiet=args.json) as progress:
-        fitted = correction.update(
-            *measured(args),
-            machine_file=args.output or target.folder / MACHINE_FILE,
-            progress=progress,
-            **given(args, correction.update),
-        )
-        files = fitted.files(plots=not args.no_plots, machine=args.output is None)
+    target = destination(args, tps.Update, args.data, machine=args.output is None)
+    fitted = call(args, tps.update, machine_file=args.output or target.folder / "machine.toml")
     keep(replaced, quiet=args.json)
-    machine_file = {args.output: fitted.machine_text()} if args.output and fitted.accepted else {}
-    written = [*map(Path, machine_file), *target.write(files, machine_file)]
-    if args.json:
-        sys.stdout.write(fitted.to_json())
-    else:
-        print("\n".join([str(fitted), written_text(written), *(["", *fitted.next] if fitted.next else [])]))
-    return 0
+    machine = {args.output: fitted.machine_text()} if args.output and fitted.accepted else {}
+    written = target.write(fitted, machine, plots=not args.no_plots, machine=args.output is None)
+    return show(
+        args, fitted, written_text([*map(Path, machine), *written]), *(["", *fitted.next] if fitted.next else [])
+    )
 
 
 def plan(args: Namespace) -> int:
@@ -162,46 +132,30 @@ def plan(args: Namespace) -> int:
     plan_tables.npz, from which --next chooses within a second or two; --next writes next_1.csv (2, 3 ...) beside them.
     """
     if args.next is not None:
-        return _next(args)
-    from toolpath_stiff.report.plan import names
-
-    target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
-    data, machine = measured(args)
-    options = given(args, correction.plan) | {"minutes": dict(args.minutes or ())}
-    return show(args, correction.plan(data if args.data else None, machine, **options), target)
-
-
-def _next(args: Namespace) -> int:
-    """The next visit of a plan: say where, write its rows."""
-    from toolpath_stiff.api.next_visits import next_visit
-
-    visit = next_visit(args.next, args.data, columns=args.columns)
-    written = visit.save()
-    if args.json:
-        sys.stdout.write(visit.to_json())
-    else:
-        print("\n".join([str(visit), *([written_text(written)] if written else [])]))
-    return 0
+        visit = tps.next_visit(args.next, args.data, columns=args.columns)
+        written = visit.save()
+        return show(args, visit, *([written_text(written)] if written else []))
+    return _run(args, tps.plan, tps.Plan, args.data or [args.machine], minutes=dict(args.minutes or ()))
 
 
 COMMANDS = {
     "reduce": Command(
         reduce,
         own("RAW", "raw records: files, FILE.xlsx[#SHEET], folders of files", count="+"),
-        Measurements.read,
+        tps.Measurements.read,
         own("--compression-positive", "forces of struts on a bench count compression positive"),
         own("--out FILE", "file to write (default: <first RAW>_measurements.csv); loops go beside it"),
         REPLACE,
         NO_PLOTS,
         JSON,
     ),
-    "compare": Command(compare, DATA, Machine.load, diagnosis.compare, *FOLDER),
-    "diagnose": Command(diagnose, DATA, Machine.load, Machine.under, diagnosis.diagnose, Program.read, *FOLDER),
+    "compare": Command(compare, DATA, tps.Machine.load, tps.compare, *FOLDER),
+    "diagnose": Command(diagnose, DATA, tps.Machine.load, tps.Machine.under, tps.diagnose, tps.Program.read, *FOLDER),
     "update": Command(
         update,
         DATA,
-        Machine.load,
-        correction.update,
+        tps.Machine.load,
+        tps.update,
         own("-o --output MACHINE.toml", "the new machine file (default: in --out)"),
         *FOLDER,
     ),
@@ -212,8 +166,8 @@ COMMANDS = {
             "--next FOLDER",
             "of a plan: the next pose after the readings so far (DATA; else its own files as filled in)",
         ),
-        Machine.load,
-        correction.plan,
+        tps.Machine.load,
+        tps.plan,
         *FOLDER,
     ),
 }

@@ -5,11 +5,10 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from toolpath_stiff.api import case_studies, placements, programs
-from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell_incomplete
-from toolpath_stiff.cli.parser import FOLDER, PROGRAM, Command, given, own
-from toolpath_stiff.cli.program import READ, machine_for, program_for
-from toolpath_stiff.cli.progress import progress_line
+import toolpath_stiff as tps
+from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell_incomplete, written_text
+from toolpath_stiff.cli.parser import FOLDER, PROGRAM, Command, call, own
+from toolpath_stiff.cli.program import READ
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.options import arguments_of, numbers
@@ -32,29 +31,21 @@ def place(args: Namespace) -> int:
     to --out: placements.csv (the front), placement.json, front.png, profiles.png, map.png, setup.pdf, report.html
     (click a placement of the front, see the path there).
     """
-    from toolpath_stiff.report.place.page import names
-
     replaced = check_single(args, args.write)
-    target = destination(args, "place", [args.program], "-place").check(names(not args.no_plots))
+    target = destination(args, tps.Placement, [args.program])
     if args.pick is not None:
         tell_incomplete([target.folder])
-    with progress_line(quiet=args.json) as progress:
-        placement = placements.place(
-            program_for(args, args.program),
-            machine_for(args),
-            earlier=Path(target.folder, "placement.json"),
-            progress=progress,
-            **given(args, placements.place),
-        )
+    placement = call(args, tps.place, earlier=Path(target.folder, "placement.json"))
     keep(replaced, quiet=args.json)
     program = {args.write: placement.program_bytes} if args.write and not placement.refusal else {}
-    code = show(args, placement, target, program)
+    written = target.write(placement, program, plots=not args.no_plots)
+    show(args, placement, written_text([*written, *map(Path, program)]))
     if placement.refusal:
         raise InputError(
             f"{args.write} was not written; the search is kept in {target.folder} "
             f"({both_names('--pick')} takes it up): {placement.refusal}"
         )
-    return code
+    return 0
 
 
 def case_study(args: Namespace) -> int:
@@ -70,16 +61,12 @@ def case_study(args: Namespace) -> int:
     displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
     A file of regions has the columns region, x_mm, y_mm, z_mm, rotation_deg (CSV or FILE.xlsx[#SHEET]).
     """
-    from toolpath_stiff.report.case_study import names
-
     regions = dict(args.region)
     if len(regions) < len(args.region):
         raise InputError("--region: a name is given twice", expected="a name of its own for each region")
-    source = args.program or args.machine
-    target = destination(args, "case-study", [source], "-case-study").check(names(not args.no_plots))
-    program = None if args.program is None else program_for(args, args.program)
-    study = case_studies.case_study(program, machine_for(args), regions or args.regions, step_mm=args.step_mm)
-    return show(args, study, target)
+    target = destination(args, tps.CaseStudy, [args.program or args.machine])
+    study = call(args, tps.case_study, regions=regions or args.regions)
+    return show(args, study, written_text(target.write(study, plots=not args.no_plots)))
 
 
 def _region(text: str) -> tuple[str, tuple[float, ...]]:
@@ -90,22 +77,21 @@ def _region(text: str) -> tuple[str, tuple[float, ...]]:
     return name, values
 
 
+REGION = own(
+    "--region NAME:X,Y,Z[,TURN]",
+    "where program zero sits, mm, and how far the path is turned about it, degrees; once for each region (default: "
+    "four of the reference machine)",
+    read=_region, count="append", default=(),
+)  # fmt: skip
 COMMANDS = {
-    "place": Command(place, PROGRAM, placements.place, *READ, *FOLDER),
+    "place": Command(place, PROGRAM, tps.place, *READ, *FOLDER),
     "case-study": Command(
         case_study,
         own("PROGRAM", f"{PROGRAM.help} (default: the contour of a 200 mm square)", count="?"),
-        own(
-            "--region NAME:X,Y,Z[,TURN]",
-            "where program zero sits, mm, and how far the path is turned about it, degrees; once for each region "
-            "(default: four of the reference machine)",
-            read=_region,
-            count="append",
-            default=(),
-        ),
+        REGION,
         own("--regions FILE", "the same as a table", instead_of="region"),
-        case_studies.case_study,
-        arguments_of(programs.analyze)["force_N"],
+        tps.case_study,
+        arguments_of(tps.analyze)["force_N"],
         *READ,
         *FOLDER,
     ),

@@ -5,16 +5,26 @@ from __future__ import annotations
 import os
 import sys
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+import toolpath_stiff as tps
 from toolpath_stiff.api import programs
-from toolpath_stiff.api.inputs import Program
-from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.cli.outputs import check_single, destination, keep, show, written_text
-from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, Command, given, own
-from toolpath_stiff.cli.progress import progress_line, say
+from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell, written_text
+from toolpath_stiff.cli.parser import (
+    FOLDER,
+    JSON,
+    PROGRAM,
+    REPLACE,
+    Command,
+    call,
+    given,
+    machine_for,
+    own,
+    program_for,
+)
+from toolpath_stiff.cli.progress import say
 from toolpath_stiff.defaults import one_thread
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import Argument
@@ -28,24 +38,6 @@ BELOW_REQUIRED = 3  # exit code
 INCOMPLETE = 1  # exit code: samples were left out, or of several programs one failed
 CONNECT_SECONDS = 10  # for a scheduler to answer
 NO_MACHINE = "none"
-PROGRAMS = own("PROGRAM", "NC program or cutter-location file, or a folder of them", name="programs", count="+")
-CLUSTER = own(
-    "--cluster ADDRESS",
-    "hand the programs to the workers of a Dask cluster instead, one program a task; ADDRESS is its scheduler's, as "
-    "tcp://10.0.0.5:8786. Workers must see the programs and --out by the same paths "
-    "(pip install 'toolpath-stiff[cluster]')",
-)
-READ = (Program.read, Machine.load, Machine.under)
-
-
-def machine_for(args: Namespace) -> Machine:
-    """The machine that the options describe. Raises `InputError`."""
-    return Machine.load(**given(args, Machine.load)).under(**given(args, Machine.under))
-
-
-def program_for(args: Namespace, file: str) -> Program:
-    """A program, read as the options say. Raises `InputError`."""
-    return Program.read(file, **given(args, Program.read))
 
 
 def analyze(args: Namespace) -> int:
@@ -84,59 +76,52 @@ def analyze(args: Namespace) -> int:
     """
     one_thread()  # before numpy is loaded
     if len(args.programs) == 1 and os.path.isfile(args.programs[0]) and not args.cluster:  # noqa: PTH113  (false for a name that none can have)
-        return _run_single(args, args.programs[0])  # without loading what lists many
+        return _analyze_one(args, args.programs[0])  # without loading what lists many
     from toolpath_stiff.report.batch.programs import find_programs
 
-    programs, counts = find_programs(args.programs)
-    if counts or len(programs) > 1 or args.cluster:
-        return _run_many(args, programs, counts)
-    return _run_single(args, programs[0].file)
+    files, counts = find_programs(args.programs)
+    if counts or len(files) > 1 or args.cluster:
+        return _analyze_many(args, files, counts)
+    return _analyze_one(args, files[0].file)
 
 
-def _run_single(args: Namespace, file: str) -> int:
-    """Analyze, write, print; the exit code."""
-    from toolpath_stiff.report.analysis.summary import names
-
-    target = destination(args, "analyze", [file]).check(names(not args.no_plots, args.table))
-    with progress_line(quiet=args.json) as progress:
-        analysis = programs.analyze(
-            program_for(args, file), machine_for(args), progress=progress, **given(args, programs.analyze)
-        )
-    show(args, analysis, target, table=args.table, show_plunges=args.show_plunges)
+def _analyze_one(args: Namespace, file: str) -> int:
+    target = destination(args, tps.Analysis, [file], table=args.table)
+    analysis = call(args, tps.analyze, program=program_for(args, file))
+    saving = {"plots": not args.no_plots, "table": args.table, "show_plunges": args.show_plunges}
+    show(args, analysis, written_text(target.write(analysis, **saving)))
     if analysis.below_required:
         return BELOW_REQUIRED
     return 0 if analysis.complete else INCOMPLETE
 
 
-def _run_many(args: Namespace, found: Sequence[Found], counts: Sequence[FolderCount]) -> int:
-    """The same of many; nothing is printed before the arguments have been found right."""
-    from toolpath_stiff.api.many import analyze_many
+def _analyze_many(args: Namespace, files: Sequence[Found], counts: Sequence[FolderCount]) -> int:
     from toolpath_stiff.report.words import plain
 
-    def told(text: str, done: int, total: int) -> None:
-        if done == 0 and not args.json:
+    def progress(text: str, done: int, total: int) -> None:
+        if done == 0 and not args.json:  # all arguments have been found right
             for count in counts:
                 print(plain(str(count)), flush=True)
         say(f"{done}/{total} programs, {plain(text)}")
 
     try:
         with _executor(args) as executor:
-            analyses = analyze_many(
-                found,
+            analyses = tps.analyze_many(
+                files,
                 machine_for(args),
                 args.out or "reports",
                 executor=executor,
                 plots=not args.no_plots,
                 replace=args.replace,
-                progress=told,
-                **given(args, analyze_many, Program.read),
+                progress=progress,
+                **given(args, tps.analyze_many, tps.Program.read),
             )
     finally:
         say("")
     if args.json:
-        sys.stdout.writelines(analyses.json_pieces())
+        _write_pieces(analyses.json_pieces())
     else:
-        print(f"{analyses}\n{written_text(analyses.written)}")
+        show(args, analyses, written_text(analyses.written))
     if not analyses.complete:
         return INCOMPLETE
     return BELOW_REQUIRED if analyses.below_required else 0
@@ -152,21 +137,28 @@ def _executor(args: Namespace) -> Iterator[Executor | None]:
         raise InputError("--jobs with --cluster", hint="the cluster's workers say how many programs analyze at a time")
     try:
         from distributed import Client
-    except ImportError:
-        raise InputError(
-            "--cluster needs the package distributed", hint="run `pip install 'toolpath-stiff[cluster]'`"
-        ) from None
-    try:
+
         client: Any = Client(args.cluster, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError, ImportError) as error:  # ImportError: a protocol that is not installed
-        told = " ".join(str(error).split())
+    except (OSError, ValueError, ImportError) as error:  # ImportError: a protocol that is not installed, or all of it
+        if "distributed" not in sys.modules or sys.modules["distributed"] is None:
+            hint = "run `pip install 'toolpath-stiff[cluster]'`"
+            raise InputError("--cluster needs the package distributed", hint=hint) from None
         raise InputError(
-            f"--cluster {args.cluster}: {told}", expected="the address of a Dask scheduler, as tcp://10.0.0.5:8786"
+            f"--cluster {args.cluster}: {' '.join(str(error).split())}",
+            expected="the address of a Dask scheduler, as tcp://10.0.0.5:8786",
         ) from None
     with client:
         if not client.scheduler_info()["workers"]:
-            print(f"tps: note: {args.cluster} has no worker yet, the programs wait for one", file=sys.stderr)
+            tell("note", [f"{args.cluster} has no worker yet, the programs wait for one"])
         yield client.get_executor(pure=False)
+
+
+def _write_pieces(pieces: Iterable[str | bytes]) -> None:
+    """Text in pieces on standard output, as long as somebody reads it."""
+    for piece in pieces:
+        sys.stdout.write(piece if isinstance(piece, str) else piece.decode())
+        if getattr(sys.stdout, "gone", False):
+            return
 
 
 def path(args: Namespace) -> int:
@@ -180,19 +172,14 @@ def path(args: Namespace) -> int:
     0,0,0 unless --origin or the program's own G10 says otherwise. Every move has samples at both of its ends.
     """
     replaced = check_single(args, args.out, mark=b"line,motion,tool,s_mm")
-    sampled = programs.sample_path(program_for(args, args.program), **given(args, programs.sample_path))
+    sampled = call(args, tps.sample_path)
     if args.out:
         keep(replaced)
         sampled.save(args.out)
     else:
-        for piece in sampled.csv():
-            sys.stdout.write(piece.decode())
-            if getattr(sys.stdout, "gone", False):  # nobody reads on
-                break
-    for warning in sampled.warnings:
-        print(f"tps: warning: {sampled.name}: {warning}", file=sys.stderr)
-    for note in sampled.unsupported:
-        print(f"tps: note: {note}", file=sys.stderr)
+        _write_pieces(sampled.csv())
+    tell("warning", (f"{sampled.name}: {warning}" for warning in sampled.warnings))
+    tell("note", sampled.unsupported)
     return 0
 
 
@@ -210,23 +197,23 @@ def check(args: Namespace) -> int:
     extents, lengths and times is then that of the blocks that could be read. Extents are those of the tool tip in
     program coordinates of G54, mm and degrees. Exit code 1 if there is any error.
     """
-    findings = programs.check(
-        program_for(args, args.program),
-        None if args.machine == NO_MACHINE else args.machine,
-        **given(args, programs.check),
-    )
-    sys.stdout.write(findings.to_json() if args.json else str(findings))
+    findings = call(args, tps.check, **({"machine": None} if args.machine == NO_MACHINE else {}))
+    show(args, findings)
     return 1 if findings.errors else 0
 
 
-MACHINE_OR_NONE = own(
-    "--machine NAME|FILE", "machine whose reach and strut speeds are checked; none: no machine", default="nist"
+READ = (tps.Program.read, tps.Machine.load, tps.Machine.under)
+CLUSTER = own(
+    "--cluster ADDRESS",
+    "hand the programs to the workers of a Dask cluster instead, one program a task; ADDRESS is its scheduler's, as "
+    "tcp://10.0.0.5:8786. Workers must see the programs and --out by the same paths "
+    "(pip install 'toolpath-stiff[cluster]')",
 )
 COMMANDS = {
     "analyze": Command(
         analyze,
-        PROGRAMS,
-        programs.analyze,
+        own("PROGRAM", "NC program or cutter-location file, or a folder of them", name="programs", count="+"),
+        tps.analyze,
         Argument("table", programs.FORMAT, default="csv"),
         Argument("show_plunges", programs.SHOW_PLUNGES, kind=bool, default=False),
         Argument("jobs", programs.JOBS, kind=int),
@@ -237,11 +224,20 @@ COMMANDS = {
     "path": Command(
         path,
         PROGRAM,
-        programs.sample_path,
-        Program.read,
+        tps.sample_path,
+        tps.Program.read,
         own("--csv", "write CSV to standard output (the default)"),
         own("--out FILE", "write CSV to a file", instead_of="csv"),
         REPLACE,
     ),
-    "check": Command(check, PROGRAM, MACHINE_OR_NONE, programs.check, Program.read, JSON),
+    "check": Command(
+        check,
+        PROGRAM,
+        own(
+            "--machine NAME|FILE", "machine whose reach and strut speeds are checked; none: no machine", default="nist"
+        ),
+        tps.check,
+        tps.Program.read,
+        JSON,
+    ),
 }

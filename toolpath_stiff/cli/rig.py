@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from toolpath_stiff.cli.outputs import check_made, check_written, inputs_of, keep, tell_kept
+from toolpath_stiff.cli.outputs import inputs_of, show, tell_kept, write_made
 from toolpath_stiff.cli.parser import JSON, REPLACE, Command, own
-from toolpath_stiff.files import write_atomically
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.results_folder import Rules
 
@@ -42,10 +40,8 @@ def measure(args: Namespace) -> int:
     """Measure the same hidden machine again."""
     from toolpath_stiff.rig.exercise import measured_again
 
-    check_written(args, [args.out], (Path(args.folder) / name for name in FILES))
     text, count = measured_again(args.folder, args.at, args.visit)
-    keep(check_made(args, {Path(args.out): text}))
-    write_atomically(args.out, text)
+    write_made(args, {Path(args.out): text}, (Path(args.folder) / name for name in FILES))
     print(f"{args.out}: {count} measurements")
     print(hint("next", _diagnose(args.folder, args.out)))
     return 0
@@ -56,8 +52,7 @@ def reveal_truth(args: Namespace) -> int:
     from toolpath_stiff.rig.exercise import reveal
 
     truth = reveal(args.folder, args.claim)
-    print(json.dumps(truth, indent=2, ensure_ascii=False) if args.json else _wording(truth))
-    return 0
+    return show(args, _wording(truth), document=lambda: truth)
 
 
 def _diagnose(folder: str, *more: str) -> str:
@@ -67,12 +62,12 @@ def _diagnose(folder: str, *more: str) -> str:
     return Asked(tuple(files), str(place / "machine.toml")).command("diagnose")
 
 
-def _wording(found: dict[str, Any]) -> str:
+def _wording(truth: dict[str, Any]) -> str:
     """What was hidden, in lines."""
-    lines = [f"claim {', '.join(found['claim'])}: {found['verdict']}"]
-    if not found["effects"]:
+    lines = [f"claim {', '.join(truth['claim'])}: {truth['verdict']}"]
+    if not truth["effects"]:
         lines.append("nothing was hidden")
-    for effect in found["effects"]:
+    for effect in truth["effects"]:
         values = ", ".join(
             f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
             for key, value in effect["parameters"].items()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import cast
 
-from toolpath_stiff.api.inputs import Program, Reading
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.cli.parser import Command, given, own
 from toolpath_stiff.defaults import MACHINE
+from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import arguments_of
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypedDict
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,13 +10,15 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions
 from toolpath_stiff.inference.covariances import Covariance
 from toolpath_stiff.readings.dates import day_of, short_dates
-from toolpath_stiff.readings.history import NOTHING, HistoryDocument, Readings, history
+from toolpath_stiff.readings.history import StrutHistory, history
 from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.strut_series import StrutReadings
 
 STANDS_OUT = 3.0  # standard deviations from which a loop is said to read something else than the model has
 
 
-class LoopReadingEntry(TypedDict):
+@dataclass(frozen=True)
+class LoopReadingFigures:
     """One reading; nm per N of load at the tip (of a strut alone: of force in it)."""
 
     file: str
@@ -32,7 +34,8 @@ class LoopReadingEntry(TypedDict):
     standard_deviations: float
 
 
-class LoopEntry(TypedDict):
+@dataclass(frozen=True)
+class LoopMean:
     """All readings of one loop; counted in the direction in which the machine file's struts would move it."""
 
     loop: str
@@ -45,14 +48,15 @@ class LoopEntry(TypedDict):
     text: str
 
 
-class LoopsDocument(TypedDict):
+@dataclass(frozen=True)
+class BesideTip:
     """Loops beside the tip: by loop, and reading by reading."""
 
-    by_loop: list[LoopEntry]
-    readings: list[LoopReadingEntry]
+    by_loop: tuple[LoopMean, ...] = ()
+    readings: tuple[LoopReadingFigures, ...] = ()
 
 
-def loops_document(data: Measurements, log_model: FloatArray, spread: Covariance) -> LoopsDocument:
+def beside_tip(data: Measurements, log_model: FloatArray, spread: Covariance) -> BesideTip:
     """Readings of loops beside the tip.
 
     Parameters
@@ -66,70 +70,54 @@ def loops_document(data: Measurements, log_model: FloatArray, spread: Covariance
     """
     beside = data.beside
     if beside is None:
-        return {"by_loop": [], "readings": []}
-    read, joined = data.compliance, np.exp(-log_model)
-    model = beside.alone(joined)
-    sd = np.sqrt(spread.diagonal) * joined
+        return BesideTip()
+    joined = np.exp(-log_model)
+    read, model, sd = 1e9 * data.compliance, 1e9 * beside.alone(joined), 1e9 * np.sqrt(spread.diagonal) * joined
     rows = np.flatnonzero(beside.beside)
-    along = directions(data)
-    readings: list[LoopReadingEntry] = [
-        {
-            "file": str(data.file[i]),
-            "line": int(data.line[i]),
-            "point": str(data.point[i]),
-            "loop": str(data.loop[i]),
-            "direction": str(along[i]),
-            "force_N": float(data.force[i]),
-            "read_nm_per_N": 1e9 * float(read[i]),
-            "model_nm_per_N": 1e9 * float(model[i]),
-            "off_nm_per_N": 1e9 * float(read[i] - model[i]),
-            "sd_nm_per_N": 1e9 * float(sd[i]),
-            "standard_deviations": float((read[i] - model[i]) / sd[i]),
-        }
+    along, off = directions(data), read - model
+    readings = [
+        LoopReadingFigures(
+            file=str(data.file[i]),
+            line=int(data.line[i]),
+            point=str(data.point[i]),
+            loop=str(data.loop[i]),
+            direction=str(along[i]),
+            force_N=float(data.force[i]),
+            read_nm_per_N=float(read[i]),
+            model_nm_per_N=float(model[i]),
+            off_nm_per_N=float(off[i]),
+            sd_nm_per_N=float(sd[i]),
+            standard_deviations=float(off[i] / sd[i]),
+        )
         for i in rows.tolist()
     ]
-    by_loop = []
+    means = []
     for name in dict.fromkeys(data.loop[rows].tolist()):
-        own = data.loop == name
-        weights = np.where(own, 1.0 / sd**2, 0.0)
-        weights /= weights.sum()
-        toward = beside.toward * weights
-        off = float((toward * (read - model)).sum())
-        error = float(np.sqrt(spread.squares(toward * joined)))
-        by_loop.append(_entry(name, int(own.sum()), float(toward @ read), float(toward @ model), off, error))
-    return {"by_loop": by_loop, "readings": readings}
+        of_loop = data.loop == name
+        weights = np.where(of_loop, 1.0 / sd**2, 0.0)
+        toward = beside.toward * weights / weights.sum()
+        error = 1e9 * float(np.sqrt(spread.squares(toward * joined)))
+        count, mean, modelled, apart = int(of_loop.sum()), *(float(toward @ part) for part in (read, model, off))
+        text = f"{name}: {mean:.2f} nm/N read in the mean of {count}, {modelled:.2f} nm/N modelled"
+        side = "more" if apart > 0.0 else "less"
+        ratio = apart / error
+        text += f": {abs(ratio):.1f} standard deviations {side}" if abs(ratio) >= STANDS_OUT else ", which agrees"
+        means.append(LoopMean(name, count, mean, modelled, apart, error, ratio, text))
+    return BesideTip(tuple(means), tuple(readings))
 
 
-def _entry(name: str, count: int, read: float, model: float, off: float, error: float) -> LoopEntry:
-    ratio = off / error
-    text = f"{name}: {1e9 * read:.2f} nm/N read in the mean of {count}, {1e9 * model:.2f} nm/N modelled"
-    side = "more" if off > 0.0 else "less"
-    text += f": {abs(ratio):.1f} standard deviations {side}" if abs(ratio) >= STANDS_OUT else ", which agrees"
-    return {
-        "loop": name,
-        "readings": count,
-        "read_nm_per_N": 1e9 * read,
-        "model_nm_per_N": 1e9 * model,
-        "off_nm_per_N": 1e9 * off,
-        "sd_nm_per_N": 1e9 * error,
-        "standard_deviations": ratio,
-        "text": text,
-    }
-
-
-def strut_history(data: Measurements, log_model: FloatArray, seed: int) -> HistoryDocument:
+def strut_history(data: Measurements, log_model: FloatArray, seed: int) -> StrutHistory:
     """Struts measured alone, over their dates and by the sign of their force.
 
     Readings at several lengths are reduced to the mean of these by the model's own stiffness, `log_model` (n,).
     """
     if data.beside is None:
-        return NOTHING
+        return StrutHistory()
     alone = np.array([loop.kind == "alone" for loop in data.beside.loops])[data.beside.which]
-    names, log_read = data.loop[alone], np.log(data.stiffness[alone])
-    modelled = log_model[alone]
+    names, log_read, modelled = data.loop[alone], np.log(data.stiffness[alone]), log_model[alone]
     for name in np.unique(names):
-        own = names == name
-        log_read[own] -= modelled[own] - modelled[own].mean()
+        of_strut = names == name
+        log_read[of_strut] -= modelled[of_strut] - modelled[of_strut].mean()
     dates = [""] * len(names) if data.date is None else data.date[alone].tolist()
     day = np.array([day_of(text) for text in dates], dtype=float)
-    return history(Readings(names, day, log_read, data.beside.side[alone], short_dates(dates)), seed=seed)
+    return history(StrutReadings(names, day, log_read, data.beside.side[alone], short_dates(dates)), seed=seed)

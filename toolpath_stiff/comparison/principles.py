@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ SAME = 1e-3  # m, poses and joints closer than this are one
 UPRIGHT = 1e-3  # rad
 
 
-CROSS = "needs the displacement across the load: no column of a measurement file holds it"
+ON_AXIS, IMAGES = "threefold symmetry on the axis", "symmetric images"
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,8 @@ class Check:
     size: float | None = None
 
 
-class CheckEntry(TypedDict):
+@dataclass(frozen=True)
+class CheckOutcome:
     """The outcome of a check."""
 
     check: str
@@ -76,40 +77,43 @@ class CheckEntry(TypedDict):
     text: str
 
 
+@dataclass(frozen=True)
+class NotChecked:
+    """A check that these data do not allow."""
+
+    check: str
+    reason: str
+
+
 def symmetries(machine: Machine) -> list[FloatArray]:
     """(3, 3) turns by 120 and 240 degrees about Z and mirrors that leave the machine's joints as they are."""
-    found = []
-    for degrees in (120.0, 240.0):
+    candidates = []
+    for degrees, sign in [(120.0, 1.0), (240.0, 1.0), *((2.0 * half, -1.0) for half in range(0, 180, 30))]:
         c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-        found.append(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
-    for degrees in range(0, 180, 30):
-        c, s = np.cos(np.radians(2 * degrees)), np.sin(np.radians(2 * degrees))
-        found.append(np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, 1.0]]))
-    return [q for q in found if _maps(q, machine.frame_joints) and _maps(q, machine.platform_joints)]
+        candidates.append(np.array([[c, -sign * s, 0.0], [s, sign * c, 0.0], [0.0, 0.0, 1.0]]))
+
+    def maps(q: FloatArray, joints: FloatArray) -> bool:
+        distance = np.linalg.norm((joints @ q.T)[:, None] - joints[None], axis=-1)
+        return bool((distance.min(axis=1) < SAME).all())
+
+    return [q for q in candidates if maps(q, machine.frame_joints) and maps(q, machine.platform_joints)]
 
 
-def _maps(q: FloatArray, joints: FloatArray) -> bool:
-    distance = np.linalg.norm((joints @ q.T)[:, None] - joints[None], axis=-1)
-    return bool((distance.min(axis=1) < SAME).all())
-
-
-def model_free_checks(machine: Machine, data: Measurements) -> tuple[list[Check], list[dict[str, str]]]:
-    """The checks that n readings allow; for the others, why not: `check`, `reason`."""
-    cells = _cells(data)
-    turns = symmetries(machine)
+def model_free_checks(machine: Machine, data: Measurements) -> tuple[list[Check], list[NotChecked]]:
+    """The checks that n readings allow; for the others, why not."""
+    cells, turns = _cells(data), symmetries(machine)
     threefold = sum(np.linalg.det(q) > 0 for q in turns) == 2
-    checks: list[Check] = []
-    cannot = [{"check": "reciprocity", "reason": CROSS}]
-    for name, found, reason in (
+    kinds: list[tuple[str, list[Check], str]] = [
+        ("reciprocity", [], "needs the displacement across the load: no column of a measurement file holds it"),
         (
-            "threefold symmetry on the axis",
+            ON_AXIS,
             list(_on_axis(data, cells)) if threefold else [],
             "no pose on the axis was measured along X and Y with the spindle vertical"
             if threefold
             else "a turn by 120 degrees does not leave this machine's joints as they are",
         ),
         (
-            "symmetric images",
+            IMAGES,
             list(_images(data, cells, turns)),
             "no two poses are images of each other under the machine's symmetry"
             if turns
@@ -117,14 +121,12 @@ def model_free_checks(machine: Machine, data: Measurements) -> tuple[list[Check]
         ),
         ("proportionality", list(_proportionality(data)), "no pose was measured at two loads"),
         ("set-ups", list(_setups(data)), "no pose was measured in two set-ups"),
-    ):
-        checks += found
-        if not found:
-            cannot.append({"check": name, "reason": reason})
-    return checks, cannot
+    ]
+    cannot = [NotChecked(name, reason) for name, checks, reason in kinds if not checks]
+    return [check for _, checks, _ in kinds for check in checks], cannot
 
 
-def assess(checks: list[Check], data: Measurements, covariance: Covariance, draws: FloatArray) -> list[CheckEntry]:
+def assess(checks: list[Check], data: Measurements, covariance: Covariance, draws: FloatArray) -> list[CheckOutcome]:
     """Size, statistic and adjusted probability of every check.
 
     `draws` (m, n): simulated scatter, in which the largest statistic of all checks is looked up as well.
@@ -136,24 +138,15 @@ def assess(checks: list[Check], data: Measurements, covariance: Covariance, draw
     logs = np.log(data.stiffness)
     value = np.array([check.weights @ logs if check.size is None else check.size for check in checks])
     largest = np.abs(draws @ (weights / sd[:, None]).T).max(axis=1)
-    found: list[CheckEntry] = []
+    outcomes = []
     for check, size, spread in zip(checks, value.tolist(), sd.tolist(), strict=True):
         p = (1.0 + float((largest >= abs(size) / spread).sum())) / (1.0 + len(largest))
         holds = p >= 0.05
         percent, error = 100.0 * np.expm1(size), 100.0 * spread
         text = check.text.format(percent=f"{percent:+.2g} % (scatter alone: +-{2 * error:.2g} %)")
-        found.append(
-            {
-                "check": check.check,
-                "holds": holds,
-                "percent": percent,
-                "standard_error_percent": error,
-                "statistic": size / spread,
-                "p_adjusted": p,
-                "text": f"{text}: {'no more than scatter' if holds else check.broken}",
-            }
-        )
-    return found
+        text = f"{text}: {'no more than scatter' if holds else check.broken}"
+        outcomes.append(CheckOutcome(check.check, holds, percent, error, size / spread, p, text))
+    return outcomes
 
 
 def _cells(data: Measurements) -> dict[tuple[Any, ...], NDArray[np.int64]]:
@@ -184,17 +177,13 @@ def _on_axis(data: Measurements, cells: dict[tuple[Any, ...], NDArray[np.int64]]
         across = next((rows for key, rows in cells.items() if key[:2] == (pose, rest) and abs(key[2][1]) == 1.0), None)
         if across is not None:
             weights = _mean(len(data), rows) - _mean(len(data), across)
-            at = f"z = {mm_from_m(float(data.position[i, 2])):.0f} mm{_rest_words(rest)}"
+            at = f"z = {mm_from_m(float(data.position[i, 2])):.0f} mm" + (f", set-up {rest[2]}" if rest[2] else "")
             yield Check(
-                "threefold symmetry on the axis",
+                ON_AXIS,
                 weights,
                 f"On the axis at {at}, X against Y: {{percent}}",
                 "the three legs, table or instruments are not alike (table, set-up, gauge, one strut or vertex)",
             )
-
-
-def _rest_words(rest: tuple[Any, ...]) -> str:
-    return f", set-up {rest[2]}" if rest[2] else ""
 
 
 def _images(
@@ -217,7 +206,7 @@ def _images(
         for direction, rows in one.items():
             for image, rows_there in other.items():
                 if abs(float(np.dot(q @ direction, image))) > 1.0 - 1e-6:
-                    yield Check("symmetric images", _mean(n, rows) - _mean(n, rows_there), f"{where}, along "
+                    yield Check(IMAGES, _mean(n, rows) - _mean(n, rows_there), f"{where}, along "
                                 f"{_named(direction)}: {{percent}}", broken)  # fmt: skip
         x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
         if abs(q[0, 1]) > 1e-9 and {x, y} <= set(one) and {x, y} <= set(other):
@@ -227,7 +216,7 @@ def _images(
                 size -= sign * float(np.log(sum(softness.values())))
                 for d in (x, y):
                     weights += _mean(n, which[d], sign * softness[d] / sum(softness.values()))
-            yield Check("symmetric images", weights, f"{where}, 1/k along X and Y added: {{percent}}", broken, size)
+            yield Check(IMAGES, weights, f"{where}, 1/k along X and Y added: {{percent}}", broken, size)
 
 
 def _is_image(data: Measurements, q: FloatArray, i: int, j: int) -> bool:

@@ -1,4 +1,4 @@
-"""What residuals are held against: every column of the data, and every quantity that the model does not use.
+"""Residuals, and what they are held against: every column of the data, and every quantity that the model does not use.
 
 A `Variable` is numbers (height, time, force), a `Label` is names (set-up, clamping, plane). Planes are groups of
 heights, zones are distances from the machine's axis.
@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
-from toolpath_stiff.comparison.structure import SIGNIFICANT, FoundPattern, Pattern
+from toolpath_stiff.comparison.structure import Pattern
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.readings.measurements import Measurements
-from toolpath_stiff.stiffness.contract import about
+from toolpath_stiff.readings.measurements import Measurements, model_stiffness
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 AXIS_ALIGNED = 0.999  # |cosine| from which a direction counts as X, Y or Z
@@ -64,9 +66,65 @@ class Label:
     values: TextArray
     by_direction: bool
 
-    def words(self, level: str) -> str:
-        """The level in a sentence."""
-        return self.text.format(level)
+
+@dataclass(frozen=True)
+class Residuals:
+    """ln(measured / modelled) of n readings of the tip, and what they are held against.
+
+    Attributes
+    ----------
+    predictor
+        Model and readings.
+    log_model, values
+        (n,) ln(N/m) that the readings should show; the residuals.
+    numbers, names
+        What they are held against.
+    notes
+        What was left out of that.
+    patterns
+        Everything that is looked for in them.
+    """
+
+    predictor: Predictor
+    log_model: FloatArray
+    values: FloatArray
+    numbers: list[Variable]
+    names: list[Label]
+    notes: list[str]
+    patterns: list[Pattern]
+
+    @classmethod
+    def of(cls, predictor: Predictor) -> Residuals:
+        """Residuals of the predictor's readings. Raises `InputError` where the model has no stiffness for one."""
+        data, log_model = predictor.data, predictor.log_stiffness()
+        bad = np.flatnonzero(~np.isfinite(log_model))
+        if len(bad):
+            model_stiffness(predictor.base, data)  # which effect leaves none, at which pose, if it is one
+            raise InputError(
+                "the model has no stiffness for this reading",
+                hint="check the pose and the machine file's effects",
+                file=str(data.file[bad[0]]),
+                line=int(data.line[bad[0]]),
+            )
+        numbers, (names, notes) = variables(predictor, log_model), labels(data)
+        values = np.log(data.stiffness) - log_model
+        return cls(predictor, log_model, values, numbers, names, notes, patterns(data, numbers, names))
+
+    @cached_property
+    def law_columns(self) -> FloatArray:
+        """(n, 2) what the strut law's constants change; (n, 1) of a constant law, whose second does nothing."""
+        columns = self.predictor.law_columns(self.log_model)
+        return columns[:, :1] if self.predictor.machine.strut_law.constant else columns
+
+    @cached_property
+    def places(self) -> NDArray[np.int64]:
+        """(n,) number of the place: pose, direction, tool and set-up, whatever the load and the repeat."""
+        data = self.predictor.data
+        columns = [np.round(part, 6) for part in (data.position, data.angles, data.direction)]
+        setup = np.unique(data.setup, return_inverse=True)[1].astype(float)
+        columns += [data.tool_extension[:, None], setup.reshape(-1, 1)]
+        number = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
+        return np.asarray(number.reshape(-1), dtype=np.int64)
 
 
 def directions(data: Measurements) -> TextArray:
@@ -122,7 +180,7 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
     share = 100.0 * predictor.strut_columns()
     along_tool = np.einsum("ni,ni->n", data.direction, turn[:, :, 2]) ** 2
     off_axis = radius(data) > SAME_PLANE
-    found = [
+    known = [
         Variable("order", "the reading's place in the measuring order", "", np.arange(1.0, len(data) + 1.0)),
         Variable("height", "the height", "mm", mm_from_m(data.position[:, 2])),
         Variable("x", "X", "mm", mm_from_m(data.position[:, 0])),
@@ -147,20 +205,16 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
         Variable("model_stiffness", "the modelled stiffness", "N/mm", n_per_mm_from_n_per_m(np.exp(log_model))),
         Variable("deflection", "the modelled deflection", "um", um_from_m(data.force / np.exp(log_model))),
     ]
-    extension = mm_from_m(data.tool_extension)
     columns = [
-        ("force_N", Variable("force_N", "the force", "N", data.force)),
-        ("time_min", Variable("time_min", "the time since zeroing", "min", min_from_s(data.time))),
-        ("temperature_C", Variable("temperature_C", "the temperature", "C", data.temperature)),
-        ("tool_extension_mm", Variable("tool_extension_mm", "the tool's extra length", "mm", extension)),
+        Variable("force_N", "the force", "N", data.force),
+        Variable("time_min", "the time since zeroing", "min", min_from_s(data.time)),
+        Variable("temperature_C", "the temperature", "C", data.temperature),
+        Variable("tool_extension_mm", "the tool's extra length", "mm", mm_from_m(data.tool_extension)),
     ]
-    found += [variable for column, variable in columns if column not in data.missing]
-    if "temperature_C" in data.missing and np.isfinite(data.temperature).any():
-        found.append(columns[2][1])
-    if "time_min" in data.missing and np.isfinite(data.time).any():
-        found.append(columns[1][1])
-    found += [Variable(name, f"column {name}", "", values) for name, values in data.extra.items()]
-    return [one for one in found if varies(one.values)]
+    known += [variable for variable in columns if variable.name not in data.missing]
+    known += [variable for variable in (columns[2], columns[1]) if variable.name in data.missing]  # given in some rows
+    known += [Variable(name, f"column {name}", "", values) for name, values in data.extra.items()]
+    return [variable for variable in known if varies(variable.values)]
 
 
 def varies(values: FloatArray) -> bool:
@@ -175,7 +229,7 @@ def labels(data: Measurements) -> tuple[list[Label], list[str]]:
     if len(set(file.tolist())) == 1:
         prefix = f"{file[0]}: "
         clamp = np.array([name.removeprefix(prefix) for name in clamp.tolist()])
-    found = [
+    every = [
         Label("plane", "at the {}", planes(data), True),
         Label("zone", "{}", zones(data), True),
         Label("setup", "with set-up {}", data.setup, True),
@@ -186,7 +240,7 @@ def labels(data: Measurements) -> tuple[list[Label], list[str]]:
         Label("point", "at point {}", data.point, False),
     ]
     kept, notes = [], []
-    for label in found:
+    for label in every:
         count = len(set(label.values.tolist()))
         if count > MOST_LEVELS:
             notes.append(f"{label.name} has {count} levels: not tested one by one")
@@ -204,164 +258,59 @@ CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose
 ALL = "all"
 
 
-NOUGHT = 0.3  # of a course's change: a residual below is nothing beside it
-
-
-SHARE = "share_of_strut_"  # of the compliance; the strut's number follows
-
-
 def patterns(data: Measurements, numbers: list[Variable], names: list[Label]) -> list[Pattern]:
     """Everything that is looked for in n residuals; patterns equal to one before are only named with it."""
     kept: dict[bytes, list[Pattern]] = {}
-    for one in _candidates(data, numbers, names):
-        centred = one.values - one.values.mean() if one.kind != "level" else one.values
+    for pattern in _candidates(data, numbers, names):
+        centred = pattern.values - pattern.values.mean() if pattern.kind != "level" else pattern.values
         size = float(np.linalg.norm(centred))
         if size > 1e-9:
             key = np.round(centred / size * np.sign(centred[np.argmax(np.abs(centred))]), 7) + 0.0
-            kept.setdefault(key.tobytes(), []).append(one)
-    return [replace(first, same=tuple(one.name for one in others)) for first, *others in kept.values()]
+            kept.setdefault(key.tobytes(), []).append(pattern)
+    return [replace(first, same=tuple(other.name for other in others)) for first, *others in kept.values()]
 
 
 def _candidates(data: Measurements, numbers: list[Variable], names: list[Label]) -> Iterator[Pattern]:
-    along = directions(data)
-    whole = np.ones(len(data), dtype=bool)
-    groups = {ALL: whole}
-    if len(set(along.tolist())) > 1:
-        groups |= {str(axis): along == axis for axis in np.unique(along)}
-    for group, rows in groups.items():
-        if rows.sum() >= FEWEST or group == ALL:
-            yield _level("everywhere", group, rows, "")
+    """Levels of the labels and slopes along the variables, in all directions and in each."""
+    along, whole = directions(data), np.ones(len(data), dtype=bool)
+    axes = np.unique(along).tolist()
+    groups = {ALL: whole} | ({axis: along == axis for axis in axes} if len(axes) > 1 else {})
+    levels = [("everywhere", group, rows, "") for group, rows in groups.items()]
     for label in names:
-        for group, rows in groups.items() if label.by_direction else [(ALL, whole)]:
-            for level in np.unique(label.values):
-                yield from _level_if(f"{label.name} {level}", group, rows & (label.values == level), label.words(level))
+        levels += [
+            (f"{label.name} {level}", group, rows & (label.values == level), label.text.format(level))
+            for group, rows in (groups if label.by_direction else {ALL: whole}).items()
+            for level in np.unique(label.values)
+        ]
     by_name = {label.name: label for label in names}
     if "plane" in by_name and "zone" in by_name:
-        yield from _cells(by_name["plane"], by_name["zone"], groups)
+        plane, zone = by_name["plane"], by_name["zone"]
+        levels += [
+            (f"zone {here}, plane {level}", group, rows & (plane.values == level) & (zone.values == here),
+             f"{here} {plane.text.format(level)}")
+            for group, rows in groups.items()
+            for here in np.unique(zone.values)
+            for level in np.unique(plane.values)
+        ]  # fmt: skip
+    for name, group, rows, place in levels:
+        if rows.sum() >= FEWEST or (name, group) == ("everywhere", ALL):
+            yield Pattern(f"{group}: {name}", name, group, "level", rows.astype(float), rows, place)
     for variable in numbers:
         for group, rows in groups.items():
             yield from _slopes(variable, group, rows)
 
 
-def _cells(plane: Label, zone: Label, groups: dict[str, BoolArray]) -> Iterator[Pattern]:
-    for group, rows in groups.items():
-        for here in np.unique(zone.values):
-            for level in np.unique(plane.values):
-                chosen = rows & (plane.values == level) & (zone.values == here)
-                yield from _level_if(f"zone {here}, plane {level}", group, chosen, f"{here} {plane.words(level)}")
-
-
-def _level_if(variable: str, group: str, rows: BoolArray, place: str) -> Iterator[Pattern]:
-    if rows.sum() >= FEWEST:
-        yield _level(variable, group, rows, place)
-
-
-def _level(variable: str, group: str, rows: BoolArray, place: str) -> Pattern:
-    return Pattern(f"{group}: {variable}", variable, group, "level", rows.astype(float), rows, place)
-
-
 def _slopes(variable: Variable, group: str, rows: BoolArray) -> Iterator[Pattern]:
+    """A straight course along a variable, and of some variables a bent one beside it."""
     known = rows & np.isfinite(variable.values)
     if not varies(variable.values[known]):
         return
+    name, of = f"{group}: {variable.name}", (variable.title, variable.values, variable.unit)
     x = np.where(known, variable.values, 0.0)
     x = np.where(known, x - x[known].mean(), 0.0) / float(x[known].std())
-    yield Pattern(f"{group}: {variable.name}", variable.name, group, "slope", x, known, variable.title)
+    yield Pattern(name, variable.name, group, "slope", x, known, *of)
     if variable.name in CURVED and len(np.unique(np.round(x[known], 9))) >= 4:
         bent = np.where(known, x**2, 0.0)
         slope = np.stack([known.astype(float), x], axis=1)
         bent = bent - slope @ np.linalg.lstsq(slope, bent, rcond=None)[0]
-        yield Pattern(f"{group}: {variable.name} squared", variable.name, group, "curve", bent, known, variable.title)
-
-
-def sentence(
-    found: FoundPattern, pattern: Pattern, numbers: dict[str, Variable], residual: FloatArray, first: bool
-) -> tuple[str, float]:
-    """A finding in words, and its size in per cent: of a level the readings' mean, of a slope the change end to end.
-
-    `first`: nothing was found before it, so that what it says is what the readings show as they are.
-    """
-    who = {ALL: "all directions", "oblique": "oblique directions"}.get(pattern.direction, f"along {pattern.direction}")
-    mean, count = float(residual[pattern.rows].mean()), int(pattern.rows.sum())
-    readings = f"{count} reading{'' if count == 1 else 's'}"
-    if pattern.kind == "level":
-        return _level_words(found, pattern, who, mean, readings, first)
-    x = pattern.values[pattern.rows]
-    values = numbers[pattern.variable].values[pattern.rows]
-    if pattern.kind == "curve":
-        middle, ends = found.coefficient * float(x.min()), found.coefficient * float(x.max())
-        size = percent(middle - ends)
-        how = "stiffer" if middle > ends else "softer"
-        return (
-            f"{_capital(who)} {how} against the model at middling values of {pattern.place} than at its extremes, by "
-            f"{abs(size):.2g} % ({readings})"
-        ), size
-    low, high = int(np.argmin(values)), int(np.argmax(values))
-    first_end, last_end = mean + found.coefficient * float(x[low]), mean + found.coefficient * float(x[high])
-    size = percent(last_end - first_end)
-    unit = f" {numbers[pattern.variable].unit}".rstrip()
-    text = (
-        f"{who} {'stiffer' if size > 0 else 'softer'} against the model as {pattern.place} grows, from "
-        f"{signed(percent(first_end))} at {_short(values[low], values)}{unit} to {signed(percent(last_end))} at "
-        f"{_short(values[high], values)}{unit} ({readings})"
-    )
-    sure = found.p_adjusted < SIGNIFICANT
-    cause = (
-        _as_if(pattern, first_end, last_end, float(values[low]) / 100.0, float(values[high]) / 100.0) if sure else ""
-    )
-    return (f"{cause}: {text}" if cause else _capital(text)), size
-
-
-def _as_if(pattern: Pattern, first: float, last: float, low: float, high: float) -> str:
-    """Which strut of what stiffness would make such a course from its low to its high share of the compliance, or "".
-
-    A strut's stiffness times f adds share (1 / f - 1) to the compliance, and nothing where the share is nothing.
-    """
-    if not pattern.variable.startswith(SHARE) or pattern.direction != ALL or high <= low:
-        return ""
-    change = last - first
-    without = first - change * low / (high - low)
-    softer = 1.0 + float(np.expm1(-change)) / (high - low)
-    if softer <= 0.0 or abs(without) > NOUGHT * abs(change):
-        return ""
-    off = 100.0 * (1.0 / softer - 1.0)
-    strut = pattern.variable.removeprefix(SHARE)
-    return f"As if strut {strut} were about {about(off)} % too {'soft' if off < 0.0 else 'stiff'}"
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
-def _short(value: float, values: FloatArray) -> str:
-    """A value to three digits; 0 where it is nothing beside the others."""
-    if abs(value) < 1e-3 * float(np.abs(values).max()):
-        return "0"
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
-
-
-def _level_words(
-    found: FoundPattern, pattern: Pattern, who: str, mean: float, readings: str, first: bool
-) -> tuple[str, float]:
-    place = f" {pattern.place}" if pattern.place else " everywhere" if pattern.direction == ALL else ""
-    size, own = percent(mean), percent(found.coefficient)
-    whole = f"{abs(size):.2g} % {_side(size)} than modelled"
-    if first or (mean * found.coefficient > 0 and abs(mean) > 0.5 * abs(found.coefficient)):
-        return f"{_capital(who)} {whole}{place} ({readings})", size
-    return (
-        f"{_capital(who)} {abs(own):.2g} % {_side(own)}{place} than the findings above explain: {whole} ({readings})"
-    ), own
-
-
-def _side(change: float) -> str:
-    return "softer" if change < 0.0 else "stiffer"
-
-
-def percent(log_ratio: float) -> float:
-    """A logarithm of a ratio as a change in per cent."""
-    return float(100.0 * np.expm1(log_ratio))
-
-
-def signed(value: float) -> str:
-    """A size in per cent with its sign."""
-    return f"{value:+.2g} %"
+        yield Pattern(f"{name} squared", variable.name, group, "curve", bent, known, *of)

@@ -60,7 +60,7 @@ TIED = 1e-9  # share by which statistics differ that are one and the same: of pa
 DEPENDENT = 1e-6  # of a column's square that is left after the patterns already found: less is nothing
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pattern:
     """A pattern that residuals may show.
 
@@ -76,6 +76,8 @@ class Pattern:
         (n,) bool, readings that it is about.
     place
         Words: "near the axis at the upper plane"; of a slope, the variable's title.
+    given, unit
+        (n,) the variable in its shop unit, of a slope.
     same
         Names of further patterns that are this one in these data, such as a set-up that is a plane.
     """
@@ -87,6 +89,8 @@ class Pattern:
     values: FloatArray
     rows: NDArray[np.bool_]
     place: str
+    given: FloatArray | None = None
+    unit: str = ""
     same: tuple[str, ...] = ()
 
 
@@ -97,7 +101,7 @@ class FoundPattern:
     Attributes
     ----------
     pattern
-        Index of the pattern.
+        Which one.
     statistic
         t, positive: stiffer than modelled.
     p_adjusted
@@ -108,12 +112,12 @@ class FoundPattern:
         Other patterns that cannot be told from it in these data.
     """
 
-    pattern: int
+    pattern: Pattern
     statistic: float
     p_adjusted: float
     coefficient: float
     standard_error: float
-    alike: tuple[int, ...]
+    alike: tuple[Pattern, ...]
 
 
 @dataclass(frozen=True)
@@ -188,7 +192,10 @@ class Scattering:
         n = len(clamps.of)
         common = rng.standard_normal((draws, len(self.covariance.shared))) @ self.covariance.shared
         clamped = rng.standard_normal((draws, clamps.count))[:, clamps.of] * noise.clamping
-        if (again := _clamped_again(clamps, self.places)) and noise.name == "measured":
+        # Clampings beyond the first of their places: degrees of freedom behind an estimate of the clamping.
+        first = np.unique(self.places.of, return_index=True)[1]
+        again = clamps.count - len(np.unique(clamps.of[first]))
+        if again and noise.name == "measured":
             clamped = clamped * np.sqrt(again / rng.chisquare(again, (draws, 1)))
         wild = np.where(rng.random((draws, n)) < noise.outliers, noise.outlier_width, 1.0)
         own = rng.standard_normal((draws, n)) * noise.repeat * wild
@@ -256,12 +263,6 @@ def _connected(clamp: NDArray[np.int64], place: NDArray[np.int64]) -> Groups:
     links = (np.ones(held.sum()), (np.tile(np.arange(n), 2)[held], columns[held]))
     size = n + clamps + int(place.max()) + 1
     return Groups.by(connected_components(coo_array(links, shape=(size, size)), directed=False)[1][:n])
-
-
-def _clamped_again(clamps: Groups, places: Groups) -> int:
-    """Clampings beyond the first of their places: degrees of freedom behind an estimate of the clamping."""
-    first = np.unique(places.of, return_index=True)[1]
-    return clamps.count - len(np.unique(clamps.of[first]))
 
 
 class _Fit:
@@ -388,7 +389,15 @@ def find_structure(
         left = float(EXCESSES[at])
         drawn = np.abs(fit.statistics(scattering.draws(left))[0]).max(axis=1)
         p = (1.0 + (drawn[:, None] >= np.abs(t)[None, :] - 1e-12).sum(axis=0)) / (1.0 + len(drawn))
-        answers = _answers(fit, at, float(factor[0]), t, p)
+        x, sizes, _ = fit.columns(at)
+        sizes = sizes / float(factor[0])
+        alike = np.abs(x.T @ x) > ALIKE
+        np.fill_diagonal(alike, val=False)
+        answers = [
+            FoundPattern(one, float(t[i]), float(p[i]), float(t[i] / sizes[i]), float(1.0 / sizes[i]),
+                         tuple(patterns[j] for j in np.flatnonzero(alike[i])))
+            for i, one in enumerate(patterns)
+        ]  # fmt: skip
         if step == 0:
             excess = left
             tests = tuple(one for one in answers if one.standard_error > 0.0)
@@ -404,30 +413,11 @@ def find_structure(
 
 
 def far_off(
-    residual: FloatArray, scattering: Scattering, structure: FoundPatterns, patterns: list[Pattern]
+    residual: FloatArray, scattering: Scattering, structure: FoundPatterns
 ) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
     """(n,) residuals with the patterns found taken out, rows far from nought, the furthest first, and (n,) in sd."""
-    columns = np.array([patterns[f.pattern].values for f in structure.found]).reshape(-1, len(residual)).T
+    columns = np.array([answer.pattern.values for answer in structure.found]).reshape(-1, len(residual)).T
     rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0] if columns.size else residual
     ratio = rest / np.sqrt(scattering.covariance.diagonal + structure.excess_left**2)
     order = np.argsort(-np.abs(ratio), kind="stable")
     return rest, order[np.abs(ratio[order]) > FAR_OFF], ratio
-
-
-def _answers(fit: _Fit, at: int, factor: float, t: FloatArray, p: FloatArray) -> list[FoundPattern]:
-    """One answer a pattern, at an excess of the grid and a factor on the noise."""
-    x, sizes, _ = fit.columns(at)
-    sizes = sizes / factor
-    alike = np.abs(x.T @ x) > ALIKE
-    np.fill_diagonal(alike, val=False)
-    return [
-        FoundPattern(
-            i,
-            float(t[i]),
-            float(p[i]),
-            float(t[i] / sizes[i]),
-            float(1.0 / sizes[i]),
-            tuple(np.flatnonzero(alike[i]).tolist()),
-        )
-        for i in range(len(t))
-    ]

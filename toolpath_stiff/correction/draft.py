@@ -10,17 +10,19 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import PurePath
+from pathlib import Path, PurePath
+from typing import Any
 
 from toolpath_stiff.correction.machines import data_hash
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.hints import Asked, command_line, options
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.machine.writer import value_text
-from toolpath_stiff.portrait.portrait import Portrait, Sized
+from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.portrait.words import portrait_text, size_words, term_words
 from toolpath_stiff.readings.measurements import reading_marks
-from toolpath_stiff.stiffness.contract import joined
+from toolpath_stiff.stiffness.effect_file import EffectFile
+from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.stiffness.term_effect import kind_of
 from toolpath_stiff.stiffness.term_file import entry_of
 from toolpath_stiff.stiffness.terms import PINS, Term, formula
@@ -30,26 +32,57 @@ WIDTH = 116  # columns of running text in the file
 MARKS_A_LINE = 10
 
 
-@dataclass(frozen=True)
-class Draft:
-    """An effect file, or why there is none.
+class EffectDraft(EffectFile):
+    """What a diagnosis leaves unexplained, as the text of an effect file.
 
     Attributes
     ----------
-    text
-        The file; "" where there is nothing to be described.
+    name, text
+        Name of the effect; the file, "" where there is nothing to describe.
     effects
-        Names of its effects.
+        Names of all effects in it.
     reason
-        Why there is none, a sentence; "" where there is one.
+        Why nothing is drafted, a sentence; "" where something is.
+    diagnosis
+        The diagnosis that it was drawn from.
+    next
+        Commands that go on from here.
     """
 
-    text: str = ""
-    effects: tuple[str, ...] = ()
-    reason: str = ""
+    def __init__(
+        self, name: str, diagnosis: Diagnosis, text: str = "", effects: Sequence[str] = (), reason: str = "",
+        commands: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        super().__init__(name, text)
+        self.effects, self.reason, self.diagnosis, self.next = list(effects), reason, diagnosis, list(commands)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Names and text, the verdict and the portrait; `reason` where nothing is drafted."""
+        diagnosis = self.diagnosis.to_dict()
+        return {
+            "effect": self.name if self.text else None,
+            "effects": self.effects,
+            "text": self.text,
+            "reason": self.reason,
+            "verdict": diagnosis["verdict"],
+            "portrait": diagnosis["portrait"],
+            "next": self.next,
+        }
+
+    def __str__(self) -> str:
+        return self.text or self.reason
+
+    def _short(self) -> str:
+        return super()._short() if self.text else self.reason
+
+    def save(self, file: str | Path) -> Path:
+        """Write the file, whole or not at all; raises `InputError` where nothing is drafted."""
+        if not self.text:
+            raise InputError(f"nothing is drafted: {self.reason}")
+        return super().save(file)
 
 
-def draft(diagnosis: Diagnosis, file: str) -> Draft:
+def draft(diagnosis: Diagnosis, file: str) -> EffectDraft:
     """What a diagnosis leaves unexplained, as an effect file.
 
     Parameters
@@ -59,23 +92,26 @@ def draft(diagnosis: Diagnosis, file: str) -> Draft:
     file
         Where it is to be written: the effect is named after it, and the commands in the file read it there.
     """
+    name, portrait = PurePath(file).stem, diagnosis.portrait
     reason = _nothing_to_describe(diagnosis)
-    if reason or diagnosis.portrait is None:
-        return Draft(reason=reason)
-    name, asked = PurePath(file).stem, diagnosis.asked or Asked(diagnosis.names, diagnosis.machine.name)
+    if reason or portrait is None:
+        return EffectDraft(name, diagnosis, reason=reason)
+    asked = diagnosis.asked or Asked(diagnosis.names, diagnosis.machine.name)
     source = (
         f"{len(diagnosis.data)} readings of {joined(list(diagnosis.names))} "
         f"(SHA-256 {data_hash(diagnosis.names)[:16]}), machine {diagnosis.machine.name}"
     )
     drawn = asked.command("effects draft", "-o", file, *options(seed=diagnosis.seed or None))
-    commands = [
-        command_line("effects", "check", file),
-        asked.command("diagnose", effects=[file]),
-        asked.command("plan", effects=[file]),
-    ]
+    commands = {
+        "read it, change it, then try it": command_line("effects", "check", file),
+        "let it compete with the catalogue": asked.command("diagnose", effects=[file]),
+        "measure where it would show, or fail": asked.command("plan", effects=[file]),
+    }
     marks = sorted(set(reading_marks(diagnosis.data).tolist()))
-    text = draft_text(name, diagnosis.portrait, source, f"Drawn by `{drawn}` from {source}.", commands, marks)
-    return Draft(text, tuple(effect_names(name, [sized.term for sized in diagnosis.portrait.terms])))
+    origin = f"Drawn by `{drawn}` from {source}."
+    text = draft_text(name, portrait, source, origin, list(commands.values()), marks)
+    effects = effect_names(name, [sized.term for sized in portrait.terms])
+    return EffectDraft(name, diagnosis, text, effects, commands=[hint(*pair) for pair in commands.items()])
 
 
 def _nothing_to_describe(diagnosis: Diagnosis) -> str:
@@ -134,7 +170,8 @@ def draft_text(
     lines += ["", f"name = {value_text(name)}", f"source = {value_text(f'described from {source}; not confirmed')}"]
     for size, sized in entries:
         lines += ["", *_comment(f"{size_words(sized)}: {formula(sized.term, size)}"), "[[effect]]"]
-        lines += [f"{key} = {value_text(value)}" for key, value in entry_of(sized.term, size, _meaning(sized)).items()]
+        meaning = " ".join(term_words(sized.term).split())
+        lines += [f"{key} = {value_text(value)}" for key, value in entry_of(sized.term, size, meaning).items()]
     lines += [
         "",
         "# The readings that this was drawn from, a mark each. They cannot confirm it: judged by them it is",
@@ -145,10 +182,6 @@ def draft_text(
         '"""',
     ]
     return "\n".join(lines) + "\n"
-
-
-def _meaning(sized: Sized) -> str:
-    return " ".join(term_words(sized.term).split())
 
 
 def effect_names(name: str, terms: Sequence[Term]) -> list[str]:

@@ -10,23 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.correction.ladder import Step, Update
-from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
-from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import Baseline
-from toolpath_stiff.inference.left_out import HeldOut
-from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import NO_CHANGE, Predictor, at_both_ends, scaled_law
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.units import n_per_um_from_n_per_m
@@ -38,6 +29,9 @@ START_SPREAD = 0.2  # sd of the starts' logarithms: a law wrong by 20 %
 
 
 FIRST_STEPS = 0.05 * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+
+
+FINE, ROUGH = (1e-7, 1e-10), (1e-5, 1e-7)  # law and mean error; a resampled search scatters a thousand times as much
 
 
 SAME = 1e-5  # of the mean error: two ends that close are one minimum
@@ -103,34 +97,33 @@ def minimise_mean_error(predictor: Predictor, seed: int = 0, starts: int = START
     InputError
         A reading without a stiffness, or fewer than three.
     """
-    _check(predictor.data)
+    lacking = int(np.isnan(predictor.data.stiffness).sum())
+    if lacking or len(predictor.data) < 3:
+        raise InputError(
+            f"{len(predictor.data)} readings, {lacking} of them without a stiffness",
+            expected="at least 3 measured stiffnesses for a law of two constants",
+        )
     rng = np.random.default_rng(seed)
-    begin = np.concatenate([np.zeros((1, 2)), rng.normal(0.0, START_SPREAD, (starts - 1, 2))])
     given = predictor.machine.strut_law
+    begin = np.concatenate([np.zeros((1, 2)), rng.normal(0.0, START_SPREAD, (starts - 1, 2))])
     begin = at_both_ends(given, begin)
-    found, errors = zip(*(_search(predictor, start) for start in begin), strict=True)
-    ends = at_both_ends(given, np.array(found))
+    objective = _objective(predictor)
+    laws = []
+    for start in begin:
+        # A second search from the first one's end: a simplex can collapse on a kink.
+        laws.append(_downhill(objective, _downhill(objective, start, *FINE), *FINE))
+    errors = [mean_error(predictor, law) for law in laws]
+    ends = at_both_ends(given, np.array(laws))
     best = int(np.argmin(errors))
-    law = ends[best]
     return StrutLawSearch(
-        law=law,
-        strut_law=scaled_law(given, law),
+        law=ends[best],
+        strut_law=scaled_law(given, ends[best]),
         error=errors[best],
         error_before=mean_error(predictor),
         starts=begin,
         ends=ends,
         end_errors=np.array(errors),
     )
-
-
-def _search(predictor: Predictor, start: FloatArray) -> tuple[FloatArray, float]:
-    """Where one search ends, and the mean error there."""
-    objective = _objective(predictor)
-    at = start
-    # A second search from the first one's end: a simplex can collapse on a kink.
-    for _ in range(2):
-        at = _downhill(objective, at, 1e-7, 1e-10)
-    return at, mean_error(predictor, at)
 
 
 def _downhill(objective: Callable[[FloatArray], float], start: FloatArray, xatol: float, fatol: float) -> FloatArray:
@@ -164,9 +157,6 @@ def _objective(predictor: Predictor, weight: FloatArray | None = None) -> Callab
 RESAMPLES = 200
 
 
-ROUGH = (1e-5, 1e-7)  # law and mean error of a resampled search: its own scatter is a thousand times larger
-
-
 def leave_points_out(predictor: Predictor, law: FloatArray) -> FloatArray:
     """(n,) ln measured - ln modelled, each reading by the law with the smallest mean error over the other points.
 
@@ -177,8 +167,8 @@ def leave_points_out(predictor: Predictor, law: FloatArray) -> FloatArray:
     residual = np.full(len(data), np.nan)
     for label in labels if len(labels) > 2 else ():
         out = data.point == label
-        found = _downhill(_objective(predictor, (~out).astype(float)), law, *ROUGH)
-        residual[out] = np.log(data.stiffness[out]) - predictor.log_stiffness(found)[out]
+        others = _downhill(_objective(predictor, (~out).astype(float)), law, *ROUGH)
+        residual[out] = np.log(data.stiffness[out]) - predictor.log_stiffness(others)[out]
     return residual
 
 
@@ -245,10 +235,10 @@ def bar_curve(
     errors, refitted, laws = [], [], []
     for k in stiffnesses:
         predictor = Predictor(machine.with_changes(platform_bar_stiffness=float(k)), data)
-        found = minimise_mean_error(predictor, seed, starts)
-        errors.append(found.error_before)
-        refitted.append(found.error)
-        laws.append([found.strut_law.stiffness_1, found.strut_law.stiffness_2])
+        search = minimise_mean_error(predictor, seed, starts)
+        errors.append(search.error_before)
+        refitted.append(search.error)
+        laws.append([search.strut_law.stiffness_1, search.strut_law.stiffness_2])
     return BarCurve(stiffnesses, np.array(errors), np.array(refitted), np.array(laws))
 
 
@@ -259,71 +249,3 @@ def bar_curve_csv(curve: BarCurve) -> str:
         figures = (100 * error, 100 * refitted, n_per_um_from_n_per_m(law[0]), n_per_um_from_n_per_m(law[1]))
         rows.append(f"{k:.6g}," + ",".join(f"{value:.4f}" for value in figures))
     return "\n".join(rows) + "\n"
-
-
-def _check(data: Measurements) -> None:
-    lacking = int(np.isnan(data.stiffness).sum())
-    if lacking or len(data) < 3:
-        raise InputError(
-            f"{len(data)} readings, {lacking} of them without a stiffness",
-            expected="at least 3 measured stiffnesses for a law of two constants",
-        )
-
-
-def update_by_mean_error(
-    machine: Machine,
-    data: Measurements,
-    *,
-    force: bool = False,
-    noise: float | tuple[float, float] | None = None,
-    strut_spread: float = STRUT_SPREAD,
-    effect_files: Sequence[str | Path] = (),
-    seed: int = 0,
-    progress: Callable[[str], None] | None = None,
-) -> tuple[Update, StrutLawSearch]:
-    """The strut law with the smallest mean error, its errors at left-out points and its uncertainty.
-
-    Parameters
-    ----------
-    machine, data
-        The model and n readings.
-    force
-        Keep the law even of readings that hardly are of this machine.
-    noise, strut_spread
-        For the noise floor only: the objective does not know of noise.
-    effect_files
-        A user's own effects, which the machine may carry.
-    seed
-        Of the searches' starts and of the bootstrap over points.
-    progress
-        Told what is being done.
-
-    Raises
-    ------
-    InputError
-        As `minimise_mean_error`.
-    """
-    say = progress or (lambda text: None)
-    say("searching from several starts")
-    found = minimise_mean_error(Predictor(machine, data, effect_files), seed)
-    worst = max(noise_models(data, noise, strut_spread), key=lambda one: one.typical)
-    problem = Problem.of(Predictor(machine, data, effect_files), worst)
-    predictor = problem.predictor
-    baseline = Baseline.of(problem)
-    given = baseline.as_given
-    say("leaving points out, drawing points anew")
-    last = Fit(
-        (), (), (), found.law, problem.observed - predictor.log_stiffness(found.law),
-        predictor.law_columns(predictor.log_stiffness(found.law), found.law),
-        resampled_covariance(predictor, found.law, seed), problem.scatter,
-    )  # fmt: skip
-    left_out = HeldOut(leave_points_out(predictor, found.law), np.zeros((0, 2)), data.point)
-    steps = (
-        Step.of(AS_GIVEN, given, data),
-        Step("strut law by mean error", last, left_out, data.tip),
-    )
-    refitted = Step.of(LAW_REFITTED, baseline.refitted, data)
-    return Update(
-        machine, data, worst, problem, steps, refitted, (), (), force, False, law_asked=True, objective="mean-error",
-        question=question(predictor),
-    ), found  # fmt: skip

@@ -3,57 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from toolpath_stiff.correction.additions import parse_addition
-from toolpath_stiff.correction.ladder import Update, build_ladder
+from toolpath_stiff.correction.ladder import build_ladder
 from toolpath_stiff.correction.machines import data_hash
-from toolpath_stiff.correction.strut_law import bar_curve, update_by_mean_error
+from toolpath_stiff.correction.result import Update
+from toolpath_stiff.correction.steps import Step
+from toolpath_stiff.correction.strut_law import (
+    BarCurve,
+    bar_curve,
+    leave_points_out,
+    minimise_mean_error,
+    resampled_covariance,
+)
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import baseline
+from toolpath_stiff.inference.left_out import HeldOut
+from toolpath_stiff.inference.noise import noise_models
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
-if TYPE_CHECKING:
-    from toolpath_stiff.correction.strut_law import BarCurve, StrutLawSearch
-
-
 LIKELIHOOD, MEAN_ERROR = OBJECTIVES = ("likelihood", "mean-error")
-
-
-@dataclass(frozen=True)
-class Correction:
-    """What an update found, and the machine that came of it.
-
-    Attributes
-    ----------
-    update
-        Steps, and whether the data support them.
-    machine
-        The machine with what was added; None where nothing is to be written.
-    provenance
-        Where the fitted values come from, as the machine file has it.
-    files, machine_file, seed
-        Names of the measurement files; of the machine file that is written, None if there is none.
-    next
-        Commands that use the new machine.
-    search, bars
-        Of the paper's own estimation: how its searches ended; its Figure 3. None otherwise.
-    """
-
-    update: Update
-    machine: Machine | None
-    provenance: dict[str, Any]
-    files: tuple[str, ...]
-    machine_file: str | None
-    seed: int
-    next: tuple[str, ...] = ()
-    search: StrutLawSearch | None = None
-    bars: BarCurve | None = None
 
 
 def update(
@@ -74,7 +56,7 @@ def update(
     machine_file: str = "machine.toml",
     asked: Asked | None = None,
     progress: Callable[[str], None] | None = None,
-) -> Correction:
+) -> Update:
     """Fit effects to measurements, judge whether the data support them, and make the machine that carries them.
 
     Parameters
@@ -112,51 +94,97 @@ def update(
     >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.readings.measurements import read_measurements
     >>> nist = load_machine("nist")
-    >>> found = update(nist, read_measurements("nist-table1", nist), strut_law=True)
-    >>> [f"{step.name}: {100 * step.error:.2f} %" for step in found.update.steps]
+    >>> result = update(nist, read_measurements("nist-table1", nist), strut_law=True)
+    >>> [f"{step.name}: {100 * step.error:.2f} %" for step in result.steps]
     ['as given: 9.62 %', 'strut law refitted: 9.72 %']
     """
     files = tuple(files) or tuple(dict.fromkeys(data.file.tolist()))
     asked = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
-    flags = {"strut_law": strut_law, "keep_strut_law": keep_strut_law, "auto": auto, "force": force}
-    search = None
+    common: dict[str, Any] = {
+        "force": force, "noise": noise, "strut_spread": strut_spread, "effect_files": effect_files, "seed": seed,
+        "progress": progress,
+    }  # fmt: skip
     if objective == MEAN_ERROR:
-        check_mean_error(add, strut_law, auto)
-        found, search = update_by_mean_error(
-            machine, data.of_tip, force=force, noise=noise, strut_spread=strut_spread, effect_files=effect_files,
-            seed=seed, progress=progress,
-        )  # fmt: skip
+        if add or auto or not strut_law:
+            raise InputError(
+                "--objective mean-error is the paper's own estimation, of the strut law alone",
+                expected="--strut-law, without --add and --auto",
+                hint="effects are fitted by likelihood",
+            )
+        result = update_by_mean_error(machine, data.of_tip, **common)
+        result = replace(result, bars=_bars(machine, data, seed, progress))
     else:
-        found = build_ladder(
-            machine, data, [parse_addition(text, data, effect_files) for text in add], strut_law=strut_law,
-            keep_law=keep_strut_law, auto=auto, force=force, noise=noise, strut_spread=strut_spread,
-            effect_files=effect_files, seed=seed, progress=progress,
-        )  # fmt: skip
-    # Where its results go does not matter to the command that repeats the fit.
-    own = options(add=list(add), **flags, objective=objective if search is not None else None, seed=seed or None)
-    provenance = _provenance(found, files, asked.command("update", *own))
-    updated = found.fitted(provenance) if found.accepted else None
-    return Correction(
-        found,
-        updated,
-        provenance,
-        files,
-        machine_file if updated is not None else None,
-        seed,
-        () if updated is None else _next(updated, machine_file, asked, effect_files),
-        search,
-        None if search is None else _bars(machine, data, seed, progress),
-    )
-
-
-def check_mean_error(add: Sequence[str], strut_law: bool, auto: bool) -> None:
-    """Raise `InputError` where the paper's own estimation is asked for more than it can do."""
-    if add or auto or not strut_law:
-        raise InputError(
-            "--objective mean-error is the paper's own estimation, of the strut law alone",
-            expected="--strut-law, without --add and --auto",
-            hint="effects are fitted by likelihood",
+        additions = [parse_addition(text, data, effect_files) for text in add]
+        result = build_ladder(
+            machine, data, additions, strut_law=strut_law, keep_law=keep_strut_law, auto=auto, **common
         )
+    # Where its results go does not matter to the command that repeats the fit.
+    own = options(
+        add=list(add), strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force,
+        objective=objective if objective == MEAN_ERROR else None, seed=seed or None,
+    )  # fmt: skip
+    result = replace(
+        result, names=files, seed=seed, machine_file=machine_file,
+        provenance=_provenance(result, files, asked.command("update", *own)),
+    )  # fmt: skip
+    if result.corrected is None:
+        return result
+    return replace(result, next=_next(result.corrected, machine_file, asked, effect_files))
+
+
+def update_by_mean_error(
+    machine: Machine,
+    data: Measurements,
+    *,
+    force: bool = False,
+    noise: float | tuple[float, float] | None = None,
+    strut_spread: float = STRUT_SPREAD,
+    effect_files: Sequence[str | Path] = (),
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Update:
+    """The strut law with the smallest mean error, its errors at left-out points and its uncertainty.
+
+    Parameters
+    ----------
+    machine, data
+        The model and n readings.
+    force
+        Keep the law even of readings that hardly are of this machine.
+    noise, strut_spread
+        For the noise floor only: the objective does not know of noise.
+    effect_files
+        A user's own effects, which the machine may carry.
+    seed
+        Of the searches' starts and of the bootstrap over points.
+    progress
+        Told what is being done.
+
+    Raises
+    ------
+    InputError
+        As `minimise_mean_error`.
+    """
+    say = progress or (lambda text: None)
+    say("searching from several starts")
+    predictor = Predictor(machine, data, effect_files)
+    search = minimise_mean_error(predictor, seed)
+    worst = max(noise_models(data, noise, strut_spread), key=lambda model: model.typical)
+    problem = Problem.of(predictor, worst)
+    (as_given, law_refitted), law = baseline(problem), search.law
+    say("leaving points out, drawing points anew")
+    modelled = predictor.log_stiffness(law)
+    last = Fit(
+        (), (), (), law, problem.observed - modelled, predictor.law_columns(modelled, law),
+        resampled_covariance(predictor, law, seed), problem.scatter,
+    )  # fmt: skip
+    left_out = HeldOut(leave_points_out(predictor, law), np.zeros((0, 2)), data.point)
+    steps = Step.of(AS_GIVEN, as_given, data), Step.of("strut law by mean error", last, data, left_out)
+    refitted = Step.of(LAW_REFITTED, law_refitted, data)
+    return Update(
+        machine, data, worst, problem, steps, refitted, forced=force, law_asked=True, objective="mean-error",
+        question=question(predictor), search=search, seed=seed,
+    )  # fmt: skip
 
 
 def _provenance(update: Update, files: Sequence[str], command: str) -> dict[str, Any]:
@@ -175,16 +203,16 @@ def _provenance(update: Update, files: Sequence[str], command: str) -> dict[str,
     }
 
 
-def _next(updated: Machine, machine_file: str, asked: Asked, effect_files: Sequence[str | Path]) -> tuple[str, ...]:
+def _next(updated: Machine, machine_file: str, asked: Asked, effect_files: Sequence[str | Path]) -> list[str]:
     """Commands that use the new machine; an effect that belongs to a set-up acts only where that is named."""
     model = build_model(updated, effect_files)
     setups = [name for active in model.effects if (name := setup_of(active))]
     shown = options(machine=machine_file, effects=list(effect_files), setup=setups[0] if setups else None)
     also = " (analyze, place and pose take the same options)"
-    return (
+    return [
         hint("what is left", asked.command("compare", machine=machine_file)),
         hint(f"the stiffness over the workspace{also}", command_line("map", *shown)),
-    )
+    ]
 
 
 def _bars(machine: Machine, data: Measurements, seed: int, progress: Callable[[str], None] | None) -> BarCurve | None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.comparison.loop_readings import BesideTip
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.confounding import Confounding
 from toolpath_stiff.inference.detectable import Detectable
@@ -22,10 +23,6 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.readings.measurements import Measurements
-
-if TYPE_CHECKING:
-    from toolpath_stiff.comparison.loop_readings import LoopsDocument
-
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
 
@@ -101,7 +98,7 @@ class Examination:
     unexcluded: tuple[Unexcluded, ...] = ()
     suspects: tuple[SuspectEntry, ...] = ()
     slips: tuple[SlipSize, ...] = ()
-    loops: LoopsDocument = field(default_factory=lambda: cast("LoopsDocument", {"by_loop": [], "readings": []}))
+    loops: BesideTip = field(default_factory=BesideTip)
     inputs: tuple[str, ...] = ()
 
     @property

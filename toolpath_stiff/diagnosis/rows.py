@@ -17,7 +17,7 @@ from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.hypotheses import Family, averaged_interval
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
-from toolpath_stiff.stiffness.contract import joined
+from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import DIGITS, json_number
 
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"

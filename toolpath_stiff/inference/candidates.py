@@ -10,7 +10,7 @@ Sizes count from the neutral value: `value - neutral`, or `1 / value` where neut
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -22,9 +22,9 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.splines import Spline
 from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.contract import Effect, Parameter
-from toolpath_stiff.stiffness.model import ActiveEffect
 
 SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated
 
@@ -38,7 +38,16 @@ CROWDED = 2.5  # power by which they crowd towards large ones: delta / size is c
 MOST_COMPONENTS = 4  # effects with more real parameters are tried in full and one by one only
 
 
+MOST_TRIALS = 12  # of a size that makes a small change
+
+
 INVISIBLE = 1e-7  # rms change of ln stiffness below which a choice does nothing to these data
+
+
+Knots = tuple[FloatArray, FloatArray]  # ln size (g,), delta / size (g, n)
+
+
+Delta = Callable[[float], FloatArray | None]  # size -> (n,) m/N added; None where the model has no answer
 
 
 @dataclass(frozen=True)
@@ -96,17 +105,9 @@ class Component:
 
     def typical(self) -> tuple[float, float]:
         """Usual sizes as positive numbers, smallest and largest; 0 and inf where nothing is said."""
-        ends = []
-        for end in self.parameter.typical:
-            value = end * self.parameter.si
-            if self.inverse:
-                ends.append(1.0 / value if value > 0.0 else np.inf)
-            else:
-                ends.append(abs(value - self.parameter.neutral * self.parameter.si))
         low, high = self.parameter.typical
-        if low < self.parameter.neutral < high:
-            return 0.0, max(ends)
-        return min(ends), max(ends)
+        ends = [abs(self.size(end * self.parameter.si)) if end or not self.inverse else np.inf for end in (low, high)]
+        return 0.0 if low < self.parameter.neutral < high else min(ends), max(ends)
 
 
 @dataclass(frozen=True)
@@ -169,26 +170,23 @@ def choice_text(key: str, value: Any) -> str:
 
 def candidates_of(effect: Effect, data: Measurements) -> list[Candidate]:
     """The candidates of an effect: one a choice. Of several discrete parameters one at a time leaves its default."""
-    real = tuple(Component.of(p) for p in effect.parameters if not p.discrete)
-    discrete = [p for p in effect.parameters if p.discrete]
+    real = tuple(Component.of(parameter) for parameter in effect.parameters if not parameter.discrete)
+    discrete = [parameter for parameter in effect.parameters if parameter.discrete]
     if not discrete:
         return [Candidate(effect, (), real)] if real else []
-    defaults: dict[str, Any] = {p.name: "" if p.kind == "text" else 0 for p in discrete}
-    found = []
+    alone, names = len(discrete) == 1, sorted(set(data.setup.tolist()) - {""})
+    defaults: dict[str, Any] = {parameter.name: "" if parameter.kind == "text" else 0 for parameter in discrete}
+    candidates = []
     for parameter in discrete:
-        for value in _choices(parameter, data, alone=len(discrete) == 1):
-            choice = tuple((defaults | {parameter.name: value}).items())
-            found.append(Candidate(effect, choice, real))
-    return found
-
-
-def _choices(parameter: Parameter, data: Measurements, alone: bool) -> list[Any]:
-    if parameter.kind == "text":
-        names = sorted(set(data.setup.tolist()) - {""})
-        # One of several means to act: a single set-up is all readings, which other choices cover.
-        return names if alone or len(names) > 1 else []
-    low, high = (int(bound) for bound in parameter.bounds)
-    return [value for value in range(low, high + 1) if alone or value != 0]
+        choices: list[Any] = names
+        if parameter.kind != "text":
+            low, high = (int(bound) for bound in parameter.bounds)
+            choices = [value for value in range(low, high + 1) if alone or value != 0]
+        elif not alone and len(names) == 1:  # a single set-up is all readings, which other choices cover
+            continue
+        for value in choices:
+            candidates.append(Candidate(effect, tuple((defaults | {parameter.name: value}).items()), real))
+    return candidates
 
 
 class Table:
@@ -196,21 +194,23 @@ class Table:
 
     One component: tabulated over its size and interpolated (delta / size over ln size, which is almost constant).
     Several: linear in each, from one size of each.
+
+    Attributes
+    ----------
+    candidate
+        The candidate.
+    columns
+        (n, p) m/N per unit of size, small sizes.
+    knots
+        Sign -> (ln size (g,), delta / size (g, n)); worked out when it is first asked for: columns often suffice.
     """
 
-    def __init__(
-        self,
-        candidate: Candidate,
-        columns: FloatArray,
-        knots: Callable[[], dict[float, tuple[FloatArray, FloatArray]]],
-    ) -> None:
-        self.candidate = candidate
-        self.columns = columns  # (n, p) m/N per unit of size, small sizes
-        self._knots = knots
+    def __init__(self, candidate: Candidate, columns: FloatArray, knots: Callable[[], dict[float, Knots]]) -> None:
+        self.candidate, self.columns, self._knots = candidate, columns, knots
 
     @cached_property
-    def knots(self) -> dict[float, tuple[FloatArray, FloatArray]]:
-        """Sign -> (ln size (g,), delta / size (g, n)); worked out when it is first asked for: columns often suffice."""
+    def knots(self) -> dict[float, Knots]:
+        """The tabulated sizes of each sign."""
         return self._knots()
 
     @cached_property
@@ -252,8 +252,8 @@ def table_of(candidate: Candidate, predictor: Predictor) -> Table | None:
     key = (candidate.name, candidate.choice)
     if key not in predictor.tables:
         predictor.tables[key] = tabulate(candidate, predictor, np.zeros(2))
-    found: Table | None = predictor.tables[key]
-    return found
+    table: Table | None = predictor.tables[key]
+    return table
 
 
 def tabulate(
@@ -263,32 +263,32 @@ def tabulate(
     base = predictor.log_stiffness(law, beside)
     compliance = np.exp(-base)
 
-    def delta(sizes: Iterable[float]) -> FloatArray | None:
-        logs = predictor.log_stiffness(law, [*beside, candidate.active(list(sizes))])
-        return None if np.isnan(logs).any() else np.asarray(np.exp(-logs) - compliance)
+    def along(unit: FloatArray) -> Delta:
+        def delta(size: float) -> FloatArray | None:
+            logs = predictor.log_stiffness(law, [*beside, candidate.active(size * unit)])
+            return None if np.isnan(logs).any() else np.asarray(np.exp(-logs) - compliance)
 
-    count = len(candidate.components)
-    columns, starts = np.zeros((len(base), count)), {}
-    for j, component in enumerate(candidate.components):
+        return delta
+
+    components = candidate.components
+    columns, starts = np.zeros((len(base), len(components))), {}
+    for j, component in enumerate(components):
         for sign in component.signs:
-            unit = np.zeros(count)
-            unit[j] = sign
-            start = _size_for(component, sign, SMALLEST, delta, compliance, unit)
-            if start is None:
+            delta = along(sign * np.eye(len(components))[j])
+            start = _size_for(component, sign, delta, compliance)
+            added = None if start is None else delta(start)
+            if start is None or added is None:
                 continue
-            found = delta(start * unit)
-            if found is None:
-                continue
-            columns[:, j] = found / (start * sign)
-            if count == 1:
-                starts[sign] = start
+            columns[:, j] = added / (start * sign)
+            starts[sign] = start
     if not columns.any():
         return None
-    return Table(
-        candidate,
-        columns,
-        lambda: {s: _knots(candidate.components[0], s, start, delta, compliance) for s, start in starts.items()},
-    )
+
+    def knots() -> dict[float, Knots]:
+        signs = starts.items() if len(components) == 1 else ()
+        return {sign: _knots(components[0], sign, start, along(np.ones(1)), compliance) for sign, start in signs}
+
+    return Table(candidate, columns, knots)
 
 
 def _rms(delta: FloatArray, compliance: FloatArray) -> float:
@@ -296,36 +296,32 @@ def _rms(delta: FloatArray, compliance: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.log1p(np.maximum(delta / compliance, -0.999)) ** 2)))
 
 
-def _size_for(
-    component: Component, sign: float, wanted: float, delta: Any, compliance: FloatArray, unit: FloatArray
-) -> float | None:
-    """A size at which ln stiffness changes by about `wanted`, or the largest possible; None if nothing changes."""
+def _size_for(component: Component, sign: float, delta: Delta, compliance: FloatArray) -> float | None:
+    """A size at which ln stiffness changes by about `SMALLEST`, or the largest; None if nothing changes."""
     reach = component.reach(sign)
     size = min(max(component.typical()), reach)
     if not np.isfinite(size) or size <= 0.0:
         size = reach if np.isfinite(reach) else 1.0
-    for _ in range(12):
-        found = delta(size * unit)
-        if found is None:
+    for _ in range(MOST_TRIALS):
+        added = delta(size)
+        if added is None:
             size *= 0.1
             continue
-        rms = _rms(found, compliance)
+        rms = _rms(added, compliance)
         if rms < INVISIBLE:
             return None
-        if 0.3 * wanted < rms < 3.0 * wanted or (rms < wanted and size == reach):
+        if 0.3 * SMALLEST < rms < 3.0 * SMALLEST or (rms < SMALLEST and size == reach):
             return size
-        size = min(size * wanted / rms, reach)
+        size = min(size * SMALLEST / rms, reach)
     return size
 
 
-def _knots(
-    component: Component, sign: float, start: float, delta: Any, compliance: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _knots(component: Component, sign: float, start: float, delta: Delta, compliance: FloatArray) -> Knots:
     """Ln sizes and delta / size from a small size to a large effect or the bound."""
     end = min(start * LARGEST / SMALLEST, component.reach(sign))
     while end > 1.001 * start:
-        found = delta([sign * end])
-        if found is not None and _rms(found, compliance) < 2.0:
+        added = delta(sign * end)
+        if added is not None and _rms(added, compliance) < 2.0:
             break
         end = max(0.7 * end, start)
     share = 1.0 - (1.0 - np.linspace(0.0, 1.0, POINTS)) ** CROWDED
@@ -333,11 +329,11 @@ def _knots(
     sizes[-1] = min(sizes[-1], component.reach(sign))
     logs, ratios = [], []
     for size in sizes:
-        found = delta([sign * size])
-        if found is None:
+        added = delta(sign * size)
+        if added is None:
             break
         logs.append(np.log(size))
-        ratios.append(found / (sign * size))
+        ratios.append(added / (sign * size))
     if len(logs) < 2:
         logs, ratios = [np.log(start), np.log(1.01 * start)], [ratios[0], ratios[0]]
     return np.array(logs), np.array(ratios)

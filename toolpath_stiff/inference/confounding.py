@@ -9,11 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.covariances import inverse_root
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.units import json_number
 
 CONFOUNDED = 0.95  # canonical correlation above which two effects cannot be told apart by these data
+
+
+SEPARATE = 1e-10  # share of an effect's information below which a combination of its components is not seen
 
 
 @dataclass(frozen=True)
@@ -43,20 +47,22 @@ class Confounding:
 def confounding(problem: Problem, families: Sequence[Family]) -> Confounding:
     """The confounding of effects on these data; for an effect with choices, that of its worst choice."""
     names = sorted(family.name for family in families)
-    bases: dict[str, list[FloatArray]] = {}
+    precision = problem.sight.projected
+    bases: dict[str, list[tuple[FloatArray, FloatArray]]] = {name: [] for name in names}  # rows, and times precision
     for family in families:
-        bases[family.name] = []
         for table in family.tables:
-            columns = problem.sight.projected.white((table.columns / problem.base_compliance[:, None]).T).T
-            lengths = np.linalg.norm(columns, axis=0)
-            if lengths.max() > 0.0:
-                kept = columns[:, lengths > 1e-9 * lengths.max()] / lengths[lengths > 1e-9 * lengths.max()]
-                bases[family.name].append(np.linalg.qr(kept)[0])
+            rows = (table.columns / problem.base_compliance[:, None]).T
+            weighted = precision.times(rows)
+            lengths = np.sqrt(np.maximum((rows * weighted).sum(axis=1), 0.0))
+            kept = lengths > 1e-9 * lengths.max()
+            if kept.any():
+                root = inverse_root(weighted[kept] @ rows[kept].T, SEPARATE)
+                bases[family.name].append((root.T @ rows[kept], root.T @ weighted[kept]))
     matrix = np.eye(len(names))
     for i, first in enumerate(names):
         for j, second in enumerate(names[:i]):
             matrix[i, j] = matrix[j, i] = max(
-                (float(np.linalg.norm(a.T @ b, 2)) for a in bases[first] for b in bases[second]), default=0.0
+                (float(np.linalg.norm(a @ b.T, 2)) for a, _ in bases[first] for _, b in bases[second]), default=0.0
             )
     matrix = np.clip(matrix, 0.0, 1.0)
     sets = _linked(matrix > CONFOUNDED)

@@ -27,9 +27,6 @@ from toolpath_stiff.arrays import FloatArray
 Rows = NDArray[np.int64]
 
 
-MOST_RANKS = 64  # by which an inverse is changed before it is worked out anew
-
-
 @dataclass(frozen=True)
 class Groups:
     """Readings in groups: `of` (n,), the number of each reading's group, from 0 on without a gap."""
@@ -247,81 +244,24 @@ class Precision:
         factors = np.concatenate([self.factors, self.times(combined)])
         return replace(self, factors=factors, fitted=np.concatenate([self.fitted, combined]))
 
-    def white(self, rows: FloatArray) -> FloatArray:
-        """(..., n) rows x R^T, where R^T R is this matrix: plain products of what comes out are weighted ones.
+    def widened(self, row: int, variance: float) -> tuple[Precision, FloatArray, float]:
+        """With more scatter of a reading's own: takes column x column^T share off; (n,) that column, and the share.
 
-        The blocks have the root (1 - u 1 1^T / d) / sqrt(d) with (1 - u sum(1 / d))^2 = 1 / (1 + c sum(1 / d)); what
-        the factors take is taken along their principal axes in that basis.
+        Share v / (1 + v c_row) of column c for the variance v (Sherman and Morrison 1950).
         """
-        taken, share = self._axes
-        found = self._whitened_by_blocks(rows)
-        return np.asarray(found - ((found @ taken.T) * share) @ taken)
-
-    @cached_property
-    def _axes(self) -> tuple[FloatArray, FloatArray]:
-        """Principal axes (q, n) of the factors where the blocks are white, and the share to be taken off each."""
-        # F = G R with the blocks' root R, so that the rows of G are those of F brought back by the blocks.
-        back = self._whitened_by_blocks(self._times_blocks(self.factors))
-        _, length, axes = np.linalg.svd(back, full_matrices=False)
-        return axes, 1.0 - np.sqrt(np.maximum(1.0 - length**2, 0.0))
-
-    def _whitened_by_blocks(self, rows: FloatArray) -> FloatArray:
-        lost = (1.0 - 1.0 / np.sqrt(1.0 + self.common * self.weights)) / self.weights
-        moved = lost * self.groups.sums(rows / self.own)
-        return np.asarray((rows - moved[..., self.groups.of]) / np.sqrt(self.own))
-
-    def _times_blocks(self, rows: FloatArray) -> FloatArray:
-        """C x of rows (..., n)."""
-        return np.asarray(rows * self.own + self.common * self.groups.sums(rows)[..., self.groups.of])
-
-
-class Widening:
-    """The inverse covariance of n readings while some get more scatter of their own, one after the other.
-
-    More scatter v of a reading takes one rank off the inverse, its column c there times c^T v / (1 + v c_row) (Sherman
-    and Morrison 1950): another row of `Precision.factors`. After `MOST_RANKS` of them the inverse is worked out anew
-    from the covariance, so that a column costs n times their number at most, however many readings were widened before.
-    """
-
-    def __init__(self, covariance: Covariance) -> None:
-        self._groups, self._members = covariance.groups, covariance.groups.members()
-        self._begin(covariance)
-
-    def _begin(self, covariance: Covariance) -> None:
-        self._covariance, self._precision = covariance, covariance.precision
-        factors = self._precision.factors
-        self._factors = np.concatenate([factors, np.empty((MOST_RANKS, len(covariance)))])
-        self._ranks, self._first = len(factors), len(factors)
-        self._more = np.zeros(len(covariance))
-
-    def column(self, row: int) -> FloatArray:
-        """(n,) a column of the inverse as it stands."""
-        factors, own, group = self._factors[: self._ranks], self._precision.own, self._groups.of[row]
-        members = self._members[group]
-        found = -(factors[:, row] @ factors)
-        found[members] -= self._precision.pull[group] / own[row] / own[members]
-        found[row] += 1.0 / own[row]
-        return np.asarray(found)
-
-    def widen(self, row: int, variance: float) -> tuple[FloatArray, float]:
-        """Add to a reading's own variance: takes column x column^T share off the inverse; (n,) that column, the share.
-
-        Both are of the inverse as it was before.
-        """
-        column = self.column(row)
+        unit = np.zeros(len(self))
+        unit[row] = 1.0
+        column = self.times(unit)
         share = variance / (1.0 + variance * float(column[row]))
-        if self._ranks == self._first + MOST_RANKS:
-            rows = np.flatnonzero(self._more)
-            self._begin(self._covariance.widened(rows, self._more[rows]))
-        self._factors[self._ranks] = column * np.sqrt(share)
-        self._ranks += 1
-        self._more[row] += variance
-        return column, share
+        return replace(self, factors=np.concatenate([self.factors, np.sqrt(share) * column[None]])), column, share
 
 
-def inverse_root(information: FloatArray) -> FloatArray:
-    """(p, r) R with R R^T the (pseudo-)inverse of an information matrix (p, p) of rows in very different units."""
+def inverse_root(information: FloatArray, least: float = 1e-15) -> FloatArray:
+    """(p, r) R with R R^T the (pseudo-)inverse of an information matrix (p, p) of rows in very different units.
+
+    `least`: share of the largest eigenvalue below which one counts as 0.
+    """
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    kept = values > 1e-15 * values[-1]
+    kept = values > least * values[-1]
     return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])

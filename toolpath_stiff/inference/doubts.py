@@ -8,7 +8,7 @@ import numpy as np
 
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.gates import Forms, Gate, Simulator, absolute_gate
+from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.noise import Noise
 
 TOO_QUIET = 0.005  # share of simulated campaigns that scatter as little or less
@@ -65,5 +65,5 @@ def _gate_at(problem: Problem, noise: Noise, factor: float, seed: int) -> Gate:
     scaled = Problem.of(problem.predictor, larger)
     base = scaled.score_base()
     forms = Forms(discrepancy_forms(problem.predictor), scaled.scatter.precision)
-    simulator = Simulator.of(larger, scaled.scatter.covariance, seed)
-    return absolute_gate(scaled, base.residual, base.jacobian, simulator, forms)
+    draws = simulate(larger, scaled.scatter.covariance, seed)
+    return absolute_gate(scaled, base.residual, base.jacobian, draws, forms)

@@ -17,34 +17,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypedDict
 
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Scatter
 from toolpath_stiff.readings.measurements import Measurements, reading_marks
-from toolpath_stiff.stiffness.contract import Effect, joined
+from toolpath_stiff.stiffness.contract import Effect
+from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import json_number
 
 CONFIRMS = 3.0  # log probability that new readings must gain: odds of 20 to 1, strong evidence (Kass and Raftery 1995)
 
 
 FEWEST_POINTS = 2  # of new readings: one pose alone cannot confirm a form
-
-
-class DrawnEntry(TypedDict):
-    """Effects whose form was read off some of the readings, and what the others say of them."""
-
-    effects: list[str]
-    readings_seen: int
-    readings_new: int
-    gain: float | None
-    rival: str
-    confirmed: bool
 
 
 @dataclass(frozen=True)
@@ -74,7 +64,7 @@ class Drawn:
         return self.gain > CONFIRMS
 
     @property
-    def document(self) -> DrawnEntry:
+    def document(self) -> Document:
         """The same for `diagnose.json`."""
         return {
             "effects": list(self.names),
@@ -88,16 +78,17 @@ class Drawn:
     @property
     def reason(self) -> str:
         """Why it is confirmed or not, a sentence without its full stop."""
-        said = f"the form of {joined(self.names)} was read off "
+        form, readings = f"the form of {joined(self.names)} was read off", self.seen + self.new
         if not self.new:
-            return f"{said}these very readings, and that it fits them says nothing of others"
-        said += f"{self.seen} of these {self.seen + self.new} readings"
+            return f"{form} these very readings, and that it fits them says nothing of others"
+        form += f" {self.seen} of these {readings} readings"
         if np.isnan(self.gain):
-            return f"{said}, and the {self.new} others are of fewer than {FEWEST_POINTS} points: too few to confirm it"
-        against = f"{self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms it)"
-        if self.confirmed:
-            return f"{said}; the {self.new} others confirm it: their log probability, foretold, is {against}"
-        return f"{said}; the {self.new} others do not confirm it: their log probability, foretold, is {against}"
+            return f"{form}, and the {self.new} others are of fewer than {FEWEST_POINTS} points: too few to confirm it"
+        confirm = "confirm" if self.confirmed else "do not confirm"
+        return (
+            f"{form}; the {self.new} others {confirm} it: their log probability, foretold, is {self.gain:.1f} above "
+            f"{self.rival} (more than {CONFIRMS:g} confirms it)"
+        )
 
 
 def seen_readings(effects: Sequence[Effect], data: Measurements) -> BoolArray:

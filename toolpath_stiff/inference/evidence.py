@@ -16,12 +16,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import Candidate, Table
+from toolpath_stiff.inference.candidates import Candidate, Component, Table
 from toolpath_stiff.inference.covariances import Precision
 from toolpath_stiff.inference.noise import Noise, NormalEquations, Scatter, covariance, gauss_newton, scaled_inverse
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.size_priors import Sight, SizePrior, log_comparable
-from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.stiffness.active import ActiveEffect
 
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
 
@@ -34,6 +34,9 @@ def law_prior(unknowns: int) -> FloatArray:
 
 
 MOST_ROUNDS = 3  # searches for wild readings
+
+
+BASE_ROUNDS = 3  # the same of the model without any further effect
 
 
 TABLE_STEPS, TABLE_TOLERANCE = 12, 1e-4  # of a fit on tables; standard deviations
@@ -103,14 +106,20 @@ class Fit:
         return tuple(c.active(s) for c, s in zip(self.candidates, self.sizes, strict=True))
 
     @property
+    def parts(self) -> list[tuple[Component, float]]:
+        """Every real parameter with its size, in the order in which sizes are counted."""
+        components = [component for candidate in self.candidates for component in candidate.components]
+        return list(zip(components, [float(size) for sizes in self.sizes for size in sizes], strict=True))
+
+    @property
     def findings(self) -> tuple[str, ...]:
         """Each effect with its size as a clause in an engineer's words."""
-        found = []
+        clauses = []
         for candidate, sizes in zip(self.candidates, self.sizes, strict=True):
-            parts = zip(candidate.components, sizes, strict=True)
-            values = {c.parameter.name: c.value(float(size)) / c.parameter.si for c, size in parts}
-            found.append(candidate.effect.finding({**dict(candidate.choice), **values}))
-        return tuple(found)
+            parts = zip(candidate.components, sizes.tolist(), strict=True)
+            values = {c.parameter.name: c.value(size) / c.parameter.si for c, size in parts}
+            clauses.append(candidate.effect.finding({**dict(candidate.choice), **values}))
+        return tuple(clauses)
 
     @property
     def errors(self) -> FloatArray:
@@ -131,28 +140,22 @@ class Fit:
     def log_posterior(self) -> float:
         """Log likelihood with the law's prior: what the fit has made largest; -inf where the model has no answer."""
         penalty = 0.5 * float(self.law @ self.law) / LAW_PRIOR**2 if self.law_free else 0.0
-        found = self.log_likelihood - penalty
-        return found if np.isfinite(found) else -np.inf
+        posterior = self.log_likelihood - penalty
+        return posterior if np.isfinite(posterior) else -np.inf
 
     def deviation(self, index: int) -> float:
         """Standard deviation of a size (counted over all candidates); 0 if it is not free."""
         if index not in self.free:
             return 0.0
-        at = 2 + self.free.index(index)
-        return float(np.sqrt(max(self.covariance[at, at], 0.0)))
+        row = 2 + self.free.index(index)
+        return float(np.sqrt(max(self.covariance[row, row], 0.0)))
 
     def at_upper_bound(self) -> list[str]:
         """Parameters whose size has run into its bound: such a fit is no explanation."""
-        found = []
-        for candidate, sizes in zip(self.candidates, self.sizes, strict=True):
-            for component, size in zip(candidate.components, sizes, strict=True):
-                reach = component.reach(float(np.sign(size))) if size else np.inf
-                if np.isfinite(reach) and abs(size) >= 0.999 * reach:
-                    found.append(component.parameter.name)
-        return found
+        reaches = ((component, size, component.reach(float(np.sign(size)))) for component, size in self.parts if size)
+        return [c.parameter.name for c, size, reach in reaches if np.isfinite(reach) and abs(size) >= 0.999 * reach]
 
 
-@dataclass
 class Problem:
     """The data, the model as a function of strut law and added compliance, and the scatter.
 
@@ -164,27 +167,25 @@ class Problem:
         Of ln readings, without wild ones.
     observed
         (n,) ln k as measured.
+    base_compliance, rest
+        (n,) m/N of the model as it stands, and of the machine file's own effects.
+    sight
+        What the data can see.
     """
 
-    predictor: Predictor
-    scatter: Scatter
-    observed: FloatArray = field(init=False)
-    sight: Sight = field(init=False)
-    rest: FloatArray = field(init=False)  # (n,) m/N of the machine file's own effects
-    base_compliance: FloatArray = field(init=False)
+    def __init__(self, predictor: Predictor, scatter: Scatter) -> None:
+        self.predictor, self.scatter = predictor, scatter
+        self.observed = np.log(predictor.data.stiffness)
+        self.base_compliance = np.exp(-predictor.log_stiffness())
+        self.rest = self.base_compliance - predictor.strut_part()
+        self._priors: dict[tuple[int, int], tuple[Table, SizePrior]] = {}
+        jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
+        self.sight = Sight(self.base_compliance, self.projected(jacobian))
 
     @classmethod
     def of(cls, predictor: Predictor, noise: Noise) -> Problem:
         """From the model's answers and a noise model."""
         return cls(predictor, Scatter.of(noise, covariance(noise, predictor)))
-
-    def __post_init__(self) -> None:
-        self.observed = np.log(self.predictor.data.stiffness)
-        self.base_compliance = np.exp(-self.predictor.log_stiffness())
-        self.rest = self.base_compliance - self.predictor.strut_part()
-        self._priors: dict[tuple[int, int], tuple[Table, SizePrior]] = {}
-        jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
-        self.sight = Sight(self.base_compliance, self.projected(jacobian))
 
     def projected(self, jacobian: FloatArray) -> Precision:
         """P = A - A J (J^T A J + prior)^-1 J^T A: the inverse covariance of what a refit leaves.
@@ -209,9 +210,8 @@ class Problem:
         return np.maximum(compliance + self.rest, 0.1 * self.base_compliance)
 
     def law_jacobian(self, law: FloatArray, compliance: FloatArray) -> FloatArray:
-        """(..., n, 2) of ln k."""
-        slopes = self.predictor.strut_part_and_slopes(law)[1]
-        return np.asarray(np.swapaxes(-slopes / compliance[..., None, :], -1, -2))
+        """(n, 2) of ln k."""
+        return np.asarray((-self.predictor.strut_part_and_slopes(law)[1] / compliance).T)
 
     def fit_law(
         self, delta: FloatArray, precision: Precision, start: FloatArray, steps: int = 3
@@ -234,7 +234,7 @@ class Problem:
         """The model without any further effect."""
         scatter, law = self.scatter, np.zeros(2)
         none = np.zeros((1, len(self.observed)))
-        for _ in range(3):
+        for _ in range(BASE_ROUNDS):
             laws, residuals, information = self.fit_law(none, scatter.precision, law)
             law, residual = laws[0], residuals[0]
             scatter, wild = self.scatter.with_wild(residual), scatter.wild
@@ -246,82 +246,77 @@ class Problem:
             log_evidence=float(scatter.log_likelihood(residual)) + float(law_terms(law[None], information)[0]),
         )  # fmt: skip
 
-    def score_subset(self, tables: Sequence[Table], free: tuple[int, ...], start: Fit) -> Fit | None:
+    def score_subset(
+        self, tables: Sequence[Table], free: tuple[int, ...], start: Fit, sizes: FloatArray | None = None
+    ) -> Fit | None:
         """Candidates with these components free (counted over all of them); None if one ends at zero or at its bound.
 
-        Gauss-Newton, then Laplace's approximation.
+        Gauss-Newton from the law of `start`, then Laplace's approximation. `sizes`: where to begin, with the scatter of
+        `start`; else at 0.
         """
-        owners = [(t, j) for t in tables for j in range(len(t.candidate.components))]
-        chosen = [owners[i] for i in free]
-        sizes = _starting_sizes(tables, start, chosen)
-        law, scatter = start.law.copy(), start.scatter if start.tables else self.scatter
+        parts = [(table, j) for table in tables for j in range(len(table.candidate.components))]
+        chosen = [parts[i] for i in free]
+        x, unknowns = np.concatenate([start.law, np.zeros(len(parts))]), [0, 1, *(2 + i for i in free)]
+        if sizes is not None:
+            x[unknowns[2:]] = sizes[list(free)]
+        scatter = self.scatter if sizes is None else start.scatter
         for last in range(MOST_ROUNDS, -1, -1):
-            converged = self._gauss_newton(tables, chosen, sizes, law, scatter.precision)
+            converged = self._gauss_newton(tables, x, unknowns, scatter.precision)
             if converged is None:
                 return None
-            law, residual, information, jacobian = converged
+            x, residual, equations = converged
             again = self.scatter.with_wild(residual, scatter)
             if not last or again is scatter:
                 break
             scatter = again
-        covariance = np.asarray(scaled_inverse(information), dtype=float)
+        covariance = np.asarray(scaled_inverse(equations.information), dtype=float)
         deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
-        held = _pull_back(chosen, sizes) if len(tables) > 1 else []
-        if held:  # the others once more beside them
-            settled = self._gauss_newton(tables, [c for c in chosen if c not in held], sizes, law, scatter.precision)
-            law, residual = (law, residual) if settled is None else settled[:2]
-        own = [float(sizes[id(table)][j]) for table, j in chosen]
-        possible = all(t.candidate.components[j].allows(size) for (t, j), size in zip(chosen, own, strict=True))
+        components = [table.candidate.components[j] for table, j in chosen]
+        near = [len(tables) > 1 and _just_beyond(c, x[i]) for c, i in zip(components, unknowns[2:], strict=True)]
+        if any(near):  # put onto their bounds, the others once more beside them
+            for component, i, held in zip(components, unknowns[2:], near, strict=True):
+                x[i] = np.clip(x[i], *component.bounds) if held else x[i]
+            rest = [0, 1, *(i for i, held in zip(unknowns[2:], near, strict=True) if not held)]
+            x, residual, _ = self._gauss_newton(tables, x, rest, scatter.precision) or (x, residual, equations)
+        fitted, law = x[unknowns[2:]], x[:2]
+        possible = all(c.allows(size) for c, size in zip(components, fitted.tolist(), strict=True))
         if not possible and len(free) > 1:
             return None
-        evidence = float(scatter.log_likelihood(residual)) - 0.5 * float(law @ law) / LAW_PRIOR**2
-        evidence += -2.0 * np.log(LAW_PRIOR)
+        peak = float(scatter.log_likelihood(residual)) - 0.5 * float(law @ law) / LAW_PRIOR**2 - 2.0 * np.log(LAW_PRIOR)
         return Fit(
-            tuple(t.candidate for t in tables), tuple(sizes[id(t)] for t in tables), free, law, residual, jacobian,
-            covariance, scatter, tables=tuple(tables),
-            log_evidence=float(self._integrated(evidence, tables, chosen, own, deviations, information)),
-            possible=possible,
+            tuple(table.candidate for table in tables), tuple(split(tables, x[2:])), free, law.copy(), residual,
+            equations.jacobian, covariance, scatter, tables=tuple(tables), possible=possible,
+            log_evidence=self._integrated(peak, tables, chosen, fitted, deviations, equations.information),
         )  # fmt: skip
 
     def _integrated(
         self,
-        evidence: float,
+        peak: float,
         tables: Sequence[Table],
         chosen: Sequence[tuple[Table, int]],
-        own: Sequence[float],
+        sizes: FloatArray,
         deviations: FloatArray,
         information: FloatArray,
     ) -> float:
-        """The log posterior of law and sizes at its peak, `evidence`, integrated over them.
-
-        `own` (p,) are the sizes, `deviations` (p,) their sd, `information` (2 + p, 2 + p).
-        """
+        """The log posterior of law and sizes (p,) at its peak integrated over them; `information` (2 + p, 2 + p)."""
         if len(chosen) == 1:
-            evidence -= 0.5 * np.linalg.slogdet(information[:2, :2])[1]
             # By quadrature, which holds for sizes next to nothing as well, with the profile as a parabola.
-            table, j = chosen[0]
-            return evidence + self.prior(table, j).log_mean_likelihood(own[0], float(deviations[0]))
-        evidence -= 0.5 * np.linalg.slogdet(information)[1]
-        evidence += 0.5 * len(chosen) * np.log(2.0 * np.pi)
+            mean = self.prior(*chosen[0]).log_mean_likelihood(float(sizes[0]), float(deviations[0]))
+            return peak - 0.5 * float(np.linalg.slogdet(information[:2, :2])[1]) + mean
+        evidence = peak - 0.5 * float(np.linalg.slogdet(information)[1]) + 0.5 * len(chosen) * np.log(2.0 * np.pi)
+        around = np.sign(sizes) * np.maximum(np.abs(sizes), deviations)
         for table in tables:
-            mine = [i for i, (owner, _) in enumerate(chosen) if owner is table]
-            evidence += self._log_prior(
-                table, [chosen[i][1] for i in mine], [own[i] for i in mine], deviations[mine].tolist()
-            )
-        return evidence
-
-    def _log_prior(self, table: Table, components: list[int], sizes: list[float], sds: list[float]) -> float:
-        """Log prior density of an effect's components: the strongest by itself, the others comparable to it."""
-        if not components:
-            return 0.0
-        around = np.array([np.sign(size) * max(abs(size), sd) for size, sd in zip(sizes, sds, strict=True)])
-        changes = np.array([self._rms_alone(table, j, size) for j, size in zip(components, around, strict=True)])
-        first = int(np.argmax(changes))
-        total = self.prior(table, components[first]).log_density_around(sizes[first], sds[first])
-        for k, size in enumerate(around):
-            if k != first:
-                total += log_comparable(changes[k] / changes[first]) - np.log(abs(size))
-        return total
+            rows = [i for i, (owner, _) in enumerate(chosen) if owner is table]
+            if not rows:
+                continue
+            # The strongest component by itself, the others comparable to it.
+            changes = [self._rms_alone(*chosen[i], around[i]) for i in rows]
+            first = rows[int(np.argmax(changes))]
+            evidence += self.prior(*chosen[first]).log_density_around(float(sizes[first]), float(deviations[first]))
+            for i, change in zip(rows, changes, strict=True):
+                if i != first:
+                    evidence += log_comparable(change / max(changes)) - np.log(abs(around[i]))
+        return float(evidence)
 
     def _rms_alone(self, table: Table, j: int, size: float) -> float:
         """Rms change of ln stiffness by one component alone."""
@@ -330,69 +325,63 @@ class Problem:
         return float(np.sqrt(np.mean(self.sight.change(table.delta(unit)) ** 2)))
 
     def _gauss_newton(
-        self,
-        tables: Sequence[Table],
-        chosen: Sequence[tuple[Table, int]],
-        sizes: dict[int, FloatArray],
-        law: FloatArray,
-        precision: Precision,
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-        """Law, residual, information and jacobian after fitting the chosen sizes, in place; None where that fails."""
-        prior = law_prior(2 + len(chosen))
+        self, tables: Sequence[Table], start: FloatArray, unknowns: Sequence[int], precision: Precision
+    ) -> tuple[FloatArray, FloatArray, NormalEquations] | None:
+        """Law and all sizes (2 + p,) with the `unknowns` among them fitted, the residual, the last equations.
 
-        def added() -> FloatArray:
-            return sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
+        None where that fails.
+        """
 
-        def equations(law: FloatArray) -> NormalEquations:
-            part, by_law = self.predictor.strut_part_and_slopes(law)
-            compliance = self._held(part + added())
-            jacobian = np.empty((len(self.observed), 2 + len(chosen)))
-            jacobian[:, :2] = (-by_law / compliance).T
-            slopes = {id(t): t.slope(sizes[id(t)]) for t in tables}
-            for i, (table, j) in enumerate(chosen):
-                jacobian[:, 2 + i] = -slopes[id(table)][:, j] / compliance
-            weighted = precision.times(jacobian.T)
-            gradient = weighted @ (self.observed + np.log(compliance))
-            gradient[:2] -= law / LAW_PRIOR**2
-            return NormalEquations(jacobian, weighted @ jacobian + prior, gradient)
+        def added(x: FloatArray) -> FloatArray:
+            deltas = (table.delta(sizes) for table, sizes in zip(tables, split(tables, x[2:]), strict=True))
+            return sum(deltas, np.zeros(len(self.observed)))
 
-        def move(law: FloatArray, here: NormalEquations) -> tuple[FloatArray, FloatArray]:
+        def equations(x: FloatArray) -> NormalEquations:
+            part, by_law = self.predictor.strut_part_and_slopes(x[:2])
+            compliance = self._held(part + added(x))
+            slopes = [table.slope(sizes) for table, sizes in zip(tables, split(tables, x[2:]), strict=True)]
+            columns = np.concatenate([by_law.T, *slopes], axis=1)[:, unknowns]
+            jacobian = -columns / compliance[:, None]
+            return normal_equations(jacobian, self.observed + np.log(compliance), x[:2], precision)
+
+        def move(x: FloatArray, here: NormalEquations) -> tuple[FloatArray, FloatArray]:
             scale = here.scale
             step = np.linalg.solve(here.information / np.outer(scale, scale), here.gradient / scale) / scale
             if not np.isfinite(step).all():
                 raise np.linalg.LinAlgError
             # A step may change no reading by more than half: beyond that the linearisation means nothing.
             step *= min(1.0, 0.5 / max(float(np.abs(here.jacobian @ step).max()), 1e-12))
-            for i, (table, j) in enumerate(chosen):
-                sizes[id(table)][j] += step[2 + i]
-            return law + step[:2], step
+            further = x.copy()
+            further[unknowns] += step
+            return further, step
 
         try:
-            law, last = gauss_newton(law, equations, move, TABLE_STEPS, TABLE_TOLERANCE)
+            x, last = gauss_newton(start, equations, move, TABLE_STEPS, TABLE_TOLERANCE)
         except np.linalg.LinAlgError:
             return None
-        return law, self.observed + np.log(self.compliance(law, added())), last.information, last.jacobian
+        return x, self.observed + np.log(self.compliance(x[:2], added(x))), last
 
 
-def _starting_sizes(tables: Sequence[Table], start: Fit, chosen: Sequence[tuple[Table, int]]) -> dict[int, FloatArray]:
-    """Id of a table -> its sizes where a fit begins: the chosen ones of an earlier fit of the same table, else 0."""
-    sizes = {id(t): np.zeros(len(t.candidate.components)) for t in tables}
-    known = {id(t): old for t, old in zip(start.tables, start.sizes, strict=True)} if start.free else {}
-    for table, j in chosen:
-        if id(table) in known:
-            sizes[id(table)][j] = known[id(table)][j]
-    return sizes
+def split(tables: Sequence[Table], sizes: FloatArray) -> list[FloatArray]:
+    """Sizes (p,) of all tables, each by itself."""
+    ends = np.cumsum([len(table.candidate.components) for table in tables])[:-1]
+    return np.split(sizes.copy(), ends)
 
 
-def _pull_back(chosen: Sequence[tuple[Table, int]], sizes: dict[int, FloatArray]) -> list[tuple[Table, int]]:
-    """Those a little beyond their bounds, put onto them: tables of two effects describe neither exactly."""
-    held = []
-    for table, j in chosen:
-        component, own = table.candidate.components[j], sizes[id(table)]
-        if not component.allows(own[j]) and component.allows(own[j] / (1.0 + BEYOND)):
-            own[j] = np.clip(own[j], *component.bounds)
-            held.append((table, j))
-    return held
+def _just_beyond(component: Component, size: float) -> bool:
+    """Of a size a little beyond its bound: tables of two effects describe neither exactly."""
+    return not component.allows(size) and component.allows(size / (1.0 + BEYOND))
+
+
+def normal_equations(
+    jacobian: FloatArray, residual: FloatArray, law: FloatArray, precision: Precision, prior: float = LAW_PRIOR**-2
+) -> NormalEquations:
+    """With the prior of the strut law, whose two logarithms are the first unknowns."""
+    weighted = precision.times(jacobian.T)
+    information, gradient = weighted @ jacobian, weighted @ residual
+    information[:2, :2] += prior * np.eye(2)
+    gradient[:2] -= prior * law
+    return NormalEquations(jacobian, information, gradient)
 
 
 def law_terms(laws: FloatArray, information: FloatArray) -> FloatArray:

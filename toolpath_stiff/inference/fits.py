@@ -7,14 +7,14 @@ Everything is dimensionless or scaled: with constants in N/m the gradient would 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import Candidate, Component
-from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem, normal_equations
 from toolpath_stiff.inference.minima import bounded_step
 from toolpath_stiff.inference.noise import NormalEquations, Scatter, gauss_newton, scaled_inverse
 
@@ -36,9 +36,10 @@ class _Model:
     `low`, `high` (2 + p,): bounds of x. A law that is not fitted is held by its prior, and not moved.
     """
 
-    def __init__(self, problem: Problem, candidates: Sequence[Candidate], law_free: bool) -> None:
+    def __init__(self, problem: Problem, candidates: tuple[Candidate, ...], law_free: bool) -> None:
         self.problem, self.candidates, self.law_free = problem, candidates, law_free
         self.components = [component for candidate in candidates for component in candidate.components]
+        self.prior = prior_of(law_free)
         bounds = [(-np.inf, np.inf)] * 2 + [component.bounds for component in self.components]
         self.low, self.high = np.array(bounds, dtype=float).T
 
@@ -69,7 +70,8 @@ class _Model:
                 step = -step if x[i] > 0.0 and x[i] + step > component.bounds[1] else step
             moved[i] += step
             columns.append((residual - self.residual(moved)) / step)
-        return normal_equations(np.nan_to_num(np.stack(columns, axis=1)), residual, x[:2], scatter, self.law_free)
+        jacobian = np.nan_to_num(np.stack(columns, axis=1))
+        return normal_equations(jacobian, residual, x[:2], scatter.precision, self.prior)
 
     def newton_step(self, x: FloatArray, unknowns: Sequence[int], equations: NormalEquations) -> FloatArray:
         """Step of the unknowns to the least quadratic model within the bounds.
@@ -102,16 +104,9 @@ class _Model:
         return None
 
 
-def normal_equations(
-    jacobian: FloatArray, residual: FloatArray, law: FloatArray, scatter: Scatter, law_free: bool
-) -> NormalEquations:
-    """With the prior of the strut law, whose two logarithms are the first unknowns."""
-    weighted = scatter.precision.times(jacobian.T)
-    information, gradient = weighted @ jacobian, weighted @ residual
-    prior = 1.0 / LAW_PRIOR**2 if law_free else 1e12
-    information[:2, :2] += prior * np.eye(2)
-    gradient[:2] -= prior * law
-    return NormalEquations(jacobian, information, gradient)
+def prior_of(law_free: bool) -> float:
+    """Information about each logarithm of the strut law; of one that is not fitted, that it does not change."""
+    return LAW_PRIOR**-2 if law_free else 1e12
 
 
 def refine(problem: Problem, fit: Fit, law_free: bool = True) -> Fit:
@@ -168,7 +163,7 @@ def fit_effects(
         pulled, sd = x + inverse @ every.gradient, np.sqrt(np.maximum(np.diag(inverse), 0.0))
         absent = {i - 2: (float(pulled[i]), float(sd[i])) for i in range(len(x)) if i not in unknowns}
     return Fit(
-        model.candidates, model.sizes(x), tuple(free), x[:2].copy(), residual, last.jacobian,
+        tuple(model.candidates), model.sizes(x), tuple(free), x[:2].copy(), residual, last.jacobian,
         scaled_inverse(last.information), scatter, law_free, absent,
     )  # fmt: skip
 
@@ -214,11 +209,15 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
         start = np.array([_start(component, share) for component in candidate.components])
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
         x = np.concatenate([fit.law, *fit.sizes])
-        scale = normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, law_free).scale
+        scale = _last_equations(fit).scale
         # Two starts mostly end in one place, and go on from there alike.
         if not any((np.abs(x - other) < TOLERANCE * (1.0 / scale)).all() for other in seen):
             yield _settled(problem, fit, nearly=True)
         seen.append(x)
+
+
+def _last_equations(fit: Fit) -> NormalEquations:
+    return normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter.precision, prior_of(fit.law_free))
 
 
 def _start(component: Component, share: float) -> float:
@@ -248,7 +247,7 @@ def _settled(problem: Problem, fit: Fit, nearly: bool = False) -> tuple[Fit, boo
 
 def _gain_to_come(problem: Problem, fit: Fit) -> float:
     """Twice what one more step adds to the log posterior; sizes that it pulls beyond their bounds stay there."""
-    last = normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
+    last = _last_equations(fit)
     model, x, gradient = (
         _Model(problem, fit.candidates, fit.law_free),
         np.concatenate([fit.law, *fit.sizes]),
@@ -279,22 +278,6 @@ def _without_zeros(fit: Fit) -> Fit:
     )
 
 
-@dataclass(frozen=True)
-class Baseline:
-    """The first two models of every report.
-
-    Attributes
-    ----------
-    as_given
-        The machine file as it stands; nothing is fitted.
-    refitted
-        Its strut law's two stiffnesses refitted, without a further effect.
-    """
-
-    as_given: Fit
-    refitted: Fit
-
-    @classmethod
-    def of(cls, problem: Problem) -> Baseline:
-        """Of data and model under one noise."""
-        return cls(base_fit(problem, law_free=False), base_fit(problem, law_free=True))
+def baseline(problem: Problem) -> tuple[Fit, Fit]:
+    """The first two models of every report: the machine file as it stands, and with its strut law refitted."""
+    return base_fit(problem, law_free=False), base_fit(problem, law_free=True)

@@ -15,7 +15,7 @@ The bootstrapped distribution of the smallest p value makes one test of them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -71,52 +71,26 @@ class Gate:
     gain_threshold: float = 0.0
 
 
-@dataclass(frozen=True)
-class Simulator:
-    """Simulated scatter of ln readings, shared by all tests of one data set.
+def simulate(noise: Noise, covariance: Covariance, seed: int, draws: int = DRAWS) -> FloatArray:
+    """(draws, n) simulated scatter of ln readings, each draw already divided by the error of its noise estimate."""
+    rng = np.random.default_rng(seed)
+    shape = (draws, len(covariance))
+    shared = covariance.draw(rng, draws)
+    wide = np.where(rng.random(shape) < noise.outliers, noise.outlier_width, 1.0)
+    scatter = shared + noise.repeat * wide * rng.standard_normal(shape)
+    if np.isfinite(noise.freedom):
+        scatter = scatter / np.sqrt(rng.chisquare(noise.freedom, draws) / noise.freedom)[:, None]
+    return np.asarray(scatter)
 
-    Attributes
-    ----------
-    draws
-        (DRAWS, n) scatter, each already divided by the error of its noise estimate.
+
+def set_wild_aside(
+    pulls: FloatArray, projected: Precision, scatter: Scatter | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Pulls P r (s, n) without the readings that are far off what all others say of them, as `scatter` has it.
+
+    Pulls as if the wild readings had not been taken, and what that takes off the residuals r of s sets of n readings:
+    nothing but at wild readings.
     """
-
-    draws: FloatArray
-
-    @classmethod
-    def of(cls, noise: Noise, covariance: Covariance, seed: int, draws: int = DRAWS) -> Simulator:
-        """From a noise model and its covariance."""
-        rng = np.random.default_rng(seed)
-        shape = (draws, len(covariance))
-        shared = covariance.draw(rng, draws)
-        wide = np.where(rng.random(shape) < noise.outliers, noise.outlier_width, 1.0)
-        scatter = shared + noise.repeat * wide * rng.standard_normal(shape)
-        if np.isfinite(noise.freedom):
-            scatter = scatter / np.sqrt(rng.chisquare(noise.freedom, draws) / noise.freedom)[:, None]
-        return cls(scatter)
-
-
-@dataclass(frozen=True)
-class Aside:
-    """Residuals r of s sets of n readings without what is wild in them.
-
-    Attributes
-    ----------
-    pulls
-        (s, n) P r as if the wild readings had not been taken.
-    taken
-        (s, n) what that takes off the residuals: nothing but at wild readings.
-    count
-        (s,) wild readings.
-    """
-
-    pulls: FloatArray
-    taken: FloatArray
-    count: FloatArray
-
-
-def set_wild_aside(pulls: FloatArray, projected: Precision, scatter: Scatter | None = None) -> Aside:
-    """Set aside in pulls P r (s, n) the readings that are far off what all others say of them, as `scatter` has it."""
     beyond, share = (WILD_SQUARED, MOST_WILD) if scatter is None else (scatter.beyond, scatter.most)
     squared = pulls**2 / np.maximum(projected.diagonal, 1e-12)
     most = max(1, int(share * pulls.shape[1]))
@@ -128,7 +102,7 @@ def set_wild_aside(pulls: FloatArray, projected: Precision, scatter: Scatter | N
         rows = furthest[sets, :size]
         block = projected.block(rows) * (1.0 + RIDGE * np.eye(size))
         taken[sets[:, None], rows] = np.linalg.solve(block, np.take_along_axis(pulls[sets], rows, 1)[..., None])[..., 0]
-    return Aside(pulls - projected.times(taken), taken, count.astype(float))
+    return pulls - projected.times(taken), taken
 
 
 class Forms:
@@ -202,7 +176,7 @@ def absolute_gate(
     problem: Problem,
     residual: FloatArray,
     jacobian: FloatArray,
-    simulator: Simulator,
+    draws: FloatArray,
     forms: Forms,
     signatures: Sequence[Sequence[FloatArray]] = (),
     gain: float = 0.0,
@@ -212,55 +186,43 @@ def absolute_gate(
     `signatures`: for the base model, one-sided signatures (n, p) of the candidates, to judge `gain`, the largest
     twice-log-likelihood gain of any of them.
     """
-    projected = problem.projected(jacobian)
+    projected, scatter = problem.projected(jacobian), problem.scatter
+
+    def squares_of(pulls: FloatArray, taken: FloatArray) -> FloatArray:
+        """(s,) r^T P r from the pulls P r, wild readings at their price; P V P = P but for the law's small prior."""
+        return np.asarray(scatter.covariance.squares(pulls) + scatter.beyond * (taken != 0.0).sum(axis=1))
+
     # What the linearised refit leaves of the data is their residual; the law's prior pulls as in the simulation.
-    observed = set_wild_aside(projected.times(residual[None]), projected, problem.scatter)
-    drawn = set_wild_aside(projected.times(simulator.draws), projected, problem.scatter)
-    squares = _quadratic(problem, drawn)
-    observed_squares = float(_quadratic(problem, observed)[0])
+    observed = set_wild_aside(projected.times(residual[None]), projected, scatter)
+    pulls, taken = set_wild_aside(projected.times(draws), projected, scatter)
+    observed_squares, squares = float(squares_of(*observed)[0]), squares_of(pulls, taken)
     structure = Structure(forms, projected)
-    seen = structure.surprises(structure.loads(residual[None], observed.taken))
+    seen = structure.surprises(structure.loads(residual[None], observed[1]))
     # Squares far beyond all simulated ones settle it; what the structure would look like by chance matters no more.
-    if not signatures and observed_squares > HOPELESS * squares.max():
-        simulated = np.zeros((len(squares), seen.shape[1]))
-    else:
-        known = forms.of_draws(simulator.draws)
-        simulated = structure.surprises(structure.loads(simulator.draws, drawn.taken, known))
+    simulated = np.zeros((len(squares), seen.shape[1]))
+    if signatures or observed_squares <= HOPELESS * squares.max():
+        simulated = structure.surprises(structure.loads(draws, taken, forms.of_draws(draws)))
     # Rows: the data, then every draw; columns: what may look bad, larger is worse.
     looks = [np.concatenate([[observed_squares], squares]), np.concatenate([seen, simulated]).max(axis=1)]
     if signatures:
-        looks.append(np.concatenate([[gain], largest_gain(drawn.pulls, projected, signatures)]))
+        looks.append(np.concatenate([[gain], largest_gain(pulls, projected, signatures)]))
     ranked = np.stack([_tail(look, look[1:]) for look in looks], axis=1)
     smallest = ranked.min(axis=1)
     probability = float(max((smallest[1:] <= smallest[0] + 1e-12).mean(), 0.5 / len(squares)))
     worst = forms.names[int(np.argmax(seen[0]))] if forms.names else ""
-    return Gate(
-        probability,
-        observed_squares,
-        np.asarray(squares),
-        float(ranked[0, 0]),
-        float(ranked[0, 1]),
-        worst,
-        float(ranked[0, 2]) if signatures else 1.0,
-        float(np.quantile(looks[2][1:], 1.0 - CHANCE)) if signatures else 0.0,
-    )
+    squared, structured, *gains = ranked[0].tolist()
+    gate = Gate(probability, observed_squares, squares, squared, structured, worst)
+    threshold = float(np.quantile(looks[-1][1:], 1.0 - CHANCE))
+    return replace(gate, gain_probability=gains[0], gain_threshold=threshold) if signatures else gate
 
 
 def gain_threshold(
-    problem: Problem, jacobian: FloatArray, simulator: Simulator, signatures: Sequence[Sequence[FloatArray]]
+    problem: Problem, jacobian: FloatArray, draws: FloatArray, signatures: Sequence[Sequence[FloatArray]]
 ) -> float:
     """Twice-log-likelihood gain that the best of all candidates reaches by chance in one campaign of twenty."""
     projected = problem.projected(jacobian)
-    drawn = set_wild_aside(projected.times(simulator.draws), projected, problem.scatter)
-    return float(np.quantile(largest_gain(drawn.pulls, projected, signatures), 1.0 - CHANCE))
-
-
-def _quadratic(problem: Problem, aside: Aside) -> FloatArray:
-    """(s,) r^T P r from the pulls P r, wild readings at their price.
-
-    P V P = P but for the law's prior, which is next to nothing.
-    """
-    return problem.scatter.covariance.squares(aside.pulls) + problem.scatter.beyond * aside.count
+    pulls, _ = set_wild_aside(projected.times(draws), projected, problem.scatter)
+    return float(np.quantile(largest_gain(pulls, projected, signatures), 1.0 - CHANCE))
 
 
 def _tail(values: FloatArray, simulated: FloatArray) -> FloatArray:

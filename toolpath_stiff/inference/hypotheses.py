@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,12 +55,11 @@ def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
     subsets: tuple[tuple[Fit, float], ...] = ()
     for table in tables:
         scores = _scores(problem, table, base)
-        for score, log_weight in scores:
-            evidences.append(score.log_evidence + log_weight)
-            if score.possible and (best is None or score.log_evidence > best.log_evidence):
-                best = score
-        if best is not None and best.tables[0] is table:
-            subsets = tuple((score, log_weight) for score, log_weight in scores if score.possible)
+        evidences += [score.log_evidence + log_weight for score, log_weight in scores]
+        possible = [(score, log_weight) for score, log_weight in scores if score.possible]
+        likeliest = max((score for score, _ in possible), key=lambda score: score.log_evidence, default=None)
+        if likeliest is not None and (best is None or likeliest.log_evidence > best.log_evidence):
+            best, subsets = likeliest, tuple(possible)
     if not tables:
         return None
     total = float(np.logaddexp.reduce(evidences)) - np.log(len(tables)) if evidences else NOTHING
@@ -71,35 +70,27 @@ def _scores(problem: Problem, table: Table, base: Fit) -> list[tuple[Fit, float]
     """Fits of one candidate with the log prior weight of each subset of components."""
     if table.knots:
         return [(score_single(problem, table, base), 0.0)]
-    subsets = list(table.candidate.subsets())
-    weight, found, start = -float(np.log(len(subsets))), [], base
+    subsets, scores = list(table.candidate.subsets()), []
+    start, sizes = base, None
     for free in subsets:
-        score = problem.score_subset([table], free, start)
+        score = problem.score_subset([table], free, start, sizes)
         if score is not None:
-            found.append((score, weight))
+            scores.append((score, -float(np.log(len(subsets)))))
             # The next subset begins where this one has ended, with the readings that it takes for wild.
-            start = score
-    return found
+            start, sizes = score, score.sizes[0]
+    return scores
 
 
-def score_families(
-    problem: Problem, effects: Iterable[Effect], base: Fit, progress: Callable[[str], None] | None = None
-) -> list[Family]:
+def score_families(problem: Problem, effects: Iterable[Effect], base: Fit) -> list[Family]:
     """All effects that do something to these data, the most likely first."""
-    found = []
-    for effect in effects:
-        if progress is not None:
-            progress(effect.name)
-        family = score_family(problem, effect, base)
-        if family is not None:
-            found.append(family)
-    return sorted(found, key=lambda family: (-family.log_evidence, family.name))
+    families = filter(None, (score_family(problem, effect, base) for effect in effects))
+    return sorted(families, key=lambda family: (-family.log_evidence, family.name))
 
 
 def tables_of(problem: Problem, effect: Effect) -> list[Table]:
     """The tables of an effect, one a choice that does something to these data."""
-    found = (table_of(candidate, problem.predictor) for candidate in candidates_of(effect, problem.predictor.data))
-    return [table for table in found if table is not None]
+    candidates = candidates_of(effect, problem.predictor.data)
+    return list(filter(None, (table_of(candidate, problem.predictor) for candidate in candidates)))
 
 
 def signatures(problem: Problem, tables: Iterable[Table]) -> list[list[FloatArray]]:
@@ -197,7 +188,7 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[fl
     averaged over amplitudes and forms.
     """
     projected = problem.projected(score.jacobian)
-    taken = set_wild_aside(projected.times(score.residual[None]), projected, problem.scatter).taken
+    _, taken = set_wild_aside(projected.times(score.residual[None]), projected, problem.scatter)
     structure = Structure(forms, projected)
     loads = structure.loads(score.residual[None], taken)
     gains = []

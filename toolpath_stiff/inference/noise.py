@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,14 +28,10 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.inference.covariances import Covariance, Groups, Precision, Widening
+from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, copied, from_repeats
+from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats
 from toolpath_stiff.readings.measurements import Measurements
-
-if TYPE_CHECKING:
-    from toolpath_stiff.inference.repeats import Repeats
-
 
 At = TypeVar("At")  # where a fit stands
 
@@ -159,88 +155,73 @@ def noise_models(
     InputError
         A stated noise that cannot be.
     """
-    found = _noise_of_tip(data.of_tip, stated, strut_spread, joint_error)
+    models = _noise_of_tip(data.of_tip, stated, strut_spread, joint_error)
     if data.beside is None:
-        return found
-    return tuple(_with_loops(noise, data) for noise in found)
-
-
-def _with_loops(noise: Noise, data: Measurements) -> Noise:
-    """The noise of the tip's readings, and that of the loops beside it: each scatters on its own."""
-    repeat = np.empty(len(data))
-    repeat[data.tip] = noise.repeat
-    relative = data.sd[~data.tip] / data.stiffness[~data.tip]
-    # A loop reading is a clamping of its own (`measurements.with_offsets`), whose scatter is counted beside this one.
-    repeat[~data.tip] = np.sqrt(np.maximum(relative**2 - noise.clamping**2, LEAST**2))
-    return replace(noise, repeat=repeat, tip=data.tip)
+        return models
+    # Each loop beside the tip scatters on its own. Its reading is a clamping of its own (`measurements.with_offsets`),
+    # whose scatter is counted beside this one.
+    relative, with_loops = data.sd[~data.tip] / data.stiffness[~data.tip], []
+    for noise in models:
+        repeat = np.empty(len(data))
+        repeat[data.tip] = noise.repeat
+        repeat[~data.tip] = np.sqrt(np.maximum(relative**2 - noise.clamping**2, LEAST**2))
+        with_loops.append(replace(noise, repeat=repeat, tip=data.tip))
+    return tuple(with_loops)
 
 
 def _noise_of_tip(
-    data: Measurements,
-    stated: float | tuple[float, float] | None,
-    strut_spread: float,
-    joint_error: float,
+    data: Measurements, stated: float | tuple[float, float] | None, strut_spread: float, joint_error: float
 ) -> tuple[Noise, ...]:
-    def model(
-        name: str, repeat: FloatArray, clamping: float, freedom: float, origin: str, wild: float = OUTLIERS,
-        remark: str = "",
-    ) -> Noise:  # fmt: skip
-        if repeat.min() < LEAST:
-            repeat = np.maximum(repeat, LEAST)
-            origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
-        return Noise(name, repeat, clamping, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark)
+    n, copies = len(data), copied(data)
+    repeats = None if copies else from_repeats(data)
 
-    n = len(data)
-    repeats = None if copied(data) else from_repeats(data)
+    def model(
+        name: str, repeat: float | FloatArray, clamping: float, freedom: float, origin: str, remark: str = ""
+    ) -> Noise:
+        wild, every = OUTLIERS if repeats is None else repeats.wild, np.full(n, repeat)
+        if every.min() < LEAST:
+            origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
+        every = np.maximum(every, LEAST)
+        return Noise(name, every, clamping, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark)
+
     remark = ""
     if stated is not None:
         both = stated if isinstance(stated, tuple) else _shared(stated)
         if not (0.0 < both[0] <= LARGEST and 0.0 <= both[1] <= LARGEST):
             raise InputError(f"a noise of {stated!r}", expected=f"more than 0 and at most {100 * LARGEST:g} %")
-        remark = (
-            ""
-            if repeats is None
-            else _disagreement(repeats, both[0], both[1], f"noise stated with {both_names('--noise')}")
-        )
+        remark = "" if repeats is None else _disagreement(repeats, *both, f"noise stated with {both_names('--noise')}")
         if not remark:
-            wild = OUTLIERS if repeats is None else repeats.wild
-            return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}", wild),)
+            return (model("stated", *both, STATED_FREEDOM, f"stated: {_percent(*both)}"),)
     relative = data.sd / data.stiffness
     rows = np.isfinite(relative) & (stated is None)  # that state how far they scatter
+    total = float(np.sqrt(np.mean(relative[rows] ** 2))) if rows.any() else np.nan
     if repeats is not None:
         if rows.any():
-            total = float(np.sqrt(np.mean(relative[rows] ** 2)))
             used = "instead" if rows.all() else "for the readings that state nothing"
             remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file", used)
-        origin = _origin(repeats)
+        origin = f"estimated from {repeats.differences} differences between repeats: "
+        origin += _percent(repeats.repeat, repeats.clamping)
+        origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
         repeat, freedom = np.full(n, repeats.repeat), repeats.freedom
         if rows.any() and not rows.all():  # of other readings, mostly: both count
             repeat, freedom = _both(relative, rows, repeats, trusted=not remark)
             origin += f", and from sd_N_per_mm of {int(rows.sum())} readings, {_percent(*_shared(total))}"
-        return (model("measured", repeat, repeats.clamping, freedom, origin, repeats.wild, remark),)
+        return (model("measured", repeat, repeats.clamping, freedom, origin, remark),)
     if rows.any():
-        repeat, clamping = _parts(relative[rows])
-        every = np.full(n, np.sqrt(np.mean(repeat**2)))
-        every[rows] = repeat
-        mean = float(np.sqrt(np.mean(relative[rows] ** 2)))
-        origin = f"sd_N_per_mm of the readings, {100 * mean:.2g} % in the mean, of "
+        own, clamping = _parts(relative[rows])
+        repeat = np.full(n, np.sqrt(np.mean(own**2)))
+        repeat[rows] = own
+        origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of "
         origin += f"which {100 * clamping:.2g} % is assumed to be clamping"
         if not rows.all():
             origin += f"; {n - int(rows.sum())} readings do not state it and are assumed to scatter as the others do"
-        return (model("stated", every, clamping, STATED_FREEDOM, origin),)
-    why = "the repeats agree exactly, as copies do" if copied(data) else "the data hold neither repeats nor sd_N_per_mm"
-    guesses = []
-    for name, guess in GUESSES.items():
-        both = _shared(guess)
-        origin = f"a {name} guess, {_percent(*both)}: {why}"
-        guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
-    return tuple(guesses)
-
-
-def _origin(repeats: Repeats) -> str:
-    origin = f"estimated from {repeats.differences} differences between repeats: "
-    origin += _percent(repeats.repeat, repeats.clamping)
-    return origin if repeats.clamps else origin + " (clamping assumed: no point was clamped twice)"
+        return (model("stated", repeat, clamping, STATED_FREEDOM, origin),)
+    why = "the repeats agree exactly, as copies do" if copies else "the data hold neither repeats nor sd_N_per_mm"
+    shared = {name: _shared(guess) for name, guess in GUESSES.items()}
+    return tuple(
+        model(name, *both, GUESSED_FREEDOM, f"a {name} guess, {_percent(*both)}: {why}")
+        for name, both in shared.items()
+    )
 
 
 def _parts(relative: FloatArray) -> tuple[FloatArray, float]:
@@ -272,16 +253,16 @@ def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str, u
 
     Both are estimates: the stated one to `STATED_FREEDOM`, the repeats' to theirs (sd of a ratio's logarithm).
     """
-    told, found = repeat, repeats.repeat
+    total, shown = repeat, repeats.repeat
     if repeats.clamps:
-        told, found = float(np.hypot(repeat, clamping)), float(np.hypot(repeats.repeat, repeats.clamping))
-    ratio = found / told
+        total, shown = float(np.hypot(repeat, clamping)), float(np.hypot(repeats.repeat, repeats.clamping))
+    ratio = shown / total
     sd = np.sqrt(0.5 / STATED_FREEDOM + 0.5 / repeats.freedom)
     if abs(np.log(ratio)) < CONTRADICTED * sd:
         return ""
     small = ratio > 1.0
     return (
-        f"the {what} is too {'small' if small else 'large'}: {100 * told:.2g} %, where {repeats.differences} "
+        f"the {what} is too {'small' if small else 'large'}: {100 * total:.2g} %, where {repeats.differences} "
         f"differences between repeats scatter {ratio:.2g} times as much; what the repeats show is used {used}"
     )
 
@@ -365,19 +346,16 @@ class Scatter:
         Where these are the wild readings of `known`, that is the answer: nothing is worked out again. One by one, the
         most wild first, each beside those before it.
         """
-        diagonal, wild = self.precision.diagonal, list(self.wild)
-        pull, taken = self.precision.times(residual), np.zeros(len(residual))
+        precision, wild = self.precision, list(self.wild)
+        diagonal, pull, taken = precision.diagonal, precision.times(residual), np.zeros(len(residual))
         taken[wild] = -np.inf
-        widening: Widening | None = None
         for _ in range(int(self.most * len(residual)) + 1):
             own = 1.0 + self.widening * diagonal
-            gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price
-            gain += taken
+            gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price + taken
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
-            widening = widening or Widening(self.covariance)
-            column, share = widening.widen(row, float(self.widening[row]))
+            precision, column, share = precision.widened(row, float(self.widening[row]))
             pull = pull - column * (share * pull[row])
             diagonal = diagonal - column**2 * share
             wild.append(row)

@@ -22,9 +22,10 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.readings.measurements import Measurements, measured_path, mechanical_stiffness, shown_by
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import law_products
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, idle_on_readings
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model, idle_on_readings
 from toolpath_stiff.stiffness.trial import failures, own_effects
 
 NO_CHANGE = (0.0, 0.0)  # of the strut law
@@ -135,7 +136,7 @@ class Predictor:
         except InputError:  # no pose, or no stiffness left: a fit walks away from there
             return np.full(len(self), np.nan)
         if model.instruments:
-            path = replace(self.full_path(), machine=model.machine)
+            path = replace(self.full_path, machine=model.machine)
             for active in model.instruments:
                 stiffness = shown_by(active, stiffness, path, self.data)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -143,28 +144,20 @@ class Predictor:
 
     def _mechanics(self, model: StiffnessModel, prepared: _Prepared) -> FloatArray:
         """(m,) N/m at the distinct rows."""
-        same_geometry = (
-            model.machine.platform_joints is self.base.machine.platform_joints
-            and model.machine.frame_joints is self.base.machine.frame_joints
-        )
-        if same_geometry:
+        given = self.base.machine
+        if model.machine.platform_joints is given.platform_joints and model.machine.frame_joints is given.frame_joints:
             path = replace(prepared.path, machine=model.machine)
             return mechanical_stiffness(model, path, prepared.data, prepared.forces)
         return mechanical_stiffness(model, measured_path(model, prepared.data), prepared.data)
 
+    @cached_property
     def full_path(self) -> LoadPath:
         """What instruments see of every row."""
-        return self._full_path
-
-    @cached_property
-    def _full_path(self) -> LoadPath:
-        prepared = self._timeless
-        path = prepared.path.take(prepared.which)
-        missing = self.data.missing
+        data, missing = self.data, self.data.missing
         return replace(
-            path,
-            time=None if "time_min" in missing else self.data.time,
-            temperature=None if "temperature_C" in missing else self.data.temperature,
+            self._timeless.path.take(self._timeless.which),
+            time=None if "time_min" in missing else data.time,
+            temperature=None if "temperature_C" in missing else data.temperature,
         )
 
     def strut_lengths(self) -> FloatArray:
@@ -178,9 +171,8 @@ class Predictor:
     def strut_columns(self) -> FloatArray:
         """(n, 6) d ln k / d ln(stiffness of strut i) at the machine file's strut law: its share of the compliance."""
         prepared = self._timeless
-        compliance = 1.0 / self.machine.strut_law.stiffness(prepared.path.struts.lengths)
-        share = prepared.products * compliance * np.exp(self._base_log())[prepared_first(prepared)][:, None]
-        return np.asarray(share[prepared.which])
+        softness = 1.0 / self.machine.strut_law.stiffness(prepared.path.struts.lengths)
+        return np.asarray((prepared.products * softness * np.exp(self._base_log)[:, None])[prepared.which])
 
     def struts_carry_all(self, effects: Iterable[Effect]) -> bool:
         """Whether these effects and the machine file's leave geometry, equilibrium and readings as they are."""
@@ -196,17 +188,7 @@ class Predictor:
         The struts' forces are those of equilibrium, so this is exact unless a stiffness parallel to the struts
         shares the load or the geometry differs; good enough there for a Gauss-Newton step.
         """
-        prepared = self._timeless
-        rule = scaled_law(self.machine.strut_law, law)
-        lengths = prepared.path.struts.lengths
-        first, second = rule.weights(lengths)
-        stiffness = rule.stiffness(lengths)
-        energy = prepared.products / stiffness**2
-        columns = [
-            (energy * rule.stiffness_1 * first).sum(axis=1),
-            (energy * rule.stiffness_2 * second).sum(axis=1),
-        ]
-        return np.asarray(np.stack(columns, axis=1)[prepared.which] * np.exp(log_stiffness)[:, None])
+        return np.asarray((-self.strut_part_and_slopes(law)[1] * np.exp(log_stiffness)).T)
 
     def strut_part(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(..., n) m/N that the struts contribute to the compliance along each reading, for laws (..., 2)."""
@@ -251,36 +233,27 @@ class Predictor:
 
     @cached_property
     def _joint_columns(self) -> FloatArray:
-        base, columns = self._base_log(), []
+        columns, prepared, given = [], self._timeless, self.base.machine
         for name in ("frame_joints", "platform_joints"):
-            for strut in range(6):
-                for axis in range(3):
-                    joints = np.array(getattr(self.base.machine, name))
-                    joints[strut, axis] += JOINT_STEP
-                    true = self.base.machine.with_changes(**{name: joints})
-                    moved = replace(self.base, machine=true, control=self.base.control or self.base.machine)
-                    prepared = self._timeless
-                    path = measured_path(moved, prepared.data)
-                    stiffness = mechanical_stiffness(moved, path, prepared.data)
-                    columns.append((np.log(stiffness)[prepared.which] - base) / JOINT_STEP)
+            for strut, axis in np.ndindex(6, 3):
+                joints = np.array(getattr(given, name))
+                joints[strut, axis] += JOINT_STEP
+                moved = replace(
+                    self.base, machine=given.with_changes(**{name: joints}), control=self.base.control or given
+                )
+                stiffness = mechanical_stiffness(moved, measured_path(moved, prepared.data), prepared.data)
+                columns.append((np.log(stiffness) - self._base_log)[prepared.which] / JOINT_STEP)
         return np.stack(columns, axis=1)
 
+    @cached_property
     def _base_log(self) -> FloatArray:
-        """(n,) ln k of the machine file's model, before instruments."""
-        prepared = self._timeless
-        return np.asarray(np.log(self._mechanics(self.base, prepared))[prepared.which])
+        """(m,) ln k of the machine file's model at the distinct rows, before instruments."""
+        return np.asarray(np.log(self._mechanics(self.base, self._timeless)))
 
 
 def idle_on(model: StiffnessModel, data: Measurements) -> dict[str, str]:
     """Effects of the model that add nothing to these readings -> a sentence for people."""
     return idle_on_readings(model, data.missing, set(data.setup.tolist()))
-
-
-def prepared_first(prepared: _Prepared) -> NDArray[np.int64]:
-    """Index of one row for each distinct row."""
-    first = np.zeros(len(prepared.data), dtype=np.int64)
-    first[prepared.which[::-1]] = np.arange(len(prepared.which))[::-1]
-    return first
 
 
 def _prepare(model: StiffnessModel, data: Measurements, timed: bool) -> _Prepared:

@@ -5,17 +5,16 @@ They are named; nothing is changed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import TypedDict
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.covariances import Groups, Precision
+from toolpath_stiff.inference.covariances import Groups, Precision, Rows
 from toolpath_stiff.inference.detectable import POWER_80
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.noise import Scatter
@@ -23,9 +22,6 @@ from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.readings.measurements import Measurements, model_stiffness
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg
-
-Rows = NDArray[np.int64]
-
 
 AS_WELL = 3.0  # log odds behind the best way of slipping within which another is said as well
 
@@ -71,6 +67,9 @@ AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 COORDINATES, ANGLES = ("x_mm", "y_mm", "z_mm"), ("a_deg", "b_deg", "c_deg")
 
 
+MENDED = ("position", "angles", "direction")  # columns of the readings that a slip may change
+
+
 # Columns, field of the readings, usual slips, SI value of its unit, and that unit.
 POSE_STEPS = (
     (COORDINATES, "position", STEPS_MM, float(m_from_mm(1.0)), "mm"),
@@ -79,30 +78,42 @@ POSE_STEPS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Suspect:
-    """Rows that look mistyped.
+class Slip:
+    """Rows (k,) in which one thing was mistyped.
 
     Attributes
     ----------
-    rows
-        Indices.
     column, stands, meant
         What is wrong: a column, what stands there and what it would be (of the first row).
-    words
-        All of it in a sentence.
-    log_odds
-        Against the rows being as they should be, or wild.
-    slip
-        The likeliest slip.
+    mended
+        Column of the readings -> (k, 3) as it would be, where it is another.
+    change
+        (k,) of ln k where that is known without a model, of a unit; else None.
     """
 
-    rows: tuple[int, ...]
+    rows: Rows
     column: str
     stands: str
     meant: str
+    mended: Mapping[str, FloatArray]
+    change: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """Rows that look mistyped: the likeliest slip, all that it may be in a sentence, and the log odds.
+
+    Odds are against the rows being as they should be, or wild.
+    """
+
+    slip: Slip
     words: str
     log_odds: float
-    slip: _Slip
+
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """Indices."""
+        return tuple(self.slip.rows.tolist())
 
     @property
     def clear(self) -> bool:
@@ -110,7 +121,8 @@ class Suspect:
         return self.log_odds > CLEAR
 
 
-class SuspectEntry(TypedDict):
+@dataclass(frozen=True)
+class SuspectEntry:
     """A suspect in a document: rows counted from 1 in their file, and its lines."""
 
     file: str
@@ -126,11 +138,10 @@ class SuspectEntry(TypedDict):
 
 def mended(data: Measurements, suspects: Sequence[Suspect]) -> Measurements:
     """The readings with the likeliest slip of each suspect mended."""
-    columns = {name: getattr(data, name).copy() for name in ("position", "angles", "direction", "stiffness")}
+    columns = {name: getattr(data, name).copy() for name in (*MENDED, "stiffness")}
     for slip in (suspect.slip for suspect in suspects):
-        columns["position"][slip.rows] = slip.position
-        columns["angles"][slip.rows] = slip.angles
-        columns["direction"][slip.rows] = slip.direction
+        for name, values in slip.mended.items():
+            columns[name][slip.rows] = values
         if slip.change is not None:
             columns["stiffness"][slip.rows] /= np.exp(slip.change)
     return replace(data, **columns)
@@ -147,7 +158,7 @@ def alone(data: Measurements, suspects: Sequence[Suspect]) -> tuple[Suspect, ...
     return tuple(
         suspect
         for suspect in suspects
-        if not all(np.isin(column[list(suspect.rows)], column[rest]).all() for column in columns)
+        if not all(np.isin(column[suspect.slip.rows], column[rest]).all() for column in columns)
     )
 
 
@@ -155,59 +166,21 @@ def suspect_entries(
     suspects: Sequence[Suspect], data: Measurements, left_out: Sequence[Suspect] | None
 ) -> list[SuspectEntry]:
     """Suspects for a document; `left_out`: those that were left out of the judgement, None where there was none."""
-    found: list[SuspectEntry] = []
-    for one in suspects:
-        rows = [int((data.file[: row + 1] == data.file[row]).sum()) for row in one.rows]
-        found.append({
-            "file": str(data.file[one.rows[0]]),
-            "row": rows[0],
-            "rows": rows,
-            "lines": [int(data.line[row]) for row in one.rows],
-            "column": one.column,
-            "stands": one.stands,
-            "would_be": one.meant,
-            "words": said_of(one, left_out),
-            "left_out": left_out is not None and one in left_out,
-        })  # fmt: skip
-    return found
-
-
-def said_of(suspect: Suspect, left_out: Sequence[Suspect] | None) -> str:
-    """A suspect in a sentence, with what was done about it."""
-    if left_out is None:
-        return suspect.words
-    several = len(suspect.rows) > 1
-    if suspect in left_out:
-        return f"{suspect.words}; {'they were' if several else 'it was'} left out of the judgement"
-    if not suspect.clear:
-        return f"{suspect.words}; kept all the same, for it may be chance"
-    return (
-        f"{suspect.words}; kept all the same: it may as well be what is missing from the model that stands out in "
-        f"{'them' if several else 'it'}"
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Slip:
-    """A slip: (k,) rows, what it is, and where (k, 3) and along which direction (k, 3) they would be if mended.
-
-    `change`: (k,) of ln k where that is known without a model, of a unit.
-    """
-
-    rows: Rows
-    column: str
-    stands: str
-    meant: str
-    position: FloatArray
-    angles: FloatArray
-    direction: FloatArray
-    change: FloatArray | None = None
-
-    @classmethod
-    def of(cls, data: Measurements, rows: Rows, column: str, stands: str, meant: str, **mended: FloatArray) -> _Slip:
-        """Of rows that stay as they are but for what is given."""
-        as_they_are = {name: getattr(data, name)[rows] for name in ("position", "angles", "direction")}
-        return cls(rows, column, stands, meant, **(as_they_are | mended))
+    entries = []
+    for suspect in suspects:
+        slip, several, out = suspect.slip, len(suspect.rows) > 1, left_out is not None and suspect in left_out
+        rows = [int((data.file[: row + 1] == data.file[row]).sum()) for row in suspect.rows]
+        words = suspect.words
+        if out:
+            words += f"; {'they were' if several else 'it was'} left out of the judgement"
+        elif left_out is not None and not suspect.clear:
+            words += "; kept all the same, for it may be chance"
+        elif left_out is not None:
+            where = "them" if several else "it"
+            words += "; kept all the same: it may as well be what is missing from the model that stands out in " + where
+        file, lines = str(data.file[slip.rows[0]]), data.line[slip.rows].tolist()
+        entries.append(SuspectEntry(file, rows[0], rows, lines, slip.column, slip.stands, slip.meant, words, out))
+    return entries
 
 
 def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
@@ -220,28 +193,42 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
     fit
         The best explanation: what else the readings hold.
     """
-    found: list[Suspect] = []
-    taken = np.zeros(len(problem.observed), dtype=bool)
+    suspects: list[Suspect] = []
     data = problem.predictor.data
-    tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))
+    taken = np.zeros(len(data), dtype=bool)
     for _ in range(MOST_SLIPS):
         slips = list(_slips(data, *_looked_at(problem, fit, taken)))
         if not slips:
             break
-        odds = _log_odds(problem, fit, slips, _changes(problem, fit, slips), taken) + np.log(SLIPPED / tried)
-        together: dict[tuple[int, ...], list[int]] = {}
+        odds = _log_odds(problem, fit, slips, taken) + np.log(SLIPPED / _tried(data))
+        together: dict[tuple[int, ...], list[int]] = defaultdict(list)
         for k in np.argsort(-odds, kind="stable").tolist():
             if np.isfinite(odds[k]):
-                together.setdefault(tuple(slips[k].rows.tolist()), []).append(k)
+                together[tuple(slips[k].rows.tolist())].append(k)
         # A row may have slipped in any way: what counts is all of them, what is said are those that fit about as well.
         totals = {rows: float(np.logaddexp.reduce(odds[ways])) for rows, ways in together.items()}
-        rows = max(totals, key=lambda one: (totals[one], one), default=())
+        rows = max(totals, key=lambda rows: (totals[rows], rows), default=())
         if not rows or totals[rows] <= 0.0:
             break
-        ways = [slips[k] for k in together[rows] if odds[k] > odds[together[rows][0]] - AS_WELL]
-        found.append(_suspect(data, ways, totals[rows]))
+        first, *others = together[rows]
+        ways = [slips[first], *(slips[k] for k in others if odds[k] > odds[first] - AS_WELL)]
+        suspects.append(Suspect(ways[0], _words(data, ways), totals[rows]))
         taken[list(rows)] = True
-    return tuple(found)
+    return tuple(suspects)
+
+
+def _words(data: Measurements, ways: Sequence[Slip]) -> str:
+    """Where rows are, and what may be wrong with them."""
+    rows = ways[0].rows
+    lines = f"line{'s' if len(rows) > 1 else ''} {', '.join(str(line) for line in data.line[rows])}"
+    either = " or ".join(f"{way.column} {way.meant} instead of {way.stands}" for way in ways)
+    looks = f"look{'' if len(rows) > 1 else 's'} mistyped"
+    return f"{lines} of {data.file[rows[0]]} {looks}: {either} would fit all other readings"
+
+
+def _tried(data: Measurements) -> int:
+    """How many slips of single rows there may be."""
+    return len(data) * len(list(_slips_of_row(data, np.array([0]))))
 
 
 @dataclass(frozen=True)
@@ -265,49 +252,35 @@ def slips_that_show(problem: Problem, fit: Fit) -> tuple[SlipSize, ...]:
     every slip that is tried.
     """
     data = problem.predictor.data
-    tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))
-    wanted = float(np.sqrt(2.0 * np.log(tried / SLIPPED))) + POWER_80
+    wanted = float(np.sqrt(2.0 * np.log(_tried(data) / SLIPPED))) + POWER_80
     projected = problem.projected(fit.jacobian)
     blocks = [(rows, projected.block(rows)) for rows in Groups.by(data.clamp).members() if len(rows) > 1]
-    found = []
+    sizes = []
     for names, field, (step, *_), si, unit in POSE_STEPS:
         for k, name in enumerate(names):
             moved = getattr(data, field) + step * si * np.eye(3)[k]
-            slip = _Slip.of(data, np.arange(len(data)), name, "", "", **{field: moved})
-            (change,) = _changes(problem, fit, [slip])
+            (change,) = _changes(problem, fit, [Slip(np.arange(len(data)), name, "", "", {field: moved})])
             squares = np.array([change[rows] @ block @ change[rows] for rows, block in blocks])
             middle = float(np.sqrt(np.median(squares))) if blocks else np.nan
-            size = np.inf if middle * MOST_STEPS < wanted else step * wanted / middle
-            found.append(SlipSize(name, unit, size))
-    return tuple(found)
+            sizes.append(SlipSize(name, unit, np.inf if middle * MOST_STEPS < wanted else step * wanted / middle))
+    return tuple(sizes)
 
 
-def _suspect(data: Measurements, ways: Sequence[_Slip], odds: float) -> Suspect:
-    first = ways[0]
-    several = len(first.rows) > 1
-    lines = ", ".join(str(int(data.line[row])) for row in first.rows)
-    where = f"line{'s' if several else ''} {lines} of {data.file[first.rows[0]]}"
-    said = " or ".join(f"{way.column} {way.meant} instead of {way.stands}" for way in ways)
-    words = f"{where} {'look' if several else 'looks'} mistyped: {said} would fit all other readings"
-    return Suspect(tuple(first.rows.tolist()), first.column, first.stands, first.meant, words, odds, first)
-
-
-def _looked_at(problem: Problem, fit: Fit, taken: NDArray[np.bool_]) -> tuple[list[Rows], list[Rows]]:
+def _looked_at(problem: Problem, fit: Fit, taken: BoolArray) -> tuple[list[Rows], list[Rows]]:
     """Rows that are far off, and clampings whose rows together are; the furthest of them."""
-    projected = problem.projected(fit.jacobian)
+    projected, inflated = problem.projected(fit.jacobian), _inflation(fit)
     pulls = projected.times(fit.residual)
-    inflated = _inflation(fit)
     squared = np.where(taken, 0.0, pulls**2 / np.maximum(projected.diagonal, 1e-300)) / inflated
     order = np.argsort(-squared, kind="stable")[:MOST_ROWS]
-    rows = [np.array([row]) for row in order.tolist() if squared[row] > FAR_OFF]
     clampings = []
     for members in Groups.by(problem.predictor.data.clamp).members():
         if len(members) < 2 or taken[members].any():
             continue
-        block = projected.block(members)
-        excess = float(pulls[members] @ np.linalg.lstsq(block, pulls[members], rcond=1e-10)[0]) / inflated
+        weighted = np.linalg.lstsq(projected.block(members), pulls[members], rcond=1e-10)[0]
+        excess = float(pulls[members] @ weighted) / inflated
         clampings.append(((excess - len(members)) / np.sqrt(2.0 * len(members)), members))
-    clampings.sort(key=lambda one: (-one[0], int(one[1][0])))
+    clampings.sort(key=lambda pair: (-pair[0], int(pair[1][0])))
+    rows = [np.array([row]) for row in order.tolist() if squared[row] > FAR_OFF]
     return rows, [members for far, members in clampings[:MOST_CLAMPS] if far > 2.0]
 
 
@@ -317,28 +290,33 @@ def _inflation(fit: Fit) -> float:
     return float(max(1.0, fit.projected.squares(fit.residual) / freedom))
 
 
-def _slips(data: Measurements, rows: Sequence[Rows], clampings: Sequence[Rows]) -> Iterator[_Slip]:
+def _slips(data: Measurements, rows: Sequence[Rows], clampings: Sequence[Rows]) -> Iterator[Slip]:
     for row in rows:
         yield from _slips_of_row(data, row)
     for members in clampings:
         yield from _slips_of_pose(data, members)
-        yield from _exchanges(data, members)
+        # Two readings of a clamping under one load that stand under each other's direction.
+        for first, second in combinations(members.tolist(), 2):
+            apart = np.abs(data.direction[first] - data.direction[second]).max() > TINY
+            if apart and data.force[first] == data.force[second]:
+                names, others = [_axis(data.direction[row]) or "oblique" for row in (first, second)], [second, first]
+                stand, meant = " and ".join(names), f"{' and '.join(names[::-1])} (exchanged)"
+                yield Slip(np.array([first, second]), "direction", stand, meant, {"direction": data.direction[others]})
 
 
-def _slips_of_row(data: Measurements, row: Rows) -> Iterator[_Slip]:
+def _slips_of_row(data: Measurements, row: Rows) -> Iterator[Slip]:
     yield from _slips_of_pose(data, row)
     stands = _axis(data.direction[row[0]])
     for name, vector in AXES.items():
         if stands != name:
-            yield _Slip.of(data, row, "direction", stands or "oblique", name, direction=np.array([vector]))
+            yield Slip(row, "direction", stands or "oblique", name, {"direction": np.array([vector])})
     value = float(n_per_mm_from_n_per_m(data.stiffness[row[0]]))
     for unit, factor in UNITS.items():
-        meant = f"{value / factor:.6g}" + f" (the number stands in {unit})"
-        change = np.array([np.log(factor)])
-        yield _Slip.of(data, row, "stiffness_N_per_mm", f"{value:.6g}", meant, change=change)
+        meant = f"{value / factor:.6g} (the number stands in {unit})"
+        yield Slip(row, "stiffness_N_per_mm", f"{value:.6g}", meant, {}, np.array([np.log(factor)]))
 
 
-def _slips_of_pose(data: Measurements, rows: Rows) -> Iterator[_Slip]:
+def _slips_of_pose(data: Measurements, rows: Rows) -> Iterator[Slip]:
     """A coordinate or an angle with the wrong sign, or off by a usual slip; the same in all rows."""
     for names, field, steps, si, _ in POSE_STEPS:
         values = getattr(data, field)[rows]
@@ -350,25 +328,7 @@ def _slips_of_pose(data: Measurements, rows: Rows) -> Iterator[_Slip]:
             for meant in (*wrong_sign, *(stands + sign * step for step in steps for sign in (-1.0, 1.0))):
                 changed = values.copy()
                 changed[:, k] = meant * si
-                yield _Slip.of(data, rows, name, _number(stands), _number(meant), **{field: changed})
-
-
-def _number(value: float) -> str:
-    return f"{round(value, 6):g}"
-
-
-def _exchanges(data: Measurements, members: Rows) -> Iterator[_Slip]:
-    """Two readings of a clamping under one load that stand under each other's direction."""
-    for a, first in enumerate(members):
-        for second in members[a + 1 :]:
-            apart = np.abs(data.direction[first] - data.direction[second]).max() > TINY
-            if apart and data.force[first] == data.force[second]:
-                rows = np.array([first, second])
-                names = [_axis(data.direction[row]) or "oblique" for row in rows]
-                yield _Slip.of(
-                    data, rows, "direction", " and ".join(names), f"{' and '.join(names[::-1])} (exchanged)",
-                    direction=data.direction[rows[::-1]],
-                )  # fmt: skip
+                yield Slip(rows, name, f"{round(stands, 6):g}", f"{round(meant, 6):g}", {field: changed})
 
 
 def _axis(direction: FloatArray) -> str:
@@ -376,64 +336,52 @@ def _axis(direction: FloatArray) -> str:
     return next((name for name, v in AXES.items() if abs(abs(float(direction @ np.array(v))) - 1.0) < TINY), "")
 
 
-def _changes(problem: Problem, fit: Fit, slips: Sequence[_Slip]) -> list[FloatArray]:
+def _changes(problem: Problem, fit: Fit, slips: Sequence[Slip]) -> list[FloatArray]:
     """By how much the modelled ln k of its rows rises when a slip is mended; nan where the model has no answer.
 
     A number in another unit is too large by a factor: that counts as a model that is too small by it.
     """
     predictor = problem.predictor
+    data, rows = predictor.data, np.concatenate([slip.rows for slip in slips])
+
+    def column(name: str) -> FloatArray:
+        return np.concatenate([slip.mended.get(name, getattr(data, name)[slip.rows]) for slip in slips])
+
+    taken = replace(
+        data.select(rows), position=column("position"), angles=column("angles"), direction=column("direction")
+    )
     law = scaled_law(predictor.machine.strut_law, fit.law)
     model = build_model(predictor.machine.with_changes(strut_law=law), predictor.effect_files, fit.effects)
-    rows = np.concatenate([slip.rows for slip in slips])
-    mended = replace(
-        predictor.data.select(rows),
-        position=np.concatenate([slip.position for slip in slips]),
-        angles=np.concatenate([slip.angles for slip in slips]),
-        direction=np.concatenate([slip.direction for slip in slips]),
-    )
     try:
-        logs = np.log(model_stiffness(model, mended))
+        logs = np.log(model_stiffness(model, taken))
     except InputError:  # one of the poses is none that the machine can take
         logs = np.full(len(rows), np.nan)
-    modelled = problem.observed - fit.residual
-    ends = np.cumsum([0, *(len(slip.rows) for slip in slips)])
-    return [
-        logs[start:end] - modelled[slip.rows] if slip.change is None else slip.change
-        for slip, (start, end) in zip(slips, pairwise(ends.tolist()), strict=True)
-    ]
+    moved = np.split(logs - (problem.observed - fit.residual)[rows], np.cumsum([len(slip.rows) for slip in slips])[:-1])
+    return [change if slip.change is None else slip.change for slip, change in zip(slips, moved, strict=True)]
 
 
-def _log_odds(
-    problem: Problem, fit: Fit, slips: Sequence[_Slip], changes: Sequence[FloatArray], taken: NDArray[np.bool_]
-) -> FloatArray:
+def _log_odds(problem: Problem, fit: Fit, slips: Sequence[Slip], taken: BoolArray) -> FloatArray:
     """(slips,) log likelihood of each slip over that of its rows as they stand, plain or wild; -inf for none."""
     scatter, inflated = problem.scatter, _inflation(fit)
     known: dict[tuple[int, ...], tuple[Precision, FloatArray]] = {}
-    found = np.full(len(slips), -np.inf)
-    for k, (slip, change) in enumerate(zip(slips, changes, strict=True)):
+    odds = np.full(len(slips), -np.inf)
+    for k, (slip, change) in enumerate(zip(slips, _changes(problem, fit, slips), strict=True)):
         if not np.isfinite(change).all():
             continue
-        others = tuple(sorted(set(fit.scatter.wild) - set(slip.rows.tolist())))
-        if others not in known:
-            known[others] = _without(scatter, fit, others, taken)
-        projected, pulls = known[others]
+        wild = tuple(sorted(set(fit.scatter.wild) - set(slip.rows.tolist())))
+        if wild not in known:  # what the fit leaves, wild rows widened and taken ones set aside
+            rows, gone = np.array(wild, dtype=np.int64), np.flatnonzero(taken)
+            wider = scatter.covariance.widened(rows, scatter.widening[rows])
+            wider = wider.widened(gone, np.full(len(gone), SET_ASIDE))
+            projected = wider.precision.beside(fit.jacobian.T, law_prior(fit.jacobian.shape[1]))
+            known[wild] = projected, projected.times(fit.residual)
+        projected, pulls = known[wild]
         block, pull = projected.block(slip.rows) / inflated, pulls[slip.rows] / inflated
         left = pull - block @ change
-        if float(left @ np.linalg.lstsq(block, left, rcond=1e-10)[0]) > NEAR**2 * len(change):
-            continue
-        gain = float(change @ pull - 0.5 * change @ block @ change)
-        found[k] = gain - max(0.0, _gain_of_wild(scatter, slip.rows, block, pull))
-    return found
-
-
-def _without(
-    scatter: Scatter, fit: Fit, wild: tuple[int, ...], taken: NDArray[np.bool_]
-) -> tuple[Precision, FloatArray]:
-    """Inverse covariance of what the fit leaves and its pulls, with wild rows widened and taken ones set aside."""
-    rows, gone = np.array(wild, dtype=np.int64), np.flatnonzero(taken)
-    wider = scatter.covariance.widened(rows, scatter.widening[rows]).widened(gone, np.full(len(gone), SET_ASIDE))
-    projected = wider.precision.beside(fit.jacobian.T, law_prior(fit.jacobian.shape[1]))
-    return projected, projected.times(fit.residual)
+        if float(left @ np.linalg.lstsq(block, left, rcond=1e-10)[0]) <= NEAR**2 * len(change):
+            gain = float(change @ pull - 0.5 * change @ block @ change)
+            odds[k] = gain - max(0.0, _gain_of_wild(scatter, slip.rows, block, pull))
+    return odds
 
 
 def _gain_of_wild(scatter: Scatter, rows: Rows, block: FloatArray, pull: FloatArray) -> float:
@@ -441,7 +389,7 @@ def _gain_of_wild(scatter: Scatter, rows: Rows, block: FloatArray, pull: FloatAr
     far = pull**2 > scatter.beyond * np.diag(block)
     if not far.any():
         return 0.0
-    own, part, widening = block[np.ix_(far, far)], pull[far], scatter.widening[rows[far]]
-    gain = float(part @ np.linalg.solve(np.diag(1.0 / widening) + own, part))
-    volume = float(np.linalg.slogdet(np.eye(len(part)) + widening[:, None] * own)[1])
+    inner, part, widening = block[np.ix_(far, far)], pull[far], scatter.widening[rows[far]]
+    gain = float(part @ np.linalg.solve(np.diag(1.0 / widening) + inner, part))
+    volume = float(np.linalg.slogdet(np.eye(len(part)) + widening[:, None] * inner)[1])
     return 0.5 * (gain - volume) - len(part) * scatter.price

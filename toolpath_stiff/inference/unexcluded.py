@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import LARGEST, SMALLEST, Candidate, Table
-from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.inference.minima import bounded_step
 from toolpath_stiff.inference.size_priors import LIKELY, log_expected, log_usual
@@ -47,22 +47,7 @@ class Unexcluded:
     value: float
     rms: float
     left: float
-    probability: float
-
-
-@dataclass(frozen=True)
-class _Room:
-    """How far one size of a candidate may go beside an explanation; attributes as of `Unexcluded`.
-
-    `mean` is that of the likelihood over the prior of the size, 1 where the readings say nothing.
-    """
-
-    table: Table
-    component: int
-    size: float
-    rms: float
-    left: float
-    mean: float
+    probability: float = np.nan
 
 
 def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_odds: float) -> list[Unexcluded]:
@@ -78,31 +63,17 @@ def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_o
         Of one certain further effect being there to none being there.
     """
     beside = _Beside(problem, fit)
-    odds, widest = {}, {}
+    odds: dict[str, float] = {}
+    widest: dict[str, Unexcluded] = {}
     for family in families:
-        if family.name in fit.names:
-            continue
-        rooms = [
-            beside.room(table, j)
-            for table in family.tables
-            for j in range(len(table.candidate.components))
-            if table.columns[:, j].any()
-        ]
-        odds[family.name] = prior_odds * float(np.mean([room.mean for room in rooms]))
-        widest[family.name] = max(rooms, key=lambda room: room.rms)
+        if family.name not in fit.names:
+            seen = ((table, np.flatnonzero(table.columns.any(axis=0)).tolist()) for table in family.tables)
+            rooms = [beside.room(table, j) for table, components in seen for j in components]
+            odds[family.name] = prior_odds * float(np.mean([mean for _, mean in rooms]))
+            widest[family.name] = max((room for room, _ in rooms), key=lambda room: room.rms)
     whole = 1.0 + sum(odds.values())
-    found = []
-    for family in families:
-        room = widest.get(family.name)
-        if room is None or room.rms < MATTERS:
-            continue
-        candidate = room.table.candidate
-        component = candidate.components[room.component]
-        found.append(
-            Unexcluded(family.effect, candidate, component.parameter, component.value(room.size), room.rms, room.left,
-                       odds[family.name] / whole)
-        )  # fmt: skip
-    return sorted(found, key=lambda one: (-one.probability, one.effect.name))
+    hidden = [replace(room, probability=odds[name] / whole) for name, room in widest.items() if room.rms >= MATTERS]
+    return sorted(hidden, key=lambda room: (-room.probability, room.effect.name))
 
 
 class _Beside:
@@ -114,28 +85,39 @@ class _Beside:
         self.compliance = np.exp(fit.residual - problem.observed)
         self.precision = fit.scatter.precision
         self.weighted = self.precision.times(fit.jacobian.T)
-        prior = np.zeros(fit.jacobian.shape[1])
-        prior[:2] = LAW_PRIOR**-2
-        self.information = self.weighted @ fit.jacobian + np.diag(prior)
-        self.pull = -prior * np.concatenate([fit.law, np.zeros(len(prior) - 2)])
-        sizes = [(c, x) for one, own in zip(fit.candidates, fit.sizes, strict=True)
-                 for c, x in zip(one.components, own, strict=True)]  # fmt: skip
-        free = [sizes[i] for i in fit.free]
-        self.low = np.array([-np.inf] * 2 + [min(c.bounds[0] - x, 0.0) for c, x in free])
-        self.high = np.array([np.inf] * 2 + [max(c.bounds[1] - x, 0.0) for c, x in free])
+        prior = law_prior(fit.jacobian.shape[1])
+        self.information = self.weighted @ fit.jacobian + prior
+        free = [fit.parts[i] for i in fit.free]
+        self.pull = -prior @ np.concatenate([fit.law, np.zeros(len(free))])
+        self.low = np.array([-np.inf] * 2 + [min(component.bounds[0] - size, 0.0) for component, size in free])
+        self.high = np.array([np.inf] * 2 + [max(component.bounds[1] - size, 0.0) for component, size in free])
 
-    def room(self, table: Table, j: int) -> _Room:
-        """How far component `j` of a table may go."""
-        least, none = self._moved(self.fit.residual[None])
-        sides = [self._side(table, j, sizes, least[0], float(none[0])) for sizes in self._sizes(table, j)]
-        lowest = min(float(none[0]), *(float(side.squares.min()) for side in sides))
-        widest = max((side.widest(lowest + LIKELY) for side in sides), key=lambda one: one[1])
-        # Of the prior, as far as sizes are expected; whether the readings would show them does not matter here.
-        weights = [side.weights(table.candidate.components[j].typical()) for side in sides]
-        whole = sum(float(one.sum()) for one in weights)
-        gains = [np.exp(0.5 * (float(none[0]) - side.squares)) for side in sides]
-        mean = sum(float(w @ gain) for w, gain in zip(weights, gains, strict=True)) / whole
-        return _Room(table, j, *widest, mean)
+    def room(self, table: Table, j: int) -> tuple[Unexcluded, float]:
+        """How far component `j` of a table may go: of both signs the one at which it changes more.
+
+        And the mean of the likelihood over the prior of the size, 1 where the readings say nothing.
+        """
+        component = table.candidate.components[j]
+        least, squares = self._moved(self.fit.residual[None])
+        none, gain, mass = float(squares[0]), 0.0, 0.0
+        sides = []
+        for sizes in self._sizes(table, j):
+            every = np.zeros((len(sizes), len(table.candidate.components)))
+            every[:, j] = sizes
+            whole = self.problem.base_compliance if table.candidate.effect.is_instrument else self.compliance
+            change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
+            moves, squares = self._moved(self.fit.residual + change)
+            rest = change - (moves - least[0]) @ self.fit.jacobian.T
+            changes, lefts = (np.sqrt(np.mean(rows[:, self.tip] ** 2, axis=1)) for rows in (change, rest))
+            sides.append((sizes, changes, lefts, squares))
+            # Of the prior, as far as sizes are expected; whether the readings would show them does not matter here.
+            weights = np.exp(log_expected(changes) + log_usual(sizes, component.typical()))
+            weights *= np.abs(np.gradient(np.log(np.abs(sizes))))
+            gain, mass = gain + float(weights @ np.exp(0.5 * (none - squares))), mass + float(weights.sum())
+        most = min(none, *(float(squares.min()) for *_, squares in sides)) + LIKELY
+        size, rms, left = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
+        candidate, value = table.candidate, component.value(size)
+        return Unexcluded(candidate.effect, candidate, component.parameter, value, rms, left), gain / mass
 
     def _sizes(self, table: Table, j: int) -> Iterator[FloatArray]:
         """Sizes (g,) of each sign, rising."""
@@ -150,16 +132,6 @@ class _Beside:
             ends = np.minimum(np.array([SMALLEST, LARGEST]) / max(scale, 1e-300), component.reach(sign))
             yield sign * np.geomspace(min(ends[0], 0.1 * ends[1]), ends[1], SIZES)
 
-    def _side(self, table: Table, j: int, sizes: FloatArray, least: FloatArray, none: float) -> _Side:
-        """What sizes of one sign do; `least` (2 + p,) and `none` are the moves and squares without the effect."""
-        every = np.zeros((len(sizes), len(table.candidate.components)))
-        every[:, j] = sizes
-        whole = self.problem.base_compliance if table.candidate.effect.is_instrument else self.compliance
-        change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
-        moves, squares = self._moved(self.fit.residual + change)
-        left = change - (moves - least) @ self.fit.jacobian.T
-        return _Side(sizes, _rms(change[:, self.tip]), _rms(left[:, self.tip]), squares, none)
-
     def _moved(self, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Moves (g, 2 + p) of law and sizes that fit residuals (g, n) best, and the squares (g,) that are left."""
         gradient = residuals @ self.weighted.T + self.pull
@@ -170,37 +142,17 @@ class _Beside:
         return moves, squares + ((moves @ self.information) * moves).sum(axis=1)
 
 
-def _rms(rows: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt(np.mean(rows**2, axis=1)))
+def _widest(side: tuple[FloatArray, ...], none: float, most: float) -> tuple[float, float, float]:
+    """Size, rms and what is left at the largest size whose squares are at most `most`; between two by a line.
 
-
-@dataclass(frozen=True)
-class _Side:
-    """Sizes (g,) of one sign, rms change of each, rms left of it, squares; `none`: the squares without the effect."""
-
-    sizes: FloatArray
-    rms: FloatArray
-    left: FloatArray
-    squares: FloatArray
-    none: float
-
-    def widest(self, most: float) -> tuple[float, float, float]:
-        """Size, rms and what is left at the largest size whose squares are at most `most`; between two by a line."""
-        sizes, rms, left, squares = (
-            np.concatenate([[start], values])
-            for start, values in ((0.0, self.sizes), (0.0, self.rms), (0.0, self.left), (self.none, self.squares))
-        )
-        last = int(np.flatnonzero(squares <= most).max(initial=0))
-        if last + 1 == len(sizes):
-            return float(sizes[-1]), float(rms[-1]), float(left[-1])
-        share = (most - squares[last]) / (squares[last + 1] - squares[last])
-        share = float(np.clip(share, 0.0, 1.0))
-        at = [float(one[last] + share * (one[last + 1] - one[last])) for one in (sizes, rms, left)]
-        return at[0], at[1], at[2]
-
-    def weights(self, typical: tuple[float, float]) -> FloatArray:
-        """(g,) prior weights of the sizes, not normalised."""
-        return np.asarray(
-            np.exp(log_expected(self.rms) + log_usual(self.sizes, typical))
-            * np.abs(np.gradient(np.log(np.abs(self.sizes))))
-        )
+    `side`: the same and the squares of sizes (g,) of one sign; `none`: the squares at size 0.
+    """
+    figures = np.concatenate([[[0.0], [0.0], [0.0], [none]], np.array(side)], axis=1)
+    squares = figures[3]
+    last = int(np.flatnonzero(squares <= most).max(initial=0))
+    share = 0.0
+    if last + 1 < len(squares):
+        share = float(np.clip((most - squares[last]) / (squares[last + 1] - squares[last]), 0.0, 1.0))
+    further = figures[:3, min(last + 1, len(squares) - 1)]
+    size, rms, left = (figures[:3, last] + share * (further - figures[:3, last])).tolist()
+    return size, rms, left

@@ -23,16 +23,9 @@ from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
 LENGTH_TOLERANCE = 1e-12  # m, a few units in the last place of a strut's length
-
-
 MOST_STEPS = 50
-
-
 # Farthest step of Newton's method: beyond some tenths of a radian its linear model of a rotation is worthless.
-LARGEST_TURN = 0.3  # rad
-
-
-LARGEST_SHIFT = 0.5  # m
+LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.3  # m, rad
 
 
 @dataclass(frozen=True)
@@ -57,19 +50,16 @@ class Struts:
     def jacobian(self) -> FloatArray:
         """(n, 6, 6) rows [u_i, r_i x u_i]: strut elongation rates per twist of the tip."""
         r, u = self.arms, self.directions
-        found = np.empty((*u.shape[:-1], 6))
-        found[..., :3] = u
+        rows = np.empty((*u.shape[:-1], 6))
+        rows[..., :3] = u
         # On a few poses `np.cross` takes several times as long; the digits are the same.
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            found[..., 3 + i] = r[..., j] * u[..., k] - r[..., k] * u[..., j]
-        return found
+            rows[..., 3 + i] = r[..., j] * u[..., k] - r[..., k] * u[..., j]
+        return rows
 
 
 def solve_struts(
-    machine: Machine,
-    position: ArrayLike,
-    rotation: ArrayLike | None = None,
-    tool_length: ArrayLike = np.nan,
+    machine: Machine, position: ArrayLike, rotation: ArrayLike | None = None, tool_length: ArrayLike = np.nan
 ) -> Struts:
     """Lengths, directions and arms of the six struts.
 
@@ -100,26 +90,13 @@ def solve_struts(
     (1, 6, 6)
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
-    joints = platform_joints(machine, tool_length)
-    if rotation is None:
-        arms = np.broadcast_to(joints, (len(tip), 6, 3))
-    else:
-        arms = np.asarray(joints @ np.swapaxes(np.asarray(rotation, dtype=float), -1, -2))
-        arms = np.broadcast_to(arms, (len(tip), 6, 3))
+    joints = machine.platform_joints_for(tool_length)
+    if rotation is not None:
+        joints = np.asarray(joints @ np.swapaxes(np.asarray(rotation, dtype=float), -1, -2))
+    arms = np.broadcast_to(joints, (len(tip), 6, 3))
     struts = tip[:, None, :] + arms - machine.frame_joints
     lengths = np.sqrt(np.einsum("nij,nij->ni", struts, struts))
     return Struts(lengths=lengths, directions=struts / lengths[..., None], arms=arms)
-
-
-def platform_joints(machine: Machine, tool_length: ArrayLike = np.nan) -> FloatArray:
-    """(6, 3), or (n, 6, 3) for n tool lengths: platform joints relative to the tip, platform frame, m."""
-    length = np.asarray(tool_length, dtype=float)
-    if length.ndim == 0:
-        return machine.platform_joints_for(float(length))
-    extension = np.where(np.isnan(length), 0.0, length - machine.reference_tool_length)
-    shift = np.zeros((len(length), 1, 3))
-    shift[:, 0, 2] = extension
-    return machine.platform_joints + shift
 
 
 def solve_struts_at(machine: Machine, pose: ArrayLike) -> Struts:
@@ -133,9 +110,13 @@ def neutral_axes(machine: Machine) -> tuple[FloatArray, FloatArray]:
 
     They lie along the struts at the machine's neutral pose.
     """
-    neutral = machine.limits.neutral_pose
-    directions = solve_struts_at(machine, neutral).directions[0]
-    return directions, directions @ rotation_matrices(neutral[3:])
+
+    def axes() -> tuple[FloatArray, FloatArray]:
+        neutral = machine.limits.neutral_pose
+        directions = solve_struts_at(machine, neutral).directions[0]
+        return directions, directions @ rotation_matrices(neutral[3:])
+
+    return machine.once("neutral axes", axes)
 
 
 def joint_angles(machine: Machine, struts: Struts, rotation: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
@@ -147,11 +128,9 @@ def joint_angles(machine: Machine, struts: Struts, rotation: ArrayLike | None = 
         (n, 6) rad each.
     """
     frame_axes, platform_axes = neutral_axes(machine)
-    frame = _angle(struts.directions, frame_axes)
-    if rotation is None:
-        return frame, _angle(struts.directions, platform_axes)
-    turned = platform_axes @ np.swapaxes(np.asarray(rotation, dtype=float), -1, -2)
-    return frame, _angle(struts.directions, turned)
+    if rotation is not None:
+        platform_axes = platform_axes @ np.swapaxes(np.asarray(rotation, dtype=float), -1, -2)
+    return _angle(struts.directions, frame_axes), _angle(struts.directions, platform_axes)
 
 
 def _angle(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -167,9 +146,17 @@ def singularity_index(machine: Machine, struts: Struts) -> FloatArray:
     The determinant of the six strut screws does not depend on the point that moments are taken about, so
     neither tool length nor the choice of units enters the ratio.
     """
-    neutral = solve_struts_at(machine, machine.limits.neutral_pose)
     with np.errstate(divide="ignore", invalid="ignore"):  # singular at the neutral pose too: nan is out of reach
-        return np.asarray(np.abs(np.linalg.det(struts.jacobian)) / np.abs(np.linalg.det(neutral.jacobian[0])))
+        return np.asarray(np.abs(np.linalg.det(struts.jacobian)) / neutral_determinant(machine))
+
+
+def neutral_determinant(machine: Machine) -> float:
+    """|det J| at the neutral pose, m^3."""
+
+    def determinant() -> float:
+        return float(np.abs(np.linalg.det(solve_struts_at(machine, machine.limits.neutral_pose).jacobian[0])))
+
+    return machine.once("neutral determinant", determinant)
 
 
 def forward_kinematics(
@@ -225,11 +212,8 @@ def forward_kinematics(
     failed = np.flatnonzero(~(error < 1e3 * LENGTH_TOLERANCE))
     if len(failed):
         row = int(failed[0])
-        shown = ", ".join(f"{mm_from_m(v):.3f}" for v in wanted[row])
-        raise PoseError(
-            f"row {row + 1}: no pose near the start has struts of {shown} mm",
-            hint="check the lengths, or give a start nearer to the pose",
-        )
+        mistake = f"row {row + 1}: no pose near the start has struts of {_in_words(wanted[row])} mm"
+        raise PoseError(mistake, hint="check the lengths, or give a start nearer to the pose")
     return np.concatenate([position, roll_pitch_yaw(rotation)], axis=1)
 
 
@@ -240,8 +224,12 @@ def _check_lengths(lengths: FloatArray) -> None:
     bad = np.flatnonzero(~(np.isfinite(lengths) & (lengths > 0.0)).all(axis=1))
     if len(bad):
         row = int(bad[0])
-        shown = ", ".join(f"{mm_from_m(v):.3f}" for v in lengths[row])
-        raise PoseError(f"row {row + 1}: strut lengths {shown} mm", expected="six finite lengths above 0")
+        mistake = f"row {row + 1}: strut lengths {_in_words(lengths[row])} mm"
+        raise PoseError(mistake, expected="six finite lengths above 0")
+
+
+def _in_words(lengths: FloatArray) -> str:
+    return ", ".join(f"{mm_from_m(v):.3f}" for v in lengths)
 
 
 def _newton_step(jacobian: FloatArray, missing: FloatArray) -> FloatArray:

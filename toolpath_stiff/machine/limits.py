@@ -13,10 +13,12 @@ from toolpath_stiff.machine.kinematics import (
     Struts,
     joint_angles,
     neutral_axes,
+    neutral_determinant,
     singularity_index,
     solve_struts_at,
 )
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 # What limits bound: strut lengths, swing of the joints at frame and platform, the tool tip, the singularity index.
@@ -47,30 +49,35 @@ class Limit:
 
 def machine_limits(machine: Machine) -> tuple[Limit, ...]:
     """The finite limits of a machine, in the order of `reach`'s columns."""
-    return tuple(limit for limit in _all_limits(machine) if np.isfinite(limit.bound))
+    return _finite_limits(machine)[0]
+
+
+def _finite_limits(machine: Machine) -> tuple[tuple[Limit, ...], list[int]]:
+    """The finite limits, and which they are of all."""
+
+    def finite() -> tuple[tuple[Limit, ...], list[int]]:
+        everything = _all_limits(machine)
+        rows = [i for i, limit in enumerate(everything) if np.isfinite(limit.bound)]
+        return tuple(everything[i] for i in rows), rows
+
+    return machine.once("limits", finite)
 
 
 def _all_limits(machine: Machine) -> list[Limit]:
     limits = machine.limits
     low, high = limits.strut_length
     span = high - low if np.isfinite(high) else max(low, 1.0)
-    found: list[Limit] = []
-    for i in range(6):
-        found += [
-            Limit(f"strut{i + 1} min length", STRUT, low, True, span, "mm"),
-            Limit(f"strut{i + 1} max length", STRUT, high, False, span, "mm"),
-        ]
+    bounds: list[Limit] = []
+    for i in range(1, 7):
+        bounds.append(Limit(f"strut{i} min length", STRUT, low, True, span, "mm"))
+        bounds.append(Limit(f"strut{i} max length", STRUT, high, False, span, "mm"))
     for quantity, angle in ((FRAME, limits.frame_joint_angle), (PLATFORM, limits.platform_joint_angle)):
-        found += [Limit(f"{quantity} joint{i + 1} angle", quantity, angle, False, angle, "deg") for i in range(6)]
-    lower, upper = limits.workspace
-    for axis, lo, hi in zip(AXES, lower, upper, strict=True):
+        bounds += [Limit(f"{quantity} joint{i} angle", quantity, angle, False, angle, "deg") for i in range(1, 7)]
+    for axis, lo, hi in zip(AXES, *limits.workspace.tolist(), strict=True):
         both = hi - lo if np.isfinite(hi - lo) else 1.0
-        found += [
-            Limit(f"workspace {axis} min", axis, float(lo), True, float(both), "mm"),
-            Limit(f"workspace {axis} max", axis, float(hi), False, float(both), "mm"),
-        ]
-    found.append(Limit("singularity", SINGULARITY, limits.singularity, True, 1.0 - limits.singularity, ""))
-    return found
+        bounds.append(Limit(f"workspace {axis} min", axis, lo, True, both, "mm"))
+        bounds.append(Limit(f"workspace {axis} max", axis, hi, False, both, "mm"))
+    return [*bounds, Limit("singularity", SINGULARITY, limits.singularity, True, 1.0 - limits.singularity, "")]
 
 
 @dataclass(frozen=True)
@@ -146,131 +153,75 @@ def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: Array
     'workspace z max needs 3000.000 mm, limit 1700.000 mm, 1300.000 mm beyond'
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
-    frame, platform = joint_angles(machine, struts, rotation)
-    columns = np.concatenate(
-        [
-            np.repeat(struts.lengths, 2, axis=1),
-            frame,
-            platform,
-            np.repeat(tip, 2, axis=1),
-            singularity_index(machine, struts)[:, None],
-        ],
-        axis=1,
-    )
-    everything = _all_limits(machine)
-    finite = [i for i, limit in enumerate(everything) if np.isfinite(limit.bound)]
-    limits = tuple(everything[i] for i in finite)
+    limits, finite = _finite_limits(machine)
     if not limits:
         nothing = np.full(len(tip), np.inf)
         return Reach(nothing, np.zeros(len(tip), dtype=np.int64), nothing, ())
-    values = columns[:, finite]
-    bound = np.array([limit.bound for limit in limits])
+    frame, platform = joint_angles(machine, struts, rotation)
+    lengths, tips = np.repeat(struts.lengths, 2, axis=1), np.repeat(tip, 2, axis=1)
+    index = singularity_index(machine, struts)[:, None]
+    values = np.concatenate([lengths, frame, platform, tips, index], axis=1)[:, finite]
+    bound, span = (np.array([getattr(limit, name) for limit in limits]) for name in ("bound", "span"))
     sign = np.array([1.0 if limit.lower else -1.0 for limit in limits])
-    span = np.array([limit.span for limit in limits])
     margins = sign * (values - bound) / span
     worst = np.argmin(margins, axis=1)
     rows = np.arange(len(tip))
     return Reach(margins[rows, worst], worst, values[rows, worst], limits)
 
 
+def stand(machine: Machine, pose: ArrayLike) -> tuple[FloatArray, Struts, Reach]:
+    """A pose (6,), m and rad, the struts there, and how it stands to the limits."""
+    values = np.asarray(pose, dtype=float)
+    struts = solve_struts_at(machine, values)
+    return values, struts, reach(machine, values[:3], struts, rotation_matrices(values[None, 3:]))
+
+
 # A cosine above this is no measure of an angle: rounding moves the arc cosine by more than 1e-15 rad.
 NEARLY_ONE = 0.98
 
 
-@dataclass(frozen=True)
-class Gauge:
-    """The limits of a machine prepared for poses whose strut lengths and determinants are known already.
+@dataclass
+class Extremes:
+    """The values of n poses that come nearest to a limit, found once for each kind of limit.
 
-    It gives what `reach` gives, for the extreme strut and the extreme joint alone: a kernel of the stiffness has both
-    lengths and determinants, and reach by itself takes ten times as long.
+    It gives what `reach` gives of poses whose strut lengths and determinants are known already: a kernel of the
+    stiffness has both, and reach by itself takes ten times as long.
 
     Attributes
     ----------
     machine
         The machine.
-    limits
-        All its finite limits, as `machine_limits`.
-    distinct
-        Of each quantity and side one limit, and the columns of `limits` that are of its kind.
-    axes
-        Neutral axes of the frame joints and of the platform joints, as `neutral_axes`.
+    position
+        (3, n) m, tool tip; poses last, as in all of these.
+    lengths
+        (6, n) m.
     determinant
-        |det J| at the neutral pose, m^3.
+        (n,) |det J|, m^3.
+    rotation
+        (9, n) rows of the rotation matrices one after the other; None: vertical.
+    tool
+        m, length of the tool; nan: the reference tool.
     """
 
     machine: Machine
-    limits: tuple[Limit, ...]
-    distinct: tuple[tuple[Limit, IntArray], ...]
-    axes: tuple[FloatArray, FloatArray]
-    determinant: float
-
-    @cached_property
-    def by_span(self) -> list[tuple[float, list[Limit]]]:
-        """The distinct limits whose margins are counted in the same span."""
-        return [
-            (span, [limit for limit, _ in self.distinct if limit.span == span])
-            for span in dict.fromkeys(limit.span for limit, _ in self.distinct)
-        ]
-
-    def reach(
-        self,
-        position: FloatArray,
-        lengths: FloatArray,
-        determinant: FloatArray,
-        rotation: FloatArray | None,
-        tool: float,
-    ) -> tuple[Reach, BoolArray]:
-        """How n poses with one tool stand to the limits.
-
-        Parameters
-        ----------
-        position
-            (3, n) m, tool tip; poses last, as in all of these.
-        lengths
-            (6, n) m.
-        determinant
-            (n,) |det J|, m^3.
-        rotation
-            (9, n) rows of the rotation matrices one after the other; None: vertical.
-        tool
-            m, length of the tool; nan: the reference tool.
-
-        Returns
-        -------
-        reach, sure
-            As of `reach`; (n,) false where an angle too small for its cosine decides, and `reach` must be asked.
-        """
-        n = position.shape[1]
-        extremes = Extremes(self, position, lengths, determinant, rotation, tool)
-        margin, value, which = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
-        for number, (limit, _) in enumerate(self.distinct):
-            found = extremes.of(limit)
-            apart = limit.margin(found)
-            nearer = apart < margin
-            np.copyto(margin, apart, where=nearer)
-            np.copyto(value, found, where=nearer)
-            which[nearer] = number
-        column, sure = np.zeros(n, dtype=np.int64), np.ones(n, dtype=bool)
-        for number, (limit, columns) in enumerate(self.distinct):
-            rows = np.flatnonzero(which == number)
-            column[rows] = columns[0] if len(columns) == 1 else columns[extremes.strut(limit, rows)]
-            if limit.quantity in (FRAME, PLATFORM):
-                sure[rows] = value[rows] > np.arccos(NEARLY_ONE)
-        return Reach(margin, column, value, self.limits), sure
-
-
-@dataclass
-class Extremes:
-    """The values of n poses that come nearest to a limit, found once for each kind of limit; arguments of `Gauge`."""
-
-    gauge: Gauge
     position: FloatArray
     lengths: FloatArray
     determinant: FloatArray
     rotation: FloatArray | None
     tool: float
-    cosines: dict[str, FloatArray] = field(default_factory=dict)
-    angles: dict[str, FloatArray] = field(default_factory=dict)
+    joints: dict[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+
+    @cached_property
+    def kinds(self) -> list[tuple[Limit, IntArray]]:
+        """Of each quantity and side one limit, and the columns of the machine's limits that are of its kind."""
+
+        def kinds() -> list[tuple[Limit, IntArray]]:
+            limits = machine_limits(self.machine)
+            names = [(limit.quantity, limit.lower) for limit in limits]
+            columns = {name: np.flatnonzero([name == other for other in names]) for name in names}
+            return [(limits[where[0]], where) for where in columns.values()]
+
+        return self.machine.once("kinds of limits", kinds)
 
     @cached_property
     def shortest(self) -> FloatArray:
@@ -283,65 +234,77 @@ class Extremes:
         return np.asarray(self.lengths.max(axis=0))
 
     @cached_property
+    def singularity(self) -> FloatArray:
+        """(n,) singularity index."""
+        return np.asarray(self.determinant / neutral_determinant(self.machine))
+
+    @cached_property
     def margin(self) -> FloatArray:
         """(n,) smallest margin to any limit, inf without limits."""
         n = self.position.shape[1]
         margin, nearest, apart = np.full(n, np.inf), np.empty(n), np.empty(n)
-        for span, limits in self.gauge.by_span:  # as `Limit.margin`, but divided once
+        for span in dict.fromkeys(limit.span for limit, _ in self.kinds):  # as `Limit.margin`, but divided once
             nearest.fill(np.inf)
-            for limit in limits:
+            for limit in (limit for limit, _ in self.kinds if limit.span == span):
                 value = self.of(limit)
-                if limit.lower:
-                    np.subtract(value, limit.bound, out=apart)
-                else:
-                    np.subtract(limit.bound, value, out=apart)
+                np.subtract(value if limit.lower else limit.bound, limit.bound if limit.lower else value, out=apart)
                 np.minimum(nearest, apart, out=nearest)
             nearest /= span
             np.minimum(margin, nearest, out=margin)
         return margin
+
+    def reach(self) -> tuple[Reach, BoolArray]:
+        """As of `reach`; (n,) false where an angle too small for its cosine decides, and `reach` must be asked."""
+        n = self.position.shape[1]
+        margin, value, which = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
+        for number, (limit, _) in enumerate(self.kinds):
+            apart = limit.margin(self.of(limit))
+            nearer = apart < margin
+            np.copyto(margin, apart, where=nearer)
+            which[nearer] = number
+        column, sure = np.zeros(n, dtype=np.int64), np.ones(n, dtype=bool)
+        for number, (limit, columns) in enumerate(self.kinds):
+            rows = np.flatnonzero(which == number)
+            if len(rows):
+                value[rows] = self.of(limit)[rows]
+                column[rows] = columns[0] if len(columns) == 1 else columns[self._strut(limit, rows)]
+                if limit.quantity in (FRAME, PLATFORM):
+                    sure[rows] = value[rows] > np.arccos(NEARLY_ONE)
+        value[margin == np.inf] = np.inf
+        return Reach(margin, column, value, machine_limits(self.machine)), sure
 
     def of(self, limit: Limit) -> FloatArray:
         """(n,) the extreme values of a limit's quantity."""
         if limit.quantity == STRUT:
             return self.shortest if limit.lower else self.longest
         if limit.quantity in (FRAME, PLATFORM):
-            return self._angle(limit.quantity)
+            return self._joints(limit.quantity)[1]
         if limit.quantity == SINGULARITY:
-            return np.asarray(self.determinant / self.gauge.determinant)
+            return self.singularity
         return np.asarray(self.position[AXES.index(limit.quantity)])
 
-    def strut(self, limit: Limit, rows: IntArray) -> IntArray:
+    def _strut(self, limit: Limit, rows: IntArray) -> IntArray:
         """(k,) the strut or joint that has the extreme value, of some poses; the first of several."""
-        values = self.lengths if limit.quantity == STRUT else self._cosine(limit.quantity)
+        values = self.lengths if limit.quantity == STRUT else self._joints(limit.quantity)[0]
         some = np.ascontiguousarray(values[:, rows].T)
         lowest = limit.lower or limit.quantity != STRUT  # the smallest cosine is the largest angle
         return np.asarray(some.argmin(axis=1) if lowest else some.argmax(axis=1))
 
-    def _angle(self, quantity: str) -> FloatArray:
-        """(n,) rad, the largest angle of the frame's or the platform's joints."""
-        name = self._name(quantity)
-        if name not in self.angles:
-            smallest = self._cosine(quantity).min(axis=0)
-            self.angles[name] = np.arccos(np.clip(smallest, -1.0, 1.0, out=smallest), out=smallest)
-        return self.angles[name]
-
-    def _name(self, quantity: str) -> str:
-        """The joints whose angles are those of a quantity's."""
-        axes = self.gauge.axes
-        return FRAME if self.rotation is None and bool((axes[0] == axes[1]).all()) else quantity
-
-    def _cosine(self, quantity: str) -> FloatArray:
-        """(6, n) cosines of the angles of the frame's or the platform's joints."""
-        name = self._name(quantity)
-        if name not in self.cosines:
-            along = self._along_axes(self.gauge.axes[name == PLATFORM], name == PLATFORM)
-            self.cosines[name] = np.divide(along, self.lengths, out=along)
-        return self.cosines[name]
+    def _joints(self, quantity: str) -> tuple[FloatArray, FloatArray]:
+        """(6, n) cosines of the angles of the frame's or the platform's joints, and (n,) rad, the largest angle."""
+        frame, platform = neutral_axes(self.machine)
+        name = FRAME if self.rotation is None and bool((frame == platform).all()) else quantity
+        if name not in self.joints:
+            along = self._along_axes(platform if name == PLATFORM else frame, name == PLATFORM)
+            cosines = np.divide(along, self.lengths, out=along)
+            smallest = cosines.min(axis=0)
+            self.joints[name] = cosines, np.arccos(np.clip(smallest, -1.0, 1.0, out=smallest), out=smallest)
+        return self.joints[name]
 
     def _along_axes(self, axes: FloatArray, of_platform: bool) -> FloatArray:
         """(6, n) m, components of the struts R p + tip - b along the joints' neutral axes."""
-        machine, position, turns = self.gauge.machine, self.position, self.rotation
-        arms, frame = machine.platform_joints_for(self.tool), machine.frame_joints
+        position, turns = self.position, self.rotation
+        arms, frame = self.machine.platform_joints_for(self.tool), self.machine.frame_joints
         if turns is None:
             return np.asarray(product(axes, position) + ((arms - frame) * axes).sum(axis=1)[:, None])
         if of_platform:  # the axes turn with the platform: (R a) . (R p + tip - b)
@@ -350,19 +313,3 @@ class Extremes:
             return np.asarray(product(axes, local) - fixed + (axes * arms).sum(axis=1)[:, None])
         turned = product((axes[:, :, None] * arms[:, None]).reshape(6, 9), turns)
         return np.asarray(product(axes, position) + turned - (axes * frame).sum(axis=1)[:, None])
-
-
-def gauge_of(machine: Machine) -> Gauge:
-    """The gauge of a machine, made once."""
-    return machine.once("gauge", lambda: _gauge(machine))
-
-
-def _gauge(machine: Machine) -> Gauge:
-    limits = machine_limits(machine)
-    kinds = [(limit.quantity, limit.lower) for limit in limits]
-    distinct = tuple(
-        (limits[kinds.index(kind)], np.flatnonzero([kind == other for other in kinds])) for kind in dict.fromkeys(kinds)
-    )
-    neutral = solve_struts_at(machine, machine.limits.neutral_pose)
-    determinant = float(np.abs(np.linalg.det(neutral.jacobian[0])))
-    return Gauge(machine, limits, distinct, neutral_axes(machine), determinant)

@@ -15,29 +15,26 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import MachineFileError
-from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
 SETP = re.compile(r"^\s*setp\s+genhexkins\.(\S+?)\s*(?:=\s*|\s+)(\S+)\s*$")
-JOINT = re.compile(r"(base|platform)\.([0-5])\.([xyz])$")
 KNOWN = re.compile(
     r"((base|platform)(-n)?\.[0-5]\.[xyz]|tool-offset|spindle-offset|screw-lead|"
-    r"convergence-criterion|limit-iterations|max-error|tool-offset)$"
+    r"convergence-criterion|limit-iterations|max-error)$"
 )
 UNITS_MM = {"mm": 1.0, "inch": MM_PER_INCH}
+SAME_UNIT = {"mm": "mm", "metric": "mm", "inch": "inch", "in": "inch", "imperial": "inch"}
 # Struts of a screw about 40 mm thick; LinuxCNC knows no stiffness.
 ASSUMED_STIFFNESS = n_per_m_from_n_per_um(50.0)
 
 
 def units_of(hal: Path) -> str | None:
     """`mm` or `inch` from LINEAR_UNITS of the ini files beside a HAL file; None if they do not agree or say."""
-    found = set()
-    for ini in sorted(hal.parent.glob("*.ini")):
-        text = ini.read_text(encoding="utf-8", errors="replace")
-        for value in re.findall(r"^\s*LINEAR_UNITS\s*=\s*(\w+)", text, flags=re.MULTILINE):
-            found.add({"mm": "mm", "metric": "mm", "inch": "inch", "in": "inch", "imperial": "inch"}.get(value.lower()))
-    return found.pop() if len(found) == 1 else None
+    texts = (ini.read_text(encoding="utf-8", errors="replace") for ini in sorted(hal.parent.glob("*.ini")))
+    words = (word for text in texts for word in re.findall(r"(?m)^\s*LINEAR_UNITS\s*=\s*(\w+)", text))
+    units = {SAME_UNIT.get(word.lower()) for word in words}
+    return units.pop() if len(units) == 1 else None
 
 
 def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tuple[Machine, list[str]]:
@@ -62,35 +59,29 @@ def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tup
     InputError
         A pin is missing, set twice, unknown, or its value is no number.
     """
-    scale = UNITS_MM[units]
     values = _read_pins(text, file)
-    missing = [
-        f"genhexkins.{part}.{n}.{axis}"
-        for part in ("base", "platform")
-        for n in range(6)
-        for axis in "xyz"
-        if f"{part}.{n}.{axis}" not in values
-    ]
+    names = np.array([[[f"{part}.{n}.{axis}" for axis in "xyz"] for n in range(6)] for part in ("base", "platform")])
+    missing = [f"genhexkins.{name}" for name in names.flat if name not in values]
+    if len(missing) == names.size:
+        raise MachineFileError("sets no genhexkins joints", expected="a HAL file with setp genhexkins...", file=file)
     if missing:
-        raise MachineFileError(
-            f"{len(missing)} joint pins are not set, first {missing[0]}",
-            expected="setp genhexkins.base.N.x|y|z and genhexkins.platform.N.x|y|z for N = 0 to 5",
-            file=file,
-        )
-
-    def joints(part: str) -> FloatArray:
-        rows = [[values[f"{part}.{n}.{axis}"] for axis in "xyz"] for n in range(6)]
-        return m_from_mm(np.array(rows) * scale)
-
+        mistake = f"{len(missing)} joint pins are not set, first {missing[0]}"
+        expected = "setp genhexkins.base.N.x|y|z and genhexkins.platform.N.x|y|z for N = 0 to 5"
+        raise MachineFileError(mistake, expected=expected, file=file)
+    scale = UNITS_MM[units]
+    joints = m_from_mm(np.vectorize(values.__getitem__)(names) * scale)
     offset = m_from_mm((values.get("tool-offset", 0.0) + values.get("spindle-offset", 0.0)) * scale)
     notes = []
     if offset:
         notes.append(f"{mm_from_m(offset):g} mm (tool-offset plus spindle-offset) are added to Z of all joints")
     if any(name.startswith(("base-n", "platform-n")) or name == "screw-lead" for name in values):
         notes.append("screw-lead and the joint normals correct strut lengths for the turning screw; left out")
-    shift = np.array([0.0, 0.0, offset])
-    machine, more = _with_assumptions(joints("base") + shift, joints("platform") + shift, file)
-    return machine, notes + more
+    notes.append(
+        "strut stiffness, travel, joint angles, workspace, tool length and default origin are assumed from the "
+        "machine's size: edit them"
+    )
+    frame, platform = joints + np.array([0.0, 0.0, offset])
+    return _with_assumptions(frame, platform, file), notes
 
 
 def _read_pins(text: str, file: str) -> dict[str, float]:
@@ -100,55 +91,50 @@ def _read_pins(text: str, file: str) -> dict[str, float]:
         if not match:
             continue
         pin, raw = match.groups()
-        if not KNOWN.match(pin):
-            raise MachineFileError(f"genhexkins has no pin {pin!r}", file=file, line=number)
-        if pin in values:
-            raise MachineFileError(f"genhexkins.{pin} is set twice", file=file, line=number)
+        mistake, expected = f"genhexkins.{pin} = {raw!r}", ""
         try:
-            values[pin] = float(raw)
+            value = float(raw)
         except ValueError:
-            raise MachineFileError(
-                f"genhexkins.{pin} = {raw!r}", expected="a number (variables are not read)", file=file, line=number
-            ) from None
-        if not np.isfinite(values[pin]):
-            raise MachineFileError(f"genhexkins.{pin} = {raw!r}", expected="a finite number", file=file, line=number)
-    if not any(JOINT.match(pin) for pin in values):
-        raise MachineFileError("sets no genhexkins joints", expected="a HAL file with setp genhexkins...", file=file)
+            value, expected = np.inf, "a number (variables are not read)"
+        if not KNOWN.match(pin):
+            mistake = f"genhexkins has no pin {pin!r}"
+        elif pin in values:
+            mistake = f"genhexkins.{pin} is set twice"
+        elif np.isfinite(value):
+            values[pin] = value
+            continue
+        else:
+            expected = expected or "a finite number"
+        raise MachineFileError(mistake, expected=expected, file=file, line=number)
     return values
 
 
-def _with_assumptions(frame: FloatArray, platform: FloatArray, file: str) -> tuple[Machine, list[str]]:
+def _with_assumptions(frame: FloatArray, platform: FloatArray, file: str) -> Machine:
     """Limits and stiffness that LinuxCNC does not know, from the machine's own size."""
     size = float(np.linalg.norm(frame[:, :2], axis=1).mean())
     height = float(frame[:, 2].mean() + 0.87 * size)  # struts then lean by about 45 degrees
     neutral = (0.0, 0.0, height, 0.0, 0.0, 0.0)
-    machine = Machine(
+    struts = platform + np.array(neutral[:3]) - frame
+    middle = float(np.sqrt(np.einsum("ij,ij->i", struts, struts)).mean())
+    travel = (0.7 * middle, 1.4 * middle)
+    name = Path(file).name
+    return Machine(
         name=Path(file).stem,
-        title=f"hexapod of {Path(file).name}",
-        source=f"genhexkins pins of {Path(file).name}",
+        title=f"hexapod of {name}",
+        source=f"genhexkins pins of {name}",
         frame_joints=frame,
         platform_joints=platform,
         reference_tool_length=0.0,
-        strut_law=StrutLaw(0.5 * size, ASSUMED_STIFFNESS, 2.0 * size, ASSUMED_STIFFNESS),
-        limits=Limits(neutral_pose=neutral),
+        strut_law=StrutLaw(travel[0], ASSUMED_STIFFNESS, travel[1], ASSUMED_STIFFNESS),
+        limits=Limits(
+            strut_length=travel,
+            frame_joint_angle=rad_from_deg(45.0),
+            platform_joint_angle=rad_from_deg(45.0),
+            workspace=np.array([[-size, -size, height - 0.5 * size], [size, size, height + 0.5 * size]]),
+            singularity=0.1,
+            neutral_pose=neutral,
+        ),
         default_origin=neutral,
-    )
-    middle = float(solve_struts_at(machine, neutral).lengths.mean())
-    limits = Limits(
-        strut_length=(0.7 * middle, 1.4 * middle),
-        frame_joint_angle=rad_from_deg(45.0),
-        platform_joint_angle=rad_from_deg(45.0),
-        workspace=np.array([[-size, -size, height - 0.5 * size], [size, size, height + 0.5 * size]]),
-        singularity=0.1,
-        neutral_pose=neutral,
-    )
-    origins = {"frame_joints": "published", "platform_joints": "published"}
-    return machine.with_changes(
-        limits=limits,
-        strut_law=StrutLaw(0.7 * middle, ASSUMED_STIFFNESS, 1.4 * middle, ASSUMED_STIFFNESS),
-        origins=origins,
+        origins={"frame_joints": "published", "platform_joints": "published"},
         remarks={"strut_law": "LinuxCNC knows no stiffness; set your own"},
-    ), [
-        "strut stiffness, travel, joint angles, workspace, tool length and default origin are assumed from the "
-        "machine's size: edit them"
-    ]
+    )

@@ -13,21 +13,19 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import EffectError, InputError, MachineFileError
-from toolpath_stiff.toml_reader import TomlReader
+from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
 
 Derived = TypeVar("Derived")
 ORIGINS = ("published", "recovered", "assumed", "fitted")
 
-UNCERTAINTY_KEYS = ("parameters", "sd", "correlation")
 STRUT_LAW = ("strut_law.stiffness_1_N_per_um", "strut_law.stiffness_2_N_per_um")
 CONSTANT_LAW = ("strut_law.stiffness_N_per_um",)
 NO_END = 1e3  # m, the room of a law that holds at every length: finite, because a search takes differences of it
-NOT_NEGATIVE = -1e-8  # smallest eigenvalue of a correlation matrix that rounding in a file may leave
 
 
 @dataclass(frozen=True)
@@ -75,6 +73,11 @@ class StrutLaw:
     def parameters(self) -> tuple[str, ...]:
         """Names of its free constants, as `[uncertainty]` of a machine file has them."""
         return CONSTANT_LAW if self.constant else STRUT_LAW
+
+    def moved(self, name: str, change: float) -> StrutLaw:
+        """The law with `change`, in the unit of the key, added to one of its `parameters`."""
+        key = "stiffness_2" if name == STRUT_LAW[1] else "stiffness_1"
+        return replace(self, **{key: getattr(self, key) + n_per_m_from_n_per_um(change)})
 
     @property
     def points(self) -> list[tuple[float, float]]:
@@ -150,15 +153,15 @@ class StrutLaw:
         return np.asarray(self.room(length) < 0.0)
 
 
-def _piecewise(at: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
+def _piecewise(position: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
     """Linear between values (p,) at rising knots (p,), at positions of any shape; the end pieces go on outside."""
-    i = _segment(at, knots)
+    i = _segment(position, knots)
     slope = (values[1:] - values[:-1]) / (knots[1:] - knots[:-1])
-    return np.asarray(values[i] + slope[i] * (at - knots[i]))
+    return np.asarray(values[i] + slope[i] * (position - knots[i]))
 
 
-def _segment(at: FloatArray, knots: FloatArray) -> IntArray:
-    return np.asarray(np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2))
+def _segment(position: FloatArray, knots: FloatArray) -> IntArray:
+    return np.asarray(np.clip(np.searchsorted(knots, position, side="right") - 1, 0, len(knots) - 2))
 
 
 @dataclass(frozen=True)
@@ -274,15 +277,16 @@ class Machine:
         derived: Derived = known[key]
         return derived
 
-    def platform_joints_for(self, tool_length: float) -> FloatArray:
-        """(6, 3) m, platform joints relative to the tip of a tool of that length; nan: the reference tool.
+    def platform_joints_for(self, tool_length: ArrayLike) -> FloatArray:
+        """(6, 3) m, or (n, 6, 3) for n lengths: platform joints relative to the tip of such a tool, nan: of reference.
 
         A longer tool puts the joints further above the tip, along the spindle axis.
         """
-        if np.isnan(tool_length):
+        length = np.asarray(tool_length, dtype=float)
+        if length.ndim == 0 and np.isnan(length):
             return self.platform_joints
-        shift = np.array([0.0, 0.0, tool_length - self.reference_tool_length])
-        return np.asarray(self.platform_joints + shift)
+        extension = np.where(np.isnan(length), 0.0, length - self.reference_tool_length)
+        return np.asarray(self.platform_joints + extension[..., None, None] * np.array([0.0, 0.0, 1.0]))
 
     def with_changes(self, **changes: Any) -> Machine:
         """A copy with some attributes replaced."""
@@ -333,90 +337,3 @@ class Uncertainty:
         correlation[:count, :count] = self.correlation
         correlation[count:, count:] = other.correlation
         return Uncertainty(self.names + other.names, np.concatenate([self.sd, other.sd]), correlation)
-
-
-def with_parameter(machine: Machine, name: str, change: float) -> Machine:
-    """The machine with `change` added to one of its fitted parameters, in the unit of the key.
-
-    Raises `InputError` if the machine has no such parameter.
-    """
-    law = machine.strut_law
-    if name in law.parameters:
-        values = [law.stiffness_1, law.stiffness_2]
-        values[law.parameters.index(name)] += n_per_m_from_n_per_um(change)
-        return machine.with_changes(strut_law=replace(law, stiffness_1=values[0], stiffness_2=values[1]))
-    owner, _, key = name.partition(".")
-    for kind in ("effects", "instruments"):
-        entries = list(getattr(machine, kind))
-        for i, entry in enumerate(entries):
-            if entry.name == owner and key in entry.parameters:
-                moved = {**entry.parameters, key: entry.parameters[key] + change}
-                entries[i] = replace(entry, parameters=moved)
-                return machine.with_changes(**{kind: tuple(entries)})
-    raise MachineFileError(f"machine {machine.name} has no parameter {name!r}")
-
-
-def read_uncertainty(toml: TomlReader, law: StrutLaw, entries: Sequence[EffectEntry]) -> Uncertainty | None:
-    """`[uncertainty]` of a machine file, checked; None where there is none. Raises `InputError`."""
-    table = toml.data.get("uncertainty")
-    if table is None:
-        return None
-    if not isinstance(table, Mapping):
-        raise _fail(toml, "", f" = {table!r}", "a section [uncertainty]")
-    for key in table:
-        if key not in UNCERTAINTY_KEYS:
-            raise _fail(toml, key, ": unknown key", f"one of {', '.join(UNCERTAINTY_KEYS)}")
-    for key in UNCERTAINTY_KEYS:
-        if key not in table:
-            raise _fail(toml, key, " is missing", "parameters, sd and correlation")
-    known = [*law.parameters, *(f"{entry.name}.{key}" for entry in entries for key in entry.parameters)]
-    names = _parameters(toml, table["parameters"], known)
-    return Uncertainty(names, _deviations(toml, table["sd"], len(names)), _correlation(toml, table, len(names)))
-
-
-def _fail(toml: TomlReader, key: str, found: str, expected: str) -> InputError:
-    line = toml.line_of("uncertainty", key)
-    return MachineFileError(f"{f'[uncertainty] {key}'.strip()}{found}", expected=expected, file=toml.file, line=line)
-
-
-def _parameters(toml: TomlReader, names: Any, known: Sequence[str]) -> tuple[str, ...]:
-    """The names of the parameters, each once, each of the machine file."""
-    if not isinstance(names, list) or not names or len(set(map(str, names))) != len(names):
-        raise _fail(toml, "parameters", f" = {names!r}", "a list of parameters, each once")
-    for name in names:
-        if name not in known:
-            found = f": {name!r} is not a parameter of this file"
-            raise _fail(toml, "parameters", found, f"one of {', '.join(known)}")
-    return tuple(names)
-
-
-def _deviations(toml: TomlReader, raw: Any, count: int) -> FloatArray:
-    sd = _numbers(raw)
-    if sd is None or sd.shape != (count,) or not (np.isfinite(sd).all() and (sd >= 0.0).all()):
-        raise _fail(toml, "sd", "", f"{count} numbers, 0 or more, one a parameter")
-    return sd
-
-
-def _correlation(toml: TomlReader, table: Mapping[str, Any], count: int) -> FloatArray:
-    found = _numbers(table["correlation"])
-    if found is None or found.shape != (count, count) or not _is_correlation(found):
-        expected = f"{count} rows of {count} numbers: symmetric, ones on the diagonal, a correlation"
-        raise _fail(toml, "correlation", "", expected)
-    return found
-
-
-def _numbers(raw: Any) -> FloatArray | None:
-    try:
-        array = np.array(raw, dtype=float)
-    except (ValueError, TypeError):
-        return None
-    return array
-
-
-def _is_correlation(matrix: FloatArray) -> bool:
-    return bool(
-        np.isfinite(matrix).all()
-        and np.allclose(np.diag(matrix), 1.0, rtol=0.0, atol=1e-9)
-        and np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9)
-        and np.linalg.eigvalsh(matrix)[0] >= NOT_NEGATIVE
-    )

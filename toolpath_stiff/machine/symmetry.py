@@ -20,17 +20,12 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import mm_from_m
 
 Pairing = tuple[int, ...]  # strut i goes over into strut pairing[i]
-
+Onto = Callable[[FloatArray], FloatArray]  # where joints (k, 3) go over to
+Fit = Callable[[FloatArray, FloatArray], Onto]  # what takes joints (k, 3) best to others
 
 FOLLOWS = 0.01  # of the body's size: joints this close to where the symmetry puts them follow it (tolerances, recovery)
-
-
 SAME = 1e-5  # m: fits that differ by less are as good
-
-
 APART = 0.03  # of it: a joint this far off stands apart
-
-
 THIRD = np.array([[-0.5, -np.sqrt(0.75)], [np.sqrt(0.75), -0.5]])
 
 
@@ -95,34 +90,27 @@ class Symmetry:
 def find_symmetry(machine: Machine) -> Symmetry:
     """The symmetry that the most joints follow, the one that fits them best; see the module."""
     bodies = {"frame": machine.frame_joints, "platform": machine.platform_joints}
-    found: list[tuple[tuple[int, int, int, int], Symmetry]] = []
+    ranked: list[tuple[tuple[int, int, int, int], Symmetry]] = []
     for kind, pairing, fit in _candidates():
-        strays: list[Stray] = []
-        worst, doubt = 0.0, 0
-        for body, joints in bodies.items():
-            body_fit = _follow(body, joints, pairing, fit)
-            if body_fit is None:
-                break
-            stray, distance = body_fit
-            worst = max(worst, distance)
-            if stray is not None:
-                strays.append(stray)
-                doubt += stray.instead_of is not None
-        else:
+        followed = [_follow(body, joints, pairing, fit) for body, joints in bodies.items()]
+        strays = [stray for part in followed if part is not None for stray in part[0]]
+        if None not in followed:
+            worst = max(part[1] for part in followed if part is not None)
+            doubt = sum(stray.instead_of is not None for stray in strays)
             # Where two joints could be exchanged as well, the struts of equal length are the ones that were meant.
             rank = (len(strays), doubt, round(worst / SAME), round(_spread(machine, strays) / SAME))
-            found.append((rank, Symmetry(kind, tuple(strays), worst)))
-    if not found:
+            ranked.append((rank, Symmetry(kind, tuple(strays), worst)))
+    if not ranked:
         return Symmetry("")
-    rank, best = min(found, key=lambda item: item[0])
-    rivals = [other for same, other in found if same == rank]
-    return replace(best, strays=tuple(_with_rival(stray, rivals) for stray in best.strays))
+    rank, best = min(ranked, key=lambda item: item[0])
+    rivals = [stray for same, other in ranked if same == rank for stray in other.strays]
 
+    def with_rival(stray: Stray) -> Stray:
+        """The same, with the joint that may as well be the wrong one: struts that share a point can be renumbered."""
+        others = [rival.joint for rival in rivals if rival.body == stray.body and rival.joint != stray.joint]
+        return replace(stray, instead_of=others[0]) if others and stray.instead_of is None else stray
 
-def _with_rival(stray: Stray, rivals: list[Symmetry]) -> Stray:
-    """The same, with the joint that may as well be the wrong one (struts that share a point can be numbered anew)."""
-    others = [o.joint for rival in rivals for o in rival.strays if o.body == stray.body and o.joint != stray.joint]
-    return replace(stray, instead_of=others[0]) if others and stray.instead_of is None else stray
+    return replace(best, strays=tuple(map(with_rival, best.strays)))
 
 
 def _spread(machine: Machine, strays: list[Stray]) -> float:
@@ -134,21 +122,18 @@ def _spread(machine: Machine, strays: list[Stray]) -> float:
     return float(solve_struts_at(corrected, machine.limits.neutral_pose).lengths.std())
 
 
-Fit = Callable[[FloatArray, list[tuple[int, int]]], Callable[[FloatArray], FloatArray]]
-
-
 def _candidates() -> Iterator[tuple[str, Pairing, Fit]]:
     """Kinds of symmetry with every way of pairing six struts: two cycles of three, three pairs."""
     for first in combinations(range(1, 6), 2):
-        rest = [i for i in range(1, 6) if i not in first]
-        for one in permutations(first):
-            for other in permutations(rest[1:]):
-                yield "three-fold", _pairing((0, *one), (rest[0], *other)), _turn_of
+        start, *rest = (i for i in range(1, 6) if i not in first)
+        for second in permutations(first):
+            for third in permutations(rest):
+                yield "three-fold", _pairing((0, *second), (start, *third)), _turn_of
     for a in range(1, 6):
-        left = [i for i in range(1, 6) if i != a]
-        for b in left[1:]:
-            c, d = (i for i in left[1:] if i != b)
-            yield "mirror", _pairing((0, a), (left[0], b), (c, d)), _mirror
+        start, *left = (i for i in range(1, 6) if i != a)
+        for b in left:
+            c, d = (i for i in left if i != b)
+            yield "mirror", _pairing((0, a), (start, b), (c, d)), _mirror
 
 
 def _pairing(*cycles: tuple[int, ...]) -> Pairing:
@@ -156,52 +141,42 @@ def _pairing(*cycles: tuple[int, ...]) -> Pairing:
     return tuple(onto[i] for i in range(6))
 
 
-def _follow(body: str, joints: FloatArray, pairing: Pairing, fit: Fit) -> tuple[Stray | None, float] | None:
+def _follow(body: str, joints: FloatArray, pairing: Pairing, fit: Fit) -> tuple[list[Stray], float] | None:
     """The joint that does not follow, if one does not, and the largest distance of the others; None if more do not."""
+
+    def fitted(without: int | None) -> tuple[Onto, float]:
+        """The fit without a joint, and m, the largest distance between a joint and the one that goes over into it."""
+        first = [i for i in range(6) if without not in (i, pairing[i])]
+        before, after = joints[first], joints[[pairing[i] for i in first]]
+        onto = fit(before, after)
+        return onto, float(np.linalg.norm(onto(before) - after, axis=1).max())
+
     size = float(np.sqrt(((joints - joints.mean(axis=0)) ** 2).sum(axis=1).mean()))
-    everyone = _distance(joints, pairing, fit, None)
+    everyone = fitted(None)[1]
     if everyone <= FOLLOWS * size:
-        return None, everyone
-    fits = {i: _distance(joints, pairing, fit, i) for i in range(6)}
-    i, distance = min(fits.items(), key=lambda item: item[1])
+        return [], everyone
+    fits = [fitted(i) for i in range(6)]
+    i = min(range(6), key=lambda i: fits[i][1])
+    onto, distance = fits[i]
     if distance > FOLLOWS * size:
         return None
     partner = pairing[i] if pairing[pairing[i]] == i else None  # a pair does not say which of the two is wrong
-    onto = fit(joints, _links(pairing, i))
-    source = pairing.index(i)
-    stray = Stray(body, i, joints[i], onto(joints[[source]])[0], partner)
-    return (stray, distance) if stray.distance > APART * size else (None, stray.distance)
+    stray = Stray(body, i, joints[i], onto(joints[[pairing.index(i)]])[0], partner)
+    return ([stray], distance) if stray.distance > APART * size else ([], stray.distance)
 
 
-def _links(pairing: Pairing, without: int | None) -> list[tuple[int, int]]:
-    return [(i, pairing[i]) for i in range(6) if without not in (i, pairing[i])]
-
-
-def _distance(joints: FloatArray, pairing: Pairing, fit: Fit, without: int | None) -> float:
-    """m, the largest distance between a joint and the one that goes over into it."""
-    links = _links(pairing, without)
-    onto = fit(joints, links)
-    first, second = (list(side) for side in zip(*links, strict=True))
-    return float(np.linalg.norm(onto(joints[first]) - joints[second], axis=1).max())
-
-
-def _turn_of(joints: FloatArray, links: list[tuple[int, int]]) -> Callable[[FloatArray], FloatArray]:
+def _turn_of(before: FloatArray, after: FloatArray) -> Onto:
     """A third of a turn about the vertical axis that fits best: (1 - R) c = p' - R p."""
-    first, second = (joints[list(side), :2] for side in zip(*links, strict=True))
-    centre = np.linalg.solve(np.eye(2) - THIRD, (second - first @ THIRD.T).mean(axis=0))
-
-    def onto(points: FloatArray) -> FloatArray:
-        return np.column_stack([(points[:, :2] - centre) @ THIRD.T + centre, points[:, 2]])
-
-    return onto
+    shift = (after[:, :2] - before[:, :2] @ THIRD.T).mean(axis=0)
+    centre = np.linalg.solve(np.eye(2) - THIRD, shift)
+    return lambda points: np.column_stack([(points[:, :2] - centre) @ THIRD.T + centre, points[:, 2]])
 
 
-def _mirror(joints: FloatArray, links: list[tuple[int, int]]) -> Callable[[FloatArray], FloatArray]:
+def _mirror(before: FloatArray, after: FloatArray) -> Onto:
     """The vertical plane that fits best: its normal along the pairs' differences, through their middles."""
-    first, second = (joints[list(side), :2] for side in zip(*links, strict=True))
-    apart = second - first
+    apart = (after - before)[:, :2]
     normal = np.linalg.eigh(apart.T @ apart)[1][:, 1]
-    offset = float((0.5 * (first + second) @ normal).mean())
+    offset = float((0.5 * (before + after)[:, :2] @ normal).mean())
 
     def onto(points: FloatArray) -> FloatArray:
         flat = points[:, :2] - 2.0 * (points[:, :2] @ normal - offset)[:, None] * normal
@@ -220,8 +195,5 @@ def describe_stray(stray: Stray, kind: str) -> str:
         f"{stray.body} joint {stray.joint + 1} stands at {shown(stray.given)} mm; the {kind} symmetry of the others "
         f"puts it at {shown(stray.expected)} mm, {mm_from_m(stray.distance):.1f} mm away"
     )
-    if stray.slip:
-        text += f" ({stray.slip})"
-    if stray.instead_of is not None:
-        text += f"; or joint {stray.instead_of + 1} is the wrong one of the two"
-    return text
+    text += f" ({stray.slip})" if stray.slip else ""
+    return text + ("" if stray.instead_of is None else f"; or joint {stray.instead_of + 1} is the wrong one of the two")

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.machine.model import EffectEntry, Machine, Uncertainty
-from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m, pose_in_mm
 
 # `tps machine new` puts it in every section; what still has it was not replaced.
 TEMPLATE_REMARK = "value of the template, not of this machine"
@@ -42,99 +41,61 @@ HEADINGS = {
 
 def machine_toml(machine: Machine, preamble: str = "") -> str:
     """The text of a machine file. `preamble` lines are put before it as comments."""
-    limits = machine.limits
-    law = machine.strut_law
-    sections: dict[str, dict[str, str]] = {
-        "frame_joints": {"mm": _rows(mm_from_m(machine.frame_joints))},
-        "platform_joints": {"mm": _rows(mm_from_m(machine.platform_joints))},
-        "reference_tool": {"length_mm": _number(mm_from_m(machine.reference_tool_length))},
-        "strut_law": {
-            "length_mm": _list([mm_from_m(length) for length, _ in law.points]),
-            "stiffness_N_per_um": _list([n_per_um_from_n_per_m(k) for _, k in law.points]),
-        }
-        if not law.constant
-        else {"stiffness_N_per_um": _number(n_per_um_from_n_per_m(law.stiffness_1))},
-        "platform": {"bar_stiffness_N_per_m": _number(machine.platform_bar_stiffness)},
-        "limits.strut_length": {
-            "min_mm": _number(mm_from_m(limits.strut_length[0])),
-            # A file needs a longest strut: 100 m stands for none.
-            "max_mm": _number(min(mm_from_m(limits.strut_length[1]), 1e5)),
-        },
+    limits, law = machine.limits, machine.strut_law
+    stiffnesses = [n_per_um_from_n_per_m(stiffness) for _, stiffness in law.points]
+    lengths = [mm_from_m(length) for length, _ in law.points]
+    shortest, longest = mm_from_m(np.array(limits.strut_length))
+    conditions = {"name": machine.setup, "names": machine.setups or None, "temperature_C": machine.temperature}
+    sections: dict[str, dict[str, Any]] = {
+        "frame_joints": {"mm": mm_from_m(machine.frame_joints)},
+        "platform_joints": {"mm": mm_from_m(machine.platform_joints)},
+        "reference_tool": {"length_mm": mm_from_m(machine.reference_tool_length)},
+        "strut_law": {"stiffness_N_per_um": stiffnesses[0]}
+        if law.constant
+        else {"length_mm": lengths, "stiffness_N_per_um": stiffnesses},
+        "platform": {"bar_stiffness_N_per_m": machine.platform_bar_stiffness},
+        # A file needs a longest strut: 100 m stands for none.
+        "limits.strut_length": {"min_mm": shortest, "max_mm": min(longest, 1e5)},
         "limits.joint_angle": {
-            "frame_max_deg": _number(deg_from_rad(limits.frame_joint_angle)),
-            "platform_max_deg": _number(deg_from_rad(limits.platform_joint_angle)),
-            "neutral_pose_mm_deg": _list(_pose_text(limits.neutral_pose)),
+            "frame_max_deg": deg_from_rad(limits.frame_joint_angle),
+            "platform_max_deg": deg_from_rad(limits.platform_joint_angle),
+            "neutral_pose_mm_deg": pose_in_mm(limits.neutral_pose),
         },
-        "limits.singularity": {"min_index": _number(limits.singularity)},
+        "limits.singularity": {"min_index": limits.singularity},
         "setup": {
-            "default_origin_mm": _list(_pose_text(machine.default_origin)),
-            "rapid_mm_per_min": _number(mm_per_min_from_m_per_s(machine.rapid_feed)),
-            **_conditions(machine),
+            "default_origin_mm": pose_in_mm(machine.default_origin),
+            "rapid_mm_per_min": mm_per_min_from_m_per_s(machine.rapid_feed),
+            **{key: value for key, value in conditions.items() if value is not None},
         },
     }
     if np.isfinite(limits.workspace).all():
         low, high = mm_from_m(limits.workspace)
-        sections["limits.workspace"] = {"min_mm": _list(low), "max_mm": _list(high)}
+        sections["limits.workspace"] = {"min_mm": low, "max_mm": high}
     lines = [f"# {line}".rstrip() for line in preamble.splitlines()]
-    lines += [
-        f"{key} = {toml_text(getattr(machine, key))}" for key in ("name", "title", "source") if getattr(machine, key)
-    ]
+    lines += _rows({key: getattr(machine, key) for key in ("name", "title", "source") if getattr(machine, key)})
     kind_of_law = ", constant" if law.constant else ", a table" if law.shape else ""
     for name, values in sections.items():
         heading = HEADINGS[name + kind_of_law if name == "strut_law" else name]
-        lines += ["", f"# {heading}", f"[{name}]", *(f"{key} = {value}" for key, value in values.items())]
-        lines.append(f"origin = {toml_text(machine.origins.get(name, 'assumed'))}")
-        if name in machine.remarks:
-            lines.append(f"remark = {toml_text(machine.remarks[name])}")
+        remark = {"remark": machine.remarks[name]} if name in machine.remarks else {}
+        origin = {"origin": machine.origins.get(name, "assumed"), **remark}
+        lines += ["", f"# {heading}", f"[{name}]", *_rows({**values, **origin})]
     for kind, entries in (("effect", machine.effects), ("instrument", machine.instruments)):
         for entry in entries:
-            lines += ["", *_entry_text(kind, entry)]
-    if machine.uncertainty is not None:
-        lines += ["", f"# {HEADINGS['uncertainty']}", *_uncertainty(machine.uncertainty)]
+            lines += ["", f"[[{kind}]]", *_rows({"name": entry.name, **entry.parameters})]
+            lines += [f"[{kind}.provenance]", *_rows(entry.provenance)] if entry.provenance else []
+    if (known := machine.uncertainty) is not None:
+        figures = {"parameters": known.names, "sd": known.sd, "correlation": known.correlation}
+        lines += ["", f"# {HEADINGS['uncertainty']}", "[uncertainty]", *_rows(figures)]
     return "\n".join([*lines, ""])
 
 
-def _conditions(machine: Machine) -> dict[str, str]:
-    """What the machine file says of set-ups and temperature, if anything."""
-    given = {"name": machine.setup, "names": machine.setups or None, "temperature_C": machine.temperature}
-    return {key: value_text(value) for key, value in given.items() if value is not None}
-
-
-def _entry_text(kind: str, entry: EffectEntry) -> list[str]:
-    lines = [f"[[{kind}]]", f"name = {toml_text(entry.name)}"]
-    lines += [f"{key} = {value_text(value)}" for key, value in entry.parameters.items()]
-    if entry.provenance:
-        lines += [f"[{kind}.provenance]", *(f"{key} = {value_text(value)}" for key, value in entry.provenance.items())]
-    return lines
-
-
-def _uncertainty(uncertainty: Uncertainty) -> list[str]:
-    return [
-        "[uncertainty]",
-        f"parameters = {value_text(uncertainty.names)}",
-        f"sd = {_list(uncertainty.sd)}",
-        f"correlation = {_rows(uncertainty.correlation)}",
-    ]
-
-
-def _pose_text(pose: Pose) -> list[float]:
-    return [*(mm_from_m(v) for v in pose[:3]), *(deg_from_rad(v) for v in pose[3:])]
+def _rows(values: Mapping[str, Any]) -> list[str]:
+    return [f"{key} = {value_text(value)}" for key, value in values.items()]
 
 
 def _number(value: float) -> str:
     """The shortest text that reads back as the same number to 14 digits: 304.77, not 304.77000000000004."""
-    if math.isinf(value):
-        return "inf" if value > 0 else "-inf"
-    rounded = float(f"{value:.14g}") + 0.0
-    return repr(rounded)
-
-
-def _list(values: Any) -> str:
-    return "[" + ", ".join(_number(float(v)) for v in values) + "]"
-
-
-def _rows(values: FloatArray) -> str:
-    return "[\n" + "".join(f"    {_list(row)},\n" for row in values) + "]"
+    return str(value) if math.isinf(value) else repr(float(f"{value:.14g}") + 0.0)
 
 
 def toml_text(value: str) -> str:
@@ -150,6 +111,10 @@ def value_text(value: Any) -> str:
         return str(value)
     if isinstance(value, float):
         return _number(value)
+    if isinstance(value, np.ndarray):
+        if value.ndim == 2:
+            return "[\n" + "".join(f"    {value_text(row)},\n" for row in value) + "]"
+        value = value.tolist()
     if isinstance(value, list | tuple):
         return "[" + ", ".join(value_text(v) for v in value) + "]"
     if isinstance(value, Mapping):

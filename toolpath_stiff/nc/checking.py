@@ -30,13 +30,18 @@ from toolpath_stiff.nc.findings import (
     findings_of,
     in_order,
 )  # fmt: skip
+from toolpath_stiff.nc.languages import foreign_program, refused_program
+from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc.inputs import split
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
+from toolpath_stiff.nc.parametric.run import ParametricRun
+from toolpath_stiff.nc.parametric.statements import uses_variables
+from toolpath_stiff.nc.posted import check_rotary_offsets, on_the_part
 from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun, Tally
-from toolpath_stiff.nc.reader import INTERPRETERS, conclusions, foreign_program, parse_program, refused_program
+from toolpath_stiff.nc.reader import INTERPRETERS, feed_assumption, millimetre_warning, read
 from toolpath_stiff.nc.request import ZERO, Request
 from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
+from toolpath_stiff.nc.tables import WORK_OFFSETS
 from toolpath_stiff.nc.words import looks_like_cutter_location
 from toolpath_stiff.units import Pose, m_from_mm, pose_in_si
 
@@ -68,27 +73,27 @@ def check_lines(
         raise ProgramError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
         return _check_cutter_location(lines, name, origin or default_origin, bool(block_delete), controller)
+    at = None if origin is None else _pose(origin)
     request = Request(
-        lines, name, "", None if origin is None else _pose(origin), _pose(default_origin),
-        controller.offsets or Offsets(), controller.tools, block_delete, "builtin", None, False, controller,
-    )  # fmt: skip
+        lines, name, origin=at, default_origin=_pose(default_origin), block_delete=block_delete, controller=controller
+    )
     run, start, errors, ending = _checked_run(request)
     state, frames, tally, posted = run.state, run.state.frames, run.tally, request.posted
     assert tally is not None
-    moves, warnings, assumptions = conclusions(run, controller)
-    warnings, zero = [*ending, *warnings], pose_in_si(frames.origin)
+    moves = state.recorder.moves() if len(state.recorder) else None
+    warnings = [*ending, *state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, lines)]
+    assumptions = [*state.assumptions, *feed_assumption(controller, moves)]
+    zero = pose_in_si(frames.origin)
     if posted is not None:
-        from toolpath_stiff.nc.posted import check_rotary_offsets, on_the_part
-
         x, y, z = (m_from_mm(v) for v in frames.origin[:3])
         there: Pose | None = (x, y, z, 0.0, 0.0, 0.0) if frames.source == "program" else None
         zero = request.default_origin if request.origin is None else request.origin
         try:
             if moves is not None:
                 check_rotary_offsets(frames.offsets, posted, name)
-                part = on_the_part(moves, posted, there, state.used_tools.values(), name, state.tip_held)
-                moves = part.moves
-                warnings, assumptions = [*warnings, *part.warnings], [*assumptions, *part.assumptions]
+                tools = state.used_tools.values()
+                moves, more, assumed = on_the_part(moves, posted, there, tools, name, state.tip_held)
+                warnings, assumptions = [*warnings, *more], [*assumptions, *assumed]
         except InputError as error:
             moves, errors = None, [*errors, error]
     return Checked(
@@ -114,15 +119,9 @@ def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[Inp
     run = ProgramRun(request.start(), lines, name, request.switches, tally=Tally())
     start = modal_state(run.state)
     errors, warnings = _run_to_the_end(run)
-    if errors:
-        from toolpath_stiff.nc.parametric.statements import uses_variables
-
-        if uses_variables(lines):
-            from toolpath_stiff.nc.parametric.run import ParametricRun
-
-            folder = request.controller.subprograms
-            run = ParametricRun(request.start(), lines, name, request.switches, folder, Tally())
-            errors, warnings = _run_to_the_end(run)
+    if errors and uses_variables(lines):
+        run = ParametricRun(request.start(), lines, name, request.switches, request.controller.subprograms, Tally())
+        errors, warnings = _run_to_the_end(run)
     return run, start, errors, warnings
 
 
@@ -235,7 +234,7 @@ def check_by(
         if interpreter == "builtin" or ours.complete or not second:
             return ours, "builtin"
     try:
-        program = parse_program("\n".join([*lines, ""]), name, controller=controller, **run, **options)
+        program = read(Request(lines, name, controller=controller, **run, **options))
     except InputError as error:
         if ours is not None:
             refused = finding_of(error)
@@ -248,7 +247,7 @@ def check_by(
     return _checked(program, lines, ours), "linuxcnc"
 
 
-def _checked(program: Program, lines: tuple[str, ...], ours: Checked | None) -> Checked:
+def _checked(program: ReadProgram, lines: tuple[str, ...], ours: Checked | None) -> Checked:
     """What LinuxCNC's interpreter made of a program, and why the built-in one did not read it (`ours`)."""
     findings = findings_of((), program.warnings, program.assumptions)
     if ours is not None:

@@ -294,10 +294,14 @@ def arc_frame(moves: Moves, rows: IntArray) -> ArcFrame:
     return ArcFrame(moves.arc_center[rows], moves.arc_normal[rows], moves.start[rows, :3], moves.end[rows, :3])
 
 
+def frame_of(arc: Arc, start: Sequence[float], end: Sequence[float]) -> ArcFrame:
+    """The frame of one arc in mm."""
+    return ArcFrame(*(np.array([point[:3]], dtype=float) for point in (arc.center, arc.normal, start, end)))
+
+
 def point_on_arc(arc: Arc, start: Sequence[float], end: Sequence[float], share: float) -> Vector:
-    """The point at a share of an arc's sweep, as it is sampled; mm, as `start` and `end`."""
-    points = (np.array([point[:3]], dtype=float) for point in (arc.center, arc.normal, start, end))
-    frame, row = ArcFrame(*points), np.zeros(1, dtype=np.int64)
+    """The point at a share of an arc's sweep, as it is sampled; mm."""
+    frame, row = frame_of(arc, start, end), np.zeros(1, dtype=np.int64)
     return _vector(_along_arcs(frame, np.array([arc.sweep]), row, np.array([share]))[0][0])
 
 

@@ -6,8 +6,6 @@ The meaning of each code is a function in `codes`, found in the table of `codes.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from toolpath_stiff.nc.codes.code import Code, code_name
 from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
@@ -19,10 +17,6 @@ from toolpath_stiff.nc.groups import LAST_MODE
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Flow, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
-
-if TYPE_CHECKING:
-    pass
-
 
 COORDINATES = frozenset((*AXES, "@"))
 WORDS_THAT_ACT = ("F", "S", "T")

@@ -8,8 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.units import (
     Pose,
     deg_from_rad,
@@ -20,15 +24,6 @@ from toolpath_stiff.units import (
     rad_from_deg,
     rad_per_s_from_deg_per_min,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    FloatArray = NDArray[np.float64]
-    IntArray = NDArray[np.int64]
-    BoolArray = NDArray[np.bool_]
-
 
 RAPID, FEED, ARC, CYCLE = 0, 1, 2, 3
 CUTTER_LOCATION = "cutter-location file"
@@ -109,23 +104,17 @@ class Moves:
 
 def move_columns(moves: Moves) -> dict[str, NDArray[Any]]:
     """Column -> values of a table of moves in the shop's units; arcs have their signed angle, else it is 0."""
-    import numpy as np
-
     columns: dict[str, NDArray[Any]] = {
         "line": moves.line,
         "motion": np.array(MOTION_NAMES)[moves.motion],
         "tool": moves.tool,
     }
-    for end, at in (("start", moves.start), ("end", moves.end)):
-        shown = np.concatenate([mm_from_m(at[:, :3]), deg_from_rad(at[:, 3:])], axis=1)
-        units = ("mm", "mm", "mm", "deg", "deg", "deg")
-        columns |= {f"{end}_{a}_{unit}": shown[:, i] for i, (a, unit) in enumerate(zip("xyzabc", units, strict=True))}
-    return {
-        **columns,
-        "arc_deg": deg_from_rad(moves.arc_sweep),
-        "feed_mm_per_min": mm_per_min_from_m_per_s(moves.feed),
-        "dwell_s": moves.dwell,
-    }
+    for name, ends in (("start", moves.start), ("end", moves.end)):
+        columns |= {f"{name}_{axis}_mm": mm_from_m(ends[:, i]) for i, axis in enumerate("xyz")}
+        columns |= {f"{name}_{axis}_deg": deg_from_rad(ends[:, i]) for i, axis in enumerate("abc", 3)}
+    columns["arc_deg"] = deg_from_rad(moves.arc_sweep)
+    columns["feed_mm_per_min"] = mm_per_min_from_m_per_s(moves.feed)
+    return {**columns, "dwell_s": moves.dwell}
 
 
 class Jump(NamedTuple):
@@ -159,7 +148,7 @@ class ToolUse:
 
 
 @dataclass(frozen=True, repr=False)
-class Program:
+class ReadProgram:
     r"""A program that was read to its end.
 
     Attributes
@@ -225,10 +214,7 @@ class Program:
     parametric: bool = False
 
     def __repr__(self) -> str:
-        return f"<Program {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
-
-
-# -- recording ---------------------------------------------------------------------------------------------------------
+        return f"<ReadProgram {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
 
 
 @dataclass(frozen=True)
@@ -252,14 +238,11 @@ class Arcs:
     @staticmethod
     def of(arcs: Mapping[int, Arc]) -> Arcs:
         """Of arcs by their rows."""
-        import numpy as np
-
-        return Arcs(
-            rows=np.array(list(arcs), dtype=np.int64),
-            center=np.array([arc.center for arc in arcs.values()], dtype=float).reshape(-1, 3),
-            normal=np.array([arc.normal for arc in arcs.values()], dtype=float).reshape(-1, 3),
-            sweep=np.array([arc.sweep for arc in arcs.values()], dtype=float),
+        columns = (
+            zip(*((arc.center, arc.normal, arc.sweep) for arc in arcs.values()), strict=True) if arcs else ((),) * 3
         )
+        center, normal, sweep = (np.array(column, dtype=float) for column in columns)
+        return Arcs(np.array(list(arcs), dtype=np.int64), center.reshape(-1, 3), normal.reshape(-1, 3), sweep)
 
     def by_row(self) -> dict[int, Arc]:
         """One by one."""
@@ -286,6 +269,15 @@ class MovesInMm:
 
     def __len__(self) -> int:
         return len(self.line)
+
+
+# Columns that the recorder collects: kind, and shape of one of them.
+COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
+    **dict.fromkeys(("line", "motion", "tool"), ("i8", ())),
+    **dict.fromkeys(("start", "end"), ("f8", (6,))),
+    **dict.fromkeys(("feed", "dwell", "tool_length"), ("f8", ())),
+    "from_machine": ("?", (2,)),
+}
 
 
 @dataclass
@@ -338,14 +330,17 @@ class Recorder:
 
     def drop(self, row: int) -> None:
         """Take a move out of the lists, that of its place there; its pause goes to the one before it."""
-        columns: tuple[list[Any], ...] = (self.line, self.motion, self.start, self.end, self.arc, self.feed)
-        for column in (*columns, self.tool, self.tool_length, self.from_machine):
+        pause = self.dwell[row]
+        for column in self._lists.values():
             del column[row]
-        pause = self.dwell.pop(row)
         if row:
             self.dwell[row - 1] += pause
         elif self.parts:
             self.parts[-1].dwell[-1] += pause
+
+    @property
+    def _lists(self) -> dict[str, list[Any]]:
+        return {name: getattr(self, name) for name in (*COLUMNS, "arc")}
 
     def add_many(self, moves: MovesInMm) -> None:
         """Add moves at once, each of some length."""
@@ -375,47 +370,19 @@ class Recorder:
 
     def _close(self) -> MovesInMm:
         """The lists as a part; they are empty afterwards."""
-        import numpy as np
-
-        n = len(self.line)
-        part = MovesInMm(
-            line=np.array(self.line, dtype=np.int64),
-            motion=np.array(self.motion, dtype=np.int64),
-            start=np.array(self.start, dtype=float).reshape(n, 6),
-            end=np.array(self.end, dtype=float).reshape(n, 6),
-            arcs=Arcs.of({row: arc for row, arc in enumerate(self.arc) if arc is not None}),
-            feed=np.array(self.feed, dtype=float),
-            dwell=np.array(self.dwell, dtype=float),
-            tool=np.array(self.tool, dtype=np.int64),
-            tool_length=np.array(self.tool_length, dtype=float),
-            from_machine=np.array(self.from_machine, dtype=bool).reshape(n, 2),
-        )
-        columns: tuple[list[Any], ...] = (self.line, self.motion, self.start, self.end, self.arc, self.feed)
-        for column in (*columns, self.dwell, self.tool, self.tool_length, self.from_machine):
+        arcs, n = {row: arc for row, arc in enumerate(self.arc) if arc is not None}, len(self.line)
+        arrays = {name: np.array(getattr(self, name), kind).reshape(n, *wide) for name, (kind, wide) in COLUMNS.items()}
+        for column in self._lists.values():
             column.clear()
-        return part
+        return MovesInMm(**arrays, arcs=Arcs.of(arcs))
 
 
 def _joined(parts: list[MovesInMm]) -> Moves:
     """All parts, the last one first, in SI; each is let go once it is copied, so that no move is held twice."""
-    import numpy as np
-
-    n = sum(len(part) for part in parts)
-    moves = Moves(
-        line=np.empty(n, dtype=np.int64),
-        motion=np.empty(n, dtype=np.int64),
-        start=np.empty((n, 6)),
-        end=np.empty((n, 6)),
-        arc_sweep=np.zeros(n),
-        arc_center=np.zeros((n, 3)),
-        arc_normal=np.zeros((n, 3)),
-        feed=np.empty(n),
-        dwell=np.zeros(n),
-        tool=np.empty(n, dtype=np.int64),
-        tool_length=np.empty(n),
-        from_machine=np.zeros((n, 2), dtype=bool),
-    )
-    first = 0
+    n, first = sum(len(part) for part in parts), 0
+    # Pages of zeros that nobody writes to take no memory.
+    zeros: dict[str, NDArray[Any]] = {name: np.zeros((n, *wide), kind) for name, (kind, wide) in COLUMNS.items()}
+    moves = Moves(**zeros, arc_sweep=np.zeros(n), arc_center=np.zeros((n, 3)), arc_normal=np.zeros((n, 3)))
     while parts:
         part = parts.pop()
         _copy(part, moves.take(slice(first, first + len(part))))
@@ -425,16 +392,12 @@ def _joined(parts: list[MovesInMm]) -> Moves:
 
 def held_once(column: NDArray[Any]) -> NDArray[Any]:
     """A column (n,); of one value, nan counts as one, a read-only view of that: most programs have one tool."""
-    import numpy as np
-
     alike = len(column) > 0 and np.array_equal(column, np.broadcast_to(column[0], column.shape), equal_nan=True)
     return np.broadcast_to(column[0], column.shape) if alike else column
 
 
 def _copy(part: MovesInMm, into: Moves) -> None:
     """Copy a part into rows of moves, to SI."""
-    import numpy as np
-
     for mm, si in ((part.start, into.start), (part.end, into.end)):
         si[:, :3] = m_from_mm(mm[:, :3])
         si[:, 3:] = rad_from_deg(mm[:, 3:])
@@ -451,5 +414,5 @@ def _copy(part: MovesInMm, into: Moves) -> None:
     into.line[:], into.motion[:] = part.line, part.motion
     into.tool[:], into.tool_length[:] = part.tool, m_from_mm(part.tool_length)
     for given, zeros in ((part.dwell, into.dwell), (part.from_machine, into.from_machine)):
-        if given.any():  # pages of zeros that nobody writes to take no memory
+        if given.any():
             zeros[:] = given

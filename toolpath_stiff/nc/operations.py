@@ -15,12 +15,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, IntArray
-from toolpath_stiff.nc.moves import RAPID, Jump, Moves, Program
+from toolpath_stiff.nc.moves import RAPID, Jump, Moves, ReadProgram
 
 NAMED, MARKED, TOOL = "named", "marked", "tool"
 
@@ -73,29 +74,18 @@ def headings(lines: Sequence[str]) -> list[Heading]:
     >>> [(heading.line, heading.name) for heading in headings(("G21", "(FACE)", "G1 X1"))]
     [(2, 'FACE')]
     """
-    found: list[Heading] = []
-    block: list[str] = []
-    first = last = -1
-    commented = [(number, text) for number, text in enumerate(lines, 1) if "(" in text or ";" in text]
-    for number, text in commented:
-        if not BEGINS.match(text):
-            continue
-        code, comment = split_comments(text)
-        if not NO_WORDS.fullmatch(code):
-            continue
-        if number != last + 1:
-            _close(found, first, block)
-            block, first = [], number
-        block.append(comment)
-        last = number
-    _close(found, first, block)
-    return found
-
-
-def _close(found: list[Heading], first: int, block: list[str]) -> None:
-    heading = heading_of(block, first)
-    if heading is not None:
-        found.append(heading)
+    blocks: list[tuple[int, list[str]]] = []  # the first line of each, and its comments
+    last = -1
+    for number, text in enumerate(lines, 1):
+        if ("(" in text or ";" in text) and BEGINS.match(text):
+            code, comment = split_comments(text)
+            if NO_WORDS.fullmatch(code):
+                if number != last + 1:
+                    blocks.append((number, []))
+                blocks[-1][1].append(comment)
+                last = number
+    named = (heading_of(comments, first) for first, comments in blocks)
+    return [heading for heading in named if heading is not None]
 
 
 def heading_of(block: Sequence[str], line: int) -> Heading | None:
@@ -120,11 +110,8 @@ def heading_of(block: Sequence[str], line: int) -> Heading | None:
             tool = tool or TOOL_NUMBERS.sub("", name) or name
         else:
             named = named or name
-    if number is not None:
-        return Heading(line, number, MARKED)
-    if named is None:
-        return None if tool is None else Heading(line, tool, TOOL)
-    return Heading(line, named, NAMED)
+    kinds = ((number, MARKED), (named, NAMED), (tool, TOOL))
+    return next((Heading(line, name, kind) for name, kind in kinds if name is not None), None)
 
 
 def plain_name(comment: str) -> str:
@@ -140,9 +127,6 @@ def plain_name(comment: str) -> str:
 def _last_dash(frame: str) -> str:
     """The dash or point next to the text, if it stands alone: it belongs to the text."""
     return frame[-1:] if frame and frame[-1] in DASHES and frame[-2:-1] not in tuple(DASHES) else ""
-
-
-# -- operations --------------------------------------------------------------------------------------------------------
 
 
 MOST_OPERATIONS = 1000  # beyond, comments name passes or moves, not operations: the tools are taken
@@ -190,7 +174,7 @@ class Operations:
     of_move: IntArray
 
 
-def operations(program: Program) -> Operations:
+def operations(program: ReadProgram) -> Operations:
     r"""The operations of a program that was read, by either interpreter.
 
     Examples
@@ -236,10 +220,11 @@ def find_operations(
     cuts = np.flatnonzero(moves.motion != RAPID)
     if not len(cuts):
         return Operations((), np.zeros(len(moves), dtype=np.int64))
-    text, way = _Text(lines, marks), _Way(lines, moves, jumps if marks is None else ())
-    begins = _beginnings(text, way, moves, cuts, text.heads, MOST_OPERATIONS) or _beginnings(text, way, moves, cuts, [])
-    first = [0] + [begin.move for begin in begins[1:]]
-    names = [_name(begin, text, remarks or {}, alone=len(begins) == 1) or name for begin in begins]
+    title, heads = _title_and_headings(lines) if marks is None else ("", [Heading(*mark, MARKED) for mark in marks])
+    way = _Way(lines, moves, jumps if marks is None else ())
+    begins = _beginnings(way, moves, cuts, heads, MOST_OPERATIONS) or _beginnings(way, moves, cuts, [])
+    first = [begin.move for begin in begins]
+    names = [_name(begin, title, remarks or {}, alone=len(begins) == 1) or name for begin in begins]
     of_move = np.repeat(np.arange(len(first)), np.diff([*first, len(moves)]))
     low, high = np.minimum.reduceat(moves.line, first), np.maximum.reduceat(moves.line, first)
     rows = [
@@ -261,99 +246,74 @@ class _Beginning:
     @property
     def line(self) -> int:
         """Where its heading or its tool change stands; the largest number there is without any."""
-        found = [head.line for head in self.heads] + ([self.change[0]] if self.change else [])
-        return min(found, default=np.iinfo(np.int64).max)
+        lines = [head.line for head in self.heads] + ([self.change[0]] if self.change else [])
+        return min(lines, default=np.iinfo(np.int64).max)
 
 
-class _Text:
-    """A program's text: its headings and its title."""
+def _title_and_headings(lines: Sequence[str]) -> tuple[str, list[Heading]]:
+    """The program's title, and the headings of its operations.
 
-    def __init__(self, lines: Sequence[str], marks: Sequence[tuple[int, str]] | None) -> None:
-        self.lines = lines
-        self.title, header_end = ("", 0) if marks is not None else _title(lines)
-        found = headings(lines) if marks is None else [Heading(line, name, MARKED) for line, name in marks]
-        if not self.title:
-            self.title = next((h.name for h in found if h.line <= header_end and h.kind == NAMED), "")
-        self.heads = [h for h in found if h.line > header_end or h.kind == MARKED]
-        said = [h for h in self.heads if h.kind == MARKED]
-        if len(said) > 1:  # a post that marks operations means other things by other comments
-            self.heads = said
+    The title is the comment beside the program's number, or the first heading before the first line with other words.
+    """
+    title, header_end = "", len(lines)
+    for number, text in enumerate(lines, 1):
+        code, comment = split_comments(text)
+        if not BARE.fullmatch(code):
+            header_end = number - 1
+            break
+        if code.strip() and comment and not title:
+            title = plain_name(comment)
+    every = headings(lines)
+    title = title or next((head.name for head in every if head.line <= header_end and head.kind == NAMED), "")
+    marked = [head for head in every if head.kind == MARKED]
+    if len(marked) > 1:  # a post that marks operations means other things by other comments
+        return title, marked
+    return title, [head for head in every if head.line > header_end or head.kind == MARKED]
 
 
 class _Way:
     """The lines that a run passes between two moves, as stretches: their first line left out, their last one in it."""
 
     def __init__(self, lines: Sequence[str], moves: Moves, jumps: Sequence[Jump] | None) -> None:
-        self.lines = lines
+        self.lines, self.jumps = lines, jumps
         self.line = np.concatenate([[0], moves.line])  # that of move i is at i + 1
-        self.jumps = jumps
         self.jump_moves = np.array([jump.moves for jump in jumps or ()], dtype=np.int64)
-        self.leaves = np.empty(0, dtype=np.int64)
-        if jumps is None:
-            self.leaves = np.array(
-                [
-                    number
-                    for number, text in enumerate(lines, 1)
-                    if ("M" in text or "O" in text or "m" in text or "o" in text) and LEAVES.match(text)
-                ],
-                dtype=np.int64,
-            )
-        self._enters: IntArray | None = None
+        self.leaves = self._lines_of(LEAVES) if jumps is None else np.empty(0, dtype=np.int64)
 
-    @property
+    def _lines_of(self, pattern: re.Pattern[str]) -> IntArray:
+        return np.array([number for number, text in enumerate(self.lines, 1) if pattern.match(text)], dtype=np.int64)
+
+    @cached_property
     def enters(self) -> IntArray:
         """Lines at which a run can arrive from elsewhere: calls and loops, heads and ends of programs."""
-        if self._enters is None:
-            heads = [number for number, text in enumerate(self.lines, 1) if HEAD.match(text)]
-            self._enters = np.union1d(self.leaves, np.array(heads, dtype=np.int64))
-        return self._enters
+        return np.union1d(self.leaves, self._lines_of(HEAD))
 
     def turns(self) -> BoolArray:
         """(n,) whether the run does not come straight on to a move from the one before."""
         if self.jumps is not None:
-            found = np.zeros(len(self.line) - 1, dtype=bool)
-            found[self.jump_moves[self.jump_moves < len(found)]] = True
-            return found
+            turns = np.zeros(len(self.line) - 1, dtype=bool)
+            turns[self.jump_moves[self.jump_moves < len(turns)]] = True
+            return turns
         return np.asarray((np.diff(self.line) < 0) | (np.diff(np.searchsorted(self.leaves, self.line)) != 0))
 
     def passed(self, last: int, move: int) -> list[tuple[int, int]]:
         """From move `last` (-1: from the start of the file) to a later one."""
         start, end = int(self.line[last + 1]), int(self.line[move + 1])
-        if self.jumps is None:
-            return self._guessed(start, end)
+        if self.jumps is None:  # up to where the run leaves for a call or a loop, and from where it arrives
+            leaves = self.leaves[np.searchsorted(self.leaves, start) :][:1].tolist()
+            arrive = self.enters[: np.searchsorted(self.enters, end)][-1:].tolist()
+            stop = leaves[0] if leaves else len(self.lines) + 1
+            return [(start, end)] if start <= end <= stop else [(start, stop), (arrive[0] if arrive else 0, end)]
         first, stop = np.searchsorted(self.jump_moves, [last + 1, move + 1]).tolist()
-        found = []
+        stretches = []
         for jump in self.jumps[first:stop]:
-            found.append((start, jump.left))
+            stretches.append((start, jump.left))
             start = jump.after
-        return [*found, (start, end)]
-
-    def _guessed(self, before: int, line: int) -> list[tuple[int, int]]:
-        """The same from the text alone: up to where the run leaves for a call or a loop, and from where it arrives."""
-        leaves = self.leaves
-        at = int(np.searchsorted(leaves, before))
-        stop = int(leaves[at]) if at < len(leaves) else len(self.lines) + 1
-        if before <= line <= stop:
-            return [(before, line)]
-        arrive = self.enters
-        at = int(np.searchsorted(arrive, line))
-        return [(before, stop), (int(arrive[at - 1]) if at else 0, line)]
-
-
-def _title(lines: Sequence[str]) -> tuple[str, int]:
-    """The comment beside the program's number, and the last line before the first one with other words."""
-    title = ""
-    for number, text in enumerate(lines, 1):
-        code, comment = split_comments(text)
-        if not BARE.fullmatch(code):
-            return title, number - 1
-        if code.strip() and comment and not title:
-            title = plain_name(comment)
-    return title, len(lines)
+        return [*stretches, (start, end)]
 
 
 def _beginnings(
-    text: _Text, way: _Way, moves: Moves, cuts: IntArray, heads: list[Heading], most: float = np.inf
+    way: _Way, moves: Moves, cuts: IntArray, heads: list[Heading], most: float = np.inf
 ) -> list[_Beginning]:
     """One for every cut before which a heading is passed or the tool changes, and one for the first cut.
 
@@ -364,57 +324,57 @@ def _beginnings(
     events = sorted(changes.union(seen))
     next_cut = np.searchsorted(cuts, events)
     tool = int(moves.tool[cuts[0]])
-    change = _tool_change(text, way.passed(-1, int(cuts[0]))) if tool else None
-    found = [_Beginning(0, [], tool, change)]
+    change = _tool_change(way.lines, way.passed(-1, int(cuts[0]))) if tool else None
+    begins = [_Beginning(0, [], tool, change)]
     # Cuts (rows of `cuts`) that the running operation, and what stands before the next cut, begin with.
     current = gap = 0
-    said: set[int] = set()  # headings passed where the running operation began: passed again, they begin none
-    before, passed = said, set[int]()
+    known: set[int] = set()  # headings passed where the running operation began: passed again, they begin none
+    before, passed = known, set[int]()
     for event, ordinal in zip(events, next_cut.tolist(), strict=True):
         if ordinal == len(cuts):
             break  # nothing is cut after it
-        if len(found) > most:
+        if len(begins) > most:
             return []
         rows = seen.get(event, [])
         if ordinal != gap:
-            gap, before, passed = ordinal, said, set()
+            gap, before, passed = ordinal, known, set()
         passed.update(rows)
         fresh = [heads[row] for row in rows if row not in before]
         if ordinal == current:
-            found[-1].heads += fresh
-            said = passed
+            begins[-1].heads += fresh
+            known = passed
             continue
         tool, last = int(moves.tool[cuts[ordinal]]), int(moves.tool[cuts[ordinal - 1]])
         if not fresh and tool == last:
             continue
         stretches = [] if tool == last else way.passed(int(cuts[ordinal - 1]), int(cuts[ordinal]))
-        change = _tool_change(text, stretches) if stretches else None
-        found.append(_Beginning(event, fresh, tool, change))
-        current, said = ordinal, passed
-    return found if len(found) <= most else []
+        change = _tool_change(way.lines, stretches) if stretches else None
+        begins.append(_Beginning(event, fresh, tool, change))
+        current, known = ordinal, passed
+    return begins if len(begins) <= most else []
 
 
 def _headings_passed(way: _Way, heads: list[Heading]) -> dict[int, Sequence[int]]:
     """Move -> headings (rows of `heads`) passed right before it."""
-    at = np.array([head.line for head in heads], dtype=np.int64)
+    lines = np.array([head.line for head in heads], dtype=np.int64)
     seen: dict[int, Sequence[int]] = {}
-    below, odd = np.searchsorted(at, way.line, side="right"), way.turns()
+    below, odd = np.searchsorted(lines, way.line, side="right"), way.turns()
     straight = np.flatnonzero(~odd & (np.diff(below) != 0))
     for move, low, high in zip(straight.tolist(), below[straight].tolist(), below[straight + 1].tolist(), strict=True):
         seen[move] = range(low, high)
     for move in np.flatnonzero(odd).tolist() if heads else ():
-        spans = [np.searchsorted(at, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
+        spans = [np.searchsorted(lines, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
         between = [row for low, high in spans for row in range(low, high)]
         if between:
             seen[move] = between
     return seen
 
 
-def _tool_change(text: _Text, stretches: list[tuple[int, int]]) -> tuple[int, str]:
+def _tool_change(lines: Sequence[str], stretches: list[tuple[int, int]]) -> tuple[int, str]:
     """Line of the first tool change in some stretches of lines, and the comment beside the last one that has any."""
     first, remark = 0, ""
     for low, high in stretches:
-        for number, words in enumerate(text.lines[low:high], low + 1):
+        for number, words in enumerate(lines[low:high], low + 1):
             code, comment = split_comments(words)
             if CHANGES_TOOL.search(code):
                 first = first or number
@@ -422,19 +382,19 @@ def _tool_change(text: _Text, stretches: list[tuple[int, int]]) -> tuple[int, st
     return first or stretches[-1][1], remark
 
 
-def _name(begin: _Beginning, text: _Text, remarks: dict[int, str], alone: bool) -> str:
+def _name(begin: _Beginning, title: str, remarks: dict[int, str], alone: bool) -> str:
     """What the post marks, else the first heading, else the tool; of a lone operation rather the title; "" if none."""
-    marked = [head.name for head in begin.heads if head.kind == MARKED]
-    if marked:
-        return marked[-1]
-    named = [head.name for head in begin.heads if head.kind == NAMED]
-    if named:
-        return named[0]
-    if alone and text.title:
-        return text.title
-    tools = [head.name for head in begin.heads if head.kind == TOOL]
-    about = (begin.change[1] if begin.change else "") or (tools[0] if tools else "") or remarks.get(begin.tool, "")
+    names: dict[str, list[str]] = {MARKED: [], NAMED: [], TOOL: []}
+    for head in begin.heads:
+        names[head.kind].append(head.name)
+    if names[MARKED]:
+        return names[MARKED][-1]
+    if names[NAMED]:
+        return names[NAMED][0]
+    if alone and title:
+        return title
+    about = (begin.change[1] if begin.change else "") or "".join(names[TOOL][:1]) or remarks.get(begin.tool, "")
     number = f"T{begin.tool}"
     if about:
         return about if about.upper().startswith(number) else f"{number} {about}"
-    return text.title if not begin.tool else "" if alone else number
+    return title if not begin.tool else "" if alone else number

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.controller import Controller, Switches, switches_on
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.state import State
@@ -22,20 +23,54 @@ ORIGIN_WINS = (
 
 @dataclass(frozen=True)
 class Request:
-    """A program to be read, and with what; as in `reader.read_program`, `origin` and `default_origin` in m and rad."""
+    """A program to be read, and with what.
+
+    Attributes
+    ----------
+    lines, name, path
+        The program, what messages call it, and its file, "" for text.
+    origin, default_origin
+        Where program zero (G54) sits in machine coordinates, x, y, z in m, A, B, C in rad: as asked for, and
+        where neither the caller nor the program says so. Only moves in machine coordinates (G53, G28, G30) depend on
+        it.
+    offsets, tools
+        Work offsets and tool table, instead of the controller's.
+    block_delete
+        Leave out blocks that begin with a slash: True, all of them; switches 1 to 9, those of theirs (`/` is `/1`);
+        False, those of the controller file's.
+    interpreter
+        "builtin"; "linuxcnc", LinuxCNC's own (`rs274`); "auto", the first and, where it refuses, the second.
+    rs274
+        Path of the program `rs274`, if it is not on PATH.
+    unconfined
+        Run it even where bubblewrap, which keeps it from all files but its own, cannot be used.
+    controller
+        Dialect, block-delete switches, work offsets and tools of the control, and the kinematics that the program was
+        posted for.
+    """
 
     lines: tuple[str, ...]
     name: str
-    path: str
-    origin: Pose | None
-    default_origin: Pose
-    offsets: Offsets
-    tools: dict[int, ToolEntry] | None
-    block_delete: Switches
-    interpreter: str
-    rs274: str | None
-    unconfined: bool
-    controller: Controller
+    path: str = ""
+    origin: Pose | None = None
+    default_origin: Pose = ZERO
+    offsets: Offsets | None = None
+    tools: dict[int, ToolEntry] | None = None
+    block_delete: Switches = False
+    interpreter: str = "builtin"
+    rs274: str | None = None
+    unconfined: bool = False
+    controller: Controller = UNKNOWN_CONTROL
+
+    @cached_property
+    def work_offsets(self) -> Offsets:
+        """Work offsets before the program sets any."""
+        return self.offsets or self.controller.offsets or Offsets()
+
+    @property
+    def tool_table(self) -> dict[int, ToolEntry] | None:
+        """The tools that are known; None: there is no table."""
+        return self.controller.tools if self.tools is None else self.tools
 
     @property
     def posted(self) -> PostedKinematics | None:
@@ -59,7 +94,7 @@ class Request:
 
     def start(self) -> State:
         """The control as the program finds it."""
-        frames = Frames(copy.deepcopy(self.offsets), *self.zero, posted=self.posted)
-        state = State(self.name, frames, copy.deepcopy(self.tools), self.controller.dialect)
+        frames = Frames(copy.deepcopy(self.work_offsets), *self.zero, posted=self.posted)
+        state = State(self.name, frames, copy.deepcopy(self.tool_table), self.controller.dialect)
         state.feed = self.controller.feed
         return state

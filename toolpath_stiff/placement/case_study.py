@@ -8,7 +8,7 @@ regions of one's own, but for the non-planar variants, which are those of the pa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
@@ -21,14 +21,13 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.tables import Columns, read_table
-from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, number, rad_from_deg
+from toolpath_stiff.units import Pose, mm_from_m, number, pose_in_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,6 +44,8 @@ REGIONS: dict[str, Region] = {
 }
 HEIGHTS_MM = tuple(float(z) for z in range(300, 1401, 25))
 STEP_MM, MOST_STEPS, ROOM_MM = 25.0, 50, 500.0  # of other heights; where no workspace is bounded, above and below
+FIGURES = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")
+Row = Mapping[str, Any]  # a region as case_study.csv has it
 REGION_COLUMNS = ("x_mm", "y_mm", "z_mm", "rotation_deg")
 MOST_REGIONS = 50
 MEANS_AGREE = 0.01  # the paper: "stiffnesses of the same magnitude"; we ask for one per cent
@@ -85,7 +86,7 @@ class CaseStudy(FolderResult):
 
     @property
     def is_own(self) -> bool:
-        """Whether path or regions are a user's; the packaged ones come with non-planar variants."""
+        """True where path or regions are a user's; the packaged ones come with non-planar variants."""
         return not self.summary["non_planar"]
 
     def to_dict(self) -> dict[str, Any]:
@@ -102,27 +103,20 @@ class CaseStudy(FolderResult):
         """The path in its regions, coloured by stiffness."""
         return cast("Figure", self.view.regions_picture.figure(self))
 
-    def __str__(self) -> str:
-        return str(self.view.text(self))
-
     def _short(self) -> str:
         held = [conclusion["holds"] for conclusion in self.summary["conclusions"] if conclusion["holds"] is not None]
         on = f"{self.summary['program']} on " if self.is_own else ""
         verb = "conclusion of the paper holds" if len(held) == 1 else "conclusions of the paper hold"
         return f"{on}{self.summary['machine']}, {sum(held)} of {len(held)} {verb}"
 
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content of each file that `save` writes."""
-        return cast("Mapping[str, Content]", self.view.files(self, plots=plots))
 
-
-def case_study_program() -> Program:
+def case_study_program() -> ReadProgram:
     """The packaged path."""
     text = (resources.files("toolpath_stiff") / "data" / "programs" / PROGRAM).read_text(encoding="ascii")
     return parse_program(text, PROGRAM)
 
 
-def wavy_program(amplitude_mm: float) -> Program:
+def wavy_program(amplitude_mm: float) -> ReadProgram:
     """The square with its height going up and down once along every side: a non-planar cut of the same outline."""
     lines = ["G21 G90 F1200", "G0 X-100 Y-100 Z0"]
     corners = [(-100, -100), (100, -100), (100, 100), (-100, 100), (-100, -100)]
@@ -136,13 +130,13 @@ def wavy_program(amplitude_mm: float) -> Program:
 
 def origin_of(x_mm: float, y_mm: float, z_mm: float, turn_deg: float) -> Pose:
     """A placement in SI."""
-    return (m_from_mm(x_mm), m_from_mm(y_mm), m_from_mm(z_mm), 0.0, 0.0, rad_from_deg(turn_deg))
+    return pose_in_si((x_mm, y_mm, z_mm, 0.0, 0.0, turn_deg))
 
 
 def run_case_study(
     model: StiffnessModel,
     step: float = defaults.STEP,
-    read: Callable[[Pose], Program] | None = None,
+    read: Callable[[Pose], ReadProgram] | None = None,
     regions: Mapping[str, Region] | None = None,
     inputs: tuple[str, ...] = (),
 ) -> CaseStudy:
@@ -174,70 +168,58 @@ def run_case_study(
     >>> [found["holds"] for found in study.summary["conclusions"]]
     [True, True, True]
     """
-    own = read is not None or regions is not None
-    packaged = case_study_program()
-    where = dict(regions or REGIONS)
+    custom = read is not None or regions is not None
+    packaged, places = case_study_program(), dict(regions or REGIONS)
 
     def at(place: Region) -> Analysis:
         origin = origin_of(*place)
         return analyze(model, read(origin) if read else packaged, origin=origin, step=step)
 
-    analyses = {name: _in_region(at, name, place, own) for name, place in where.items()}
-    figures = {name: _figures(analysis) for name, analysis in analyses.items()}
-    x, y, z, turn = next(iter(where.values()))
-    heights = _over_heights(at, (x, y, turn), _heights(model, z) if own else HEIGHTS_MM)
-    first = next(iter(analyses.values()))
+    analyses = {}
+    for name, place in places.items():
+        try:
+            analyses[name] = at(place)
+        except UnreachableError as error:
+            if not custom:
+                raise
+            hint = f"give regions that the machine reaches: {both_names('--region', 'NAME:X,Y,Z[,TURN]')}"
+            raise UnreachableError(
+                f"region {name}: {error.found}", hint=hint, file=error.file, line=error.line
+            ) from None
+    rows = [_row(name, place, analyses[name]) for name, place in places.items()]
+    x, y, height, turn = next(iter(places.values()))
+    heights = []
+    for z in _heights(model, height) if custom else HEIGHTS_MM:
+        with suppress(UnreachableError):
+            heights.append({"z_mm": z, **_figures(at((x, y, z, turn)))})
     summary = {
-        "program": first.program.name,
+        "program": next(iter(analyses.values())).program.name,
         "machine": model.machine.name,
         "step_mm": round(mm_from_m(step), 6),
         **effects_stated(model),
         "warnings": condition_warnings(model),
-        "note": "path and regions as given" if own else "the paper does not print its path; path and regions are ours",
-        "regions": [
-            {"region": name, "x_mm": at[0], "y_mm": at[1], "z_mm": at[2], "rotation_deg": at[3], **figures[name]}
-            for name, at in where.items()
-        ],
-        "conclusions": _conclusions(figures, where),
+        "note": "path and regions as given"
+        if custom
+        else "the paper does not print its path; path and regions are ours",
+        "regions": rows,
+        "conclusions": conclusions(rows),
         "heights": heights,
-        "limits_of_the_conclusions": _limits(heights),
-        "non_planar": [] if own else [_wave(model, amplitude, step) for amplitude in WAVES_MM],
+        "limits_of_the_conclusions": {
+            "largest_mean_at_z_mm": max(heights, key=lambda row: row["mean_N_per_mm"])["z_mm"],
+            "largest_range_at_z_mm": max(heights, key=lambda row: row["range_N_per_mm"])["z_mm"],
+        },
+        "non_planar": [] if custom else [_wave(model, amplitude, step) for amplitude in WAVES_MM],
     }
     return CaseStudy(summary, analyses, inputs)
 
 
-def _in_region(at: Callable[[Region], Analysis], name: str, place: Region, own: bool) -> Analysis:
-    try:
-        return at(place)
-    except UnreachableError as error:
-        if not own:
-            raise
-        raise UnreachableError(
-            f"region {name}: {error.found}",
-            hint=f"give regions that the machine reaches: {both_names('--region', 'NAME:X,Y,Z[,TURN]')}",
-            file=error.file,
-            line=error.line,
-        ) from None
-
-
-def _over_heights(
-    at: Callable[[Region], Analysis], place: tuple[float, float, float], heights: Iterable[float]
-) -> list[dict[str, float]]:
-    """The figures at x, y, turn and every height that is within reach."""
-    found, (x, y, turn) = [], place
-    for z in heights:
-        with suppress(UnreachableError):
-            found.append({"z_mm": z, **_figures(at((x, y, z, turn)))})
-    return found
-
-
-def _heights(model: StiffnessModel, own: float) -> list[float]:
+def _heights(model: StiffnessModel, of_path: float) -> list[float]:
     """mm, whole steps over the workspace, and the height of the path itself."""
     low, high = (mm_from_m(float(end)) for end in model.machine.limits.workspace[:, 2])
-    low, high = (low if np.isfinite(low) else own - ROOM_MM), (high if np.isfinite(high) else own + ROOM_MM)
+    low, high = (low if np.isfinite(low) else of_path - ROOM_MM), (high if np.isfinite(high) else of_path + ROOM_MM)
     step = STEP_MM * max(1, math.ceil((high - low) / STEP_MM / MOST_STEPS))
     steps = range(math.ceil(low / step), math.floor(high / step) + 1)
-    return sorted({own, *(step * i for i in steps)})
+    return sorted({of_path, *(step * i for i in steps)})
 
 
 def read_regions(file: str) -> dict[str, Region]:
@@ -256,113 +238,92 @@ def read_regions(file: str) -> dict[str, Region]:
         raise TableError(
             f"column {missing[0]} is missing", expected=",".join(REGION_COLUMNS), file=file, line=table.heading_line
         )
-    found: dict[str, Region] = {}
+    regions: dict[str, Region] = {}
     for row_number, (line, cells) in enumerate(table.rows, 1):
         row = dict(zip(table.heading, cells, strict=False))
         name = row.get("region") or str(row_number)
-        if name in found:
+        if name in regions:
             raise TableError(f"region {name} stands twice", file=file, line=line)
         try:
             x, y, z, turn = (float(row.get(column) or 0.0) for column in REGION_COLUMNS)
             if not np.isfinite((x, y, z, turn)).all():
                 raise ValueError("a cell is no finite number")
         except ValueError as error:
-            raise TableError(
-                f"region {name}: {error}", expected="numbers in mm and degrees", file=file, line=line
-            ) from None
-        found[name] = (x, y, z, turn)
-    return found
+            expected = "numbers in mm and degrees"
+            raise TableError(f"region {name}: {error}", expected=expected, file=file, line=line) from None
+        regions[name] = (x, y, z, turn)
+    return regions
+
+
+def _row(name: str, place: Region, analysis: Analysis) -> Row:
+    return {"region": name, **dict(zip(REGION_COLUMNS, place, strict=True)), **_figures(analysis)}
 
 
 def _figures(analysis: Analysis) -> dict[str, float]:
-    found = stiffness_figures(analysis, analysis.headline)
-    if found["mean_N_per_mm"] is None:
+    figures = stiffness_figures(analysis, analysis.headline)
+    if figures["mean_N_per_mm"] is None:
         raise ProgramError("no cut moves the tool tip", file=analysis.program.name)
-    return {
-        key: round(float(found[key]), DECIMALS)
-        for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")
-    }
+    return {key: round(float(figures[key]), DECIMALS) for key in FIGURES}
 
 
-def _conclusions(
-    figures: Mapping[str, Mapping[str, float]], regions: Mapping[str, Region] = REGIONS
-) -> list[dict[str, Any]]:
+def conclusions(regions: Sequence[Row]) -> list[dict[str, Any]]:
     """The paper's three statements, each with the numbers that decide it; None where no two regions can."""
-    in_height, in_plane = _pairs_in_height(regions), _pairs_in_plane(figures, regions)
-
-    def rises(key: str) -> tuple[bool | None, str]:
-        steps = [(figures[low][key], figures[high][key]) for low, high in in_height]
+    above: dict[tuple[float, ...], list[Row]] = {}
+    for row in regions:
+        above.setdefault((row["x_mm"], row["y_mm"], row["rotation_deg"]), []).append(row)
+    steps = [pair for rows in above.values() for pair in pairwise(sorted(rows, key=lambda row: row["z_mm"]))]
+    statements: list[dict[str, Any]] = []
+    for figure in ("mean", "range"):
+        key = f"{figure}_N_per_mm"
         words = "; ".join(
-            f"region {low} to {high}: {number(a)} to {number(b)} N/mm"
-            for (low, high), (a, b) in zip(in_height, steps, strict=True)
+            f"region {low['region']} to {high['region']}: {number(low[key])} to {number(high[key])} N/mm"
+            for low, high in steps
         )
-        return (all(b > a for a, b in steps) if steps else None), words or "no two regions differ in height alone"
-
-    mean_rises, mean_words = rises("mean_N_per_mm")
-    range_rises, range_words = rises("range_N_per_mm")
-    apart = [
-        (abs(figures[b]["mean_N_per_mm"] / figures[a]["mean_N_per_mm"] - 1.0), figures[a], figures[b], f"{a} and {b}")
-        for a, b in in_plane
-    ]
-    same_words = "; ".join(
-        f"regions {pair}: means apart by {100 * gap:.2f} %, ranges {number(one['range_N_per_mm'])} and "
-        f"{number(two['range_N_per_mm'])} N/mm"
-        for gap, one, two, pair in apart
+        holds = all(high[key] > low[key] for low, high in steps) if steps else None
+        numbers = words or "no two regions differ in height alone"
+        statements.append({"statement": f"the {figure} rises with z", "holds": holds, "numbers": numbers})
+    pairs = _in_plane(regions)
+    words = "; ".join(
+        f"regions {a['region']} and {b['region']}: means apart by {100 * _apart(a, b):.2f} %, ranges "
+        f"{number(a['range_N_per_mm'])} and {number(b['range_N_per_mm'])} N/mm"
+        for a, b in pairs
     )
-    return [
-        {"statement": "the mean rises with z", "holds": mean_rises, "numbers": mean_words},
-        {"statement": "the range rises with z", "holds": range_rises, "numbers": range_words},
+    agree = [_apart(a, b) < MEANS_AGREE and a["range_N_per_mm"] != b["range_N_per_mm"] for a, b in pairs]
+    statements.append(
         {
             "statement": "at one height means agree closely and ranges differ a little",
-            "holds": all(
-                gap < MEANS_AGREE and one["range_N_per_mm"] != two["range_N_per_mm"] for gap, one, two, _ in apart
-            )
-            if apart
-            else None,
-            "numbers": same_words or "no two regions are at one height",
-        },
-    ]
+            "holds": all(agree) if agree else None,
+            "numbers": words or "no two regions are at one height",
+        }
+    )
+    return statements
 
 
-def _pairs_in_height(regions: Mapping[str, Region]) -> list[tuple[str, str]]:
-    """Regions above each other, the lower first, neighbours in height."""
-    above: dict[tuple[float, ...], list[str]] = {}
-    for name, (x, y, _, turn) in regions.items():
-        above.setdefault((x, y, turn), []).append(name)
-    return [pair for names in above.values() for pair in pairwise(sorted(names, key=lambda name: regions[name][2]))]
-
-
-def _pairs_in_plane(figures: Mapping[str, Mapping[str, float]], regions: Mapping[str, Region]) -> list[tuple[str, str]]:
-    """Of each height with several regions the two whose means are farthest apart."""
-    beside: dict[float, list[str]] = {}
-    for name, place in regions.items():
-        beside.setdefault(place[2], []).append(name)
-    mean = {name: found["mean_N_per_mm"] for name, found in figures.items()}
+def _in_plane(regions: Sequence[Row]) -> list[tuple[Row, Row]]:
+    """The two regions of each height whose means are farthest apart."""
+    beside: dict[float, list[Row]] = {}
+    for row in regions:
+        beside.setdefault(row["z_mm"], []).append(row)
     return [
-        max(combinations(names, 2), key=lambda pair: abs(math.log(mean[pair[1]] / mean[pair[0]])))
-        for _, names in sorted(beside.items())
-        if len(names) > 1
+        max(combinations(rows, 2), key=lambda pair: abs(math.log(pair[1]["mean_N_per_mm"] / pair[0]["mean_N_per_mm"])))
+        for _, rows in sorted(beside.items())
+        if len(rows) > 1
     ]
 
 
-def _limits(heights: list[dict[str, float]]) -> dict[str, float]:
-    """At which heights mean and range of the square at (150, 100) mm stop rising."""
-    mean = max(heights, key=lambda row: row["mean_N_per_mm"])
-    widest = max(heights, key=lambda row: row["range_N_per_mm"])
-    return {"largest_mean_at_z_mm": mean["z_mm"], "largest_range_at_z_mm": widest["z_mm"]}
+def _apart(a: Row, b: Row) -> float:
+    return abs(float(b["mean_N_per_mm"]) / float(a["mean_N_per_mm"]) - 1.0)
 
 
 def _wave(model: StiffnessModel, amplitude: float, step: float) -> dict[str, Any]:
     """The wavy square in the four regions, and whether its mean still does not depend on where it lies."""
     program = wavy_program(amplitude)
-    figures = {
-        name: _figures(analyze(model, program, origin=origin_of(*at), step=step)) for name, at in REGIONS.items()
-    }
+    rows = [
+        _row(name, place, analyze(model, program, origin=origin_of(*place), step=step))
+        for name, place in REGIONS.items()
+    ]
     return {
         "amplitude_mm": amplitude,
-        "regions": [{"region": name, **row} for name, row in figures.items()],
-        "means_apart_at_one_height_percent": [
-            round(100 * abs(figures[b]["mean_N_per_mm"] / figures[a]["mean_N_per_mm"] - 1.0), DECIMALS)
-            for a, b in _pairs_in_plane(figures, REGIONS)
-        ],
+        "regions": [{key: row[key] for key in ("region", *FIGURES)} for row in rows],
+        "means_apart_at_one_height_percent": [round(100 * _apart(a, b), DECIMALS) for a, b in _in_plane(rows)],
     }

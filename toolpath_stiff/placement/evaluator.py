@@ -8,16 +8,17 @@ direction asks the compliance, and what is near singular, goes to `analysis.pose
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load, geometric_directions
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
+from toolpath_stiff.arrays import BoolArray, Columns, FloatArray, IntArray, product
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Extremes, gauge_of, reach
+from toolpath_stiff.machine.limits import Extremes, reach
+from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.stiffness import core
@@ -28,16 +29,7 @@ COMPLIANCE_DECIDES = ("softest", "normal")  # loads whose direction asks the com
 
 
 @dataclass(frozen=True)
-class Keepout:
-    """A box (m, machine coordinates) that the tool tip's path must stay out of, rapids included."""
-
-    name: str
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class PlacementFigures:
+class PlacementFigures(Columns):
     """Figures of k placements. SI; the stiffnesses are nan where a cut is out of reach.
 
     Attributes
@@ -66,17 +58,6 @@ class PlacementFigures:
     def __len__(self) -> int:
         return len(self.mean)
 
-    def take(self, rows: IntArray | BoolArray | slice) -> PlacementFigures:
-        """Some of the placements."""
-        return PlacementFigures(*(getattr(self, f.name)[rows] for f in fields(self)))
-
-    @staticmethod
-    def joined(parts: list[PlacementFigures]) -> PlacementFigures:
-        """One after the other."""
-        return PlacementFigures(
-            *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(PlacementFigures))
-        )
-
     @property
     def objectives(self) -> FloatArray:
         """(k, 3) N/m, all to be raised: mean, minus range, weakest."""
@@ -84,8 +65,8 @@ class PlacementFigures:
 
 
 @dataclass(frozen=True)
-class PlacedRows:
-    """What k placements do at each sample: rigid samples first (m), then the anchored rapids (q). SI.
+class PlacedRows(Columns):
+    """Rows of k placements, a column a sample: rigid samples first (m), then the anchored rapids (q). SI.
 
     `stiffness` (k, m), nan but at headline samples; `law` (k, m) m, how far the struts are inside the lengths of their
     law; `margin` (k, m + q); `clearance` (k, m + q) m, inf without keep-outs.
@@ -96,23 +77,10 @@ class PlacedRows:
     margin: FloatArray
     clearance: FloatArray
 
-    def take(self, rows: int | slice) -> PlacedRows:
-        """Some of the placements; of a single one arrays with one row."""
-        some = slice(rows, rows + 1) if isinstance(rows, int) else rows
-        return PlacedRows(*(getattr(self, f.name)[some] for f in fields(self)))
-
-    def slopes(self, here: PlacedRows, steps: FloatArray) -> PlacedRows:
-        """Derivatives by differences: these less those of one placement, over the steps (k,) that lie between."""
+    def combined(self, formula: Callable[..., FloatArray], other: PlacedRows) -> PlacedRows:
+        """Columns that a formula makes of these and of the same ones of others."""
         with np.errstate(invalid="ignore"):
-            return PlacedRows(
-                *((getattr(self, f.name) - getattr(here, f.name)) / steps[:, None] for f in fields(PlacedRows))
-            )
-
-    def less(self, slopes: PlacedRows, step: FloatArray) -> PlacedRows:
-        """These less what derivatives (d rows) make of a step (d,)."""
-        with np.errstate(invalid="ignore"):
-            changes = {f.name: product(step[None], getattr(slopes, f.name)) for f in fields(PlacedRows)}
-            return PlacedRows(**{name: getattr(self, name) - change for name, change in changes.items()})
+            return PlacedRows(*(formula(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)))
 
 
 class Evaluator:
@@ -124,7 +92,7 @@ class Evaluator:
         path: WorkPath,
         load: Load,
         force: float,
-        keepouts: tuple[Keepout, ...] = (),
+        keepouts: tuple[KeepOut, ...] = (),
     ) -> None:
         self.model, self.path, self.load, self.force, self.keepouts = model, path, load, force, keepouts
         self.poses = 0
@@ -156,7 +124,7 @@ class Evaluator:
             yield self.rows(placements[start : start + group])
 
     def rows(self, placements: FloatArray) -> PlacedRows:
-        """What each sample does at placements (k, 6) m and rad; all in memory at once."""
+        """Rows of placements (k, 6) m and rad; all in memory at once."""
         path, k = self.path, len(placements)
         m, n = len(path), len(self)
         self.poses += k * n
@@ -166,32 +134,23 @@ class Evaluator:
         position[:, :, m:] = np.moveaxis(path.anchored.placed(turn, placements[:, :3]), -1, 0)
         motion[:, :, :m], motion[:, :, m:] = _turned(turn, self.tangent), np.array([0.0, 0.0, 1.0])[:, None, None]
         rotation = self._orientations(placements, turn)
-        parts = []
+        along, margin, law = np.empty((3, k, n))
         for rows, tool in self.of_one_tool:
             some = None if rotation is None else rotation[:, :, rows].reshape(9, -1)
             tip, towards = position[:, :, rows].reshape(3, -1), motion[:, :, rows].reshape(3, -1)
-            parts.append([values.reshape(k, -1) for values in self._kernel_rows(tool, tip, towards, some)])
-        along, margin, law = (self._in_order(list(part)) for part in zip(*parts, strict=True))
+            for column, values in zip((along, margin, law), self._kernel_rows(tool, tip, towards, some), strict=True):
+                column[:, rows] = values.reshape(k, -1)
         if self.direct:
             with np.errstate(divide="ignore"):
                 stiffness = np.divide(1.0, along[:, :m])
             stiffness[:, self.rest] = np.nan
         else:
             stiffness = np.full((k, m), np.nan)
-            stiffness[:, self.head] = self._asked(position[:, :, :m], motion[:, :, :m], rotation, margin[:, :m])
+            stiffness[:, self.head] = self._with_effects(position, motion, rotation, margin)
         clearance = np.broadcast_to(np.inf, (k, n))
         for box in self.keepouts:
-            clearance = np.minimum(clearance, clearances(box, np.moveaxis(position, 0, -1)))
+            clearance = np.minimum(clearance, box.clearances(np.moveaxis(position, 0, -1)))
         return PlacedRows(stiffness, law[:, :m], margin, clearance)
-
-    def _in_order(self, parts: list[FloatArray]) -> FloatArray:
-        """(k, n) of all samples from those of each tool."""
-        if len(parts) == 1:
-            return parts[0]
-        found = np.empty((len(parts[0]), len(self)))
-        for (rows, _), values in zip(self.of_one_tool, parts, strict=True):
-            found[:, rows] = values
-        return found
 
     def summary(self, rows: PlacedRows) -> PlacementFigures:
         """Figures of placements from what each of their samples does."""
@@ -233,74 +192,65 @@ class Evaluator:
         if self.turned is None:
             if not placements[:, 3:5].any():
                 return None
-            one = product(turn, rotation_about_z(-placements[:, 5]))
-            return np.repeat(one.reshape(k, 9).T[:, :, None], n, axis=2)
-        found = np.empty((3, 3, k, n))
-        first, second, found[:, 2] = (_turned(turn, self.turned[:, column]) for column in range(3))
+            turned = product(turn, rotation_about_z(-placements[:, 5]))
+            return np.repeat(turned.reshape(k, 9).T[:, :, None], n, axis=2)
+        rotation = np.empty((3, 3, k, n))
+        first, second, rotation[:, 2] = (_turned(turn, self.turned[:, column]) for column in range(3))
         cosine, sine = np.cos(placements[:, 5])[:, None], np.sin(placements[:, 5])[:, None]
-        found[:, 0] = cosine * first - sine * second
-        found[:, 1] = sine * first + cosine * second
-        return found.reshape(9, k, n)
+        rotation[:, 0] = cosine * first - sine * second
+        rotation[:, 1] = sine * first + cosine * second
+        return rotation.reshape(9, k, n)
 
     def _kernel_rows(
         self, tool: float, tip: FloatArray, motion: FloatArray, rotation: FloatArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Compliance along the load, margin and law of n poses with one tool; (3, n), (3, n), (9, n)."""
-        machine = self.model.machine
+        machine, turns = self.model.machine, _matrices(rotation)
         direction = motion
         if self.direct and self.load.kind != "tangential":
-            turns = None if rotation is None else rotation.T.reshape(-1, 3, 3)
             direction = np.ascontiguousarray(geometric_directions(self.load, tip.T, turns, motion.T)[0].T)
         # The same kernel whatever is installed: a search amplifies the last digit, and gives the same everywhere.
         along, determinant, lengths, good = core.compliance_along_columns(
             machine, tip, direction, rotation, tool, "closed_form"
         )
-        extremes = Extremes(gauge_of(machine), tip, lengths, determinant, rotation, tool)
+        extremes = Extremes(machine, tip, lengths, determinant, rotation, tool)
         margin, law = extremes.margin, machine.strut_law.room_of(extremes.shortest, extremes.longest)
         doubtful = np.flatnonzero(~good & ~(margin < 0.0))  # ill-conditioned for the closed form: pivot
         if len(doubtful):
-            there = tip[:, doubtful].T
-            turns = None if rotation is None else rotation[:, doubtful].T.reshape(-1, 3, 3)
-            margin[doubtful] = reach(machine, there, solve_struts(machine, there, turns, tool), turns).margin
+            there, leaning = tip[:, doubtful].T, None if turns is None else turns[doubtful]
+            margin[doubtful] = reach(machine, there, solve_struts(machine, there, leaning, tool), leaning).margin
             if self.direct:
-                along[doubtful] = 1.0 / self._evaluated(there, motion[:, doubtful].T, turns, tool)
+                along[doubtful] = 1.0 / self._evaluated(there, motion[:, doubtful].T, leaning, tool)
         return along, margin, law
 
-    def _asked(
+    def _with_effects(
         self, position: FloatArray, motion: FloatArray, rotation: FloatArray | None, margin: FloatArray
     ) -> FloatArray:
-        """(k, h) stiffness at the headline samples where all cuts are within reach."""
-        path = self.path
-        head = np.flatnonzero(path.headline)
-        found = np.full((len(margin), len(head)), np.nan)
+        """(k, h) N/m at the headline samples where all cuts are within reach, by the closed form where possible."""
+        head = np.flatnonzero(self.path.headline)
+        stiffness = np.full((len(margin), len(head)), np.nan)
         possible = np.flatnonzero((margin[:, self.cuts] >= 0.0).all(axis=1))
-        if len(possible):
+        if not len(possible):
+            return stiffness
 
-            def some(columns: FloatArray) -> FloatArray:
-                """Rows of the headline samples at the possible placements."""
-                return columns[:, possible][:, :, head].reshape(len(columns), -1).T
+        def some(columns: FloatArray) -> FloatArray:
+            """Columns of the headline samples at the possible placements."""
+            return columns[:, possible][:, :, head].reshape(len(columns), -1)
 
-            turns = None if rotation is None else some(rotation)
-            tools = np.tile(path.tool_length[head], len(possible))
-            tip, towards = some(position), some(motion)
-            found[possible] = self._with_effects(tip, towards, turns, tools).reshape(len(possible), -1)
-        return found
-
-    def _with_effects(
-        self, tip: FloatArray, motion: FloatArray, rotation: FloatArray | None, tools: FloatArray
-    ) -> FloatArray:
-        """(n,) N/m at poses (n, 3) with motions (n, 3) and rotations (n, 9), by the closed form where it can be had."""
-        turns = None if rotation is None else rotation.reshape(-1, 3, 3)
-        stiffness = np.full(len(tip), np.nan)
-        direction, known = geometric_directions(self.load, tip, turns, motion)
+        tip, towards = some(position).T, some(motion).T
+        turn = None if rotation is None else some(rotation)
+        turns, tools = _matrices(turn), np.tile(self.path.tool_length[head], len(possible))
+        direction, known = geometric_directions(self.load, tip, turns, towards)
+        values = np.full(len(tip), np.nan)
         for rows, tool in _groups(tools) if self.load.kind not in COMPLIANCE_DECIDES else []:
-            turn = None if rotation is None else np.ascontiguousarray(rotation[rows].T)
-            there, along = (np.ascontiguousarray(values[rows].T) for values in (tip, direction))
-            stiffness[rows] = 1.0 / core.compliance_with_effects(self.model, there, along, turn, tool, self.force)
-        left = np.flatnonzero(~(known & (stiffness > 0.0) & (stiffness < np.inf)))
+            there, along = (np.ascontiguousarray(columns[rows].T) for columns in (tip, direction))
+            leaning = None if turn is None else np.ascontiguousarray(turn[:, rows])
+            values[rows] = 1.0 / core.compliance_with_effects(self.model, there, along, leaning, tool, self.force)
+        left = np.flatnonzero(~(known & (values > 0.0) & (values < np.inf)))
         if len(left):
-            turns = None if turns is None else turns[left]
-            stiffness[left] = self._evaluated(tip[left], motion[left], turns, tools[left])
+            leaning = None if turns is None else turns[left]
+            values[left] = self._evaluated(tip[left], towards[left], leaning, tools[left])
+        stiffness[possible] = values.reshape(len(possible), -1)
         return stiffness
 
     def _evaluated(
@@ -308,6 +258,11 @@ class Evaluator:
     ) -> FloatArray:
         abc = np.zeros((len(tip), 3)) if rotation is None else roll_pitch_yaw(rotation)
         return evaluate(self.model, tip, abc, motion, tool, self.load, self.force).stiffness
+
+
+def _matrices(rotation: FloatArray | None) -> FloatArray | None:
+    """(n, 3, 3) of columns (9, n)."""
+    return None if rotation is None else rotation.T.reshape(-1, 3, 3)
 
 
 def _turned(turn: FloatArray, columns: FloatArray) -> FloatArray:
@@ -330,9 +285,3 @@ def _groups(tool_length: FloatArray) -> list[tuple[IntArray | slice, float]]:
     if len(lengths) == 1:
         return [(slice(None), float(lengths[0]))]
     return [(np.flatnonzero(number == i), float(length)) for i, length in enumerate(lengths)]
-
-
-def clearances(box: Keepout, position: FloatArray) -> FloatArray:
-    """(...,) m, how far points (..., 3) lie outside a box, negative inside: the depth below the nearest face."""
-    outside = np.maximum(np.array(box.low) - position, position - np.array(box.high))
-    return np.asarray(outside.max(axis=-1))

@@ -18,7 +18,7 @@ Programme = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]  #
 
 
 def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
-    """Of each programme the x (n,) of least `cost` . x with `matrix` x <= `right` and `low` <= x <= `high`, all finite.
+    """The x (n,) of least `cost` . x of each programme, with `matrix` x <= `right` and `low` <= x <= `high`, finite.
 
     The dual simplex method in the form of a working set: n rows that hold as equations, at first the bounds that the
     cost leans on; the row that is broken most comes in, the one whose multiplier reaches zero first goes out (Nocedal
@@ -29,7 +29,7 @@ def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
     rows, state, working = _set_up(programmes)
     n = state.shape[2] - 1
     leaning = np.array([_leaning(programme[0]) for programme in programmes])
-    found: list[FloatArray | None] = [None] * len(programmes)
+    solutions: list[FloatArray | None] = [None] * len(programmes)
     number, going = np.arange(len(programmes)), np.ones(len(programmes), dtype=bool)
     for pivot in range(MOST_PIVOTS):
         if going.sum() <= 0.6 * len(going):  # those that are done cost time
@@ -48,7 +48,7 @@ def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
         worst = broken.argmax(axis=1)
         done = going & (broken[each, worst] <= TOLERANCE)
         for i in np.flatnonzero(done):
-            found[number[i]] = state[i, :n, n].copy()
+            solutions[number[i]] = state[i, :n, n].copy()
         change = product(rows[each, :, worst][:, None], state[:, : n + 1])[:, 0]
         share = change[:, :n]
         ratio = np.full(share.shape, np.inf)
@@ -59,7 +59,7 @@ def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
         column = state[each, :, out] / np.where(going, change[each, out], np.inf)[:, None]
         change[each, out] -= 1.0
         state -= column[:, :, None] * change[:, None]
-    return found
+    return solutions
 
 
 def _inverses(matrices: FloatArray) -> FloatArray:

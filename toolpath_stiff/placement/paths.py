@@ -1,49 +1,46 @@
-"""The path that is placed, sampled in the set-up frame; thinned for a search, and for drawing.
+"""The path that is placed, sampled in the set-up frame, and thinned for a search.
 
 A placement (x, y, z, A, B, C; the numbers of `--origin`) turns and moves the samples rigidly, as `path`. Rapids
 to a point of the machine (G53, G28, G30), and the first one, which comes from where the control stands, are anchored:
 one of their ends, or some of its axes, stays where it is.
-
-A page cannot hold every sample of a long program at sixty placements. Of a drawn path the ends of every cut and its
-corners are kept first, then samples evenly along the path; the stiffness is evaluated at just these.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolpath_stiff.analysis.evaluation import evaluate
-from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
+from toolpath_stiff.analysis.loads import Load, headline_rows
+from toolpath_stiff.arrays import BoolArray, Columns, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
 from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose, rad_from_deg
+from toolpath_stiff.units import Pose
 
-Read = Callable[[Pose], Program]  # the program as it is read where its zero sits there
+Read = Callable[[Pose], ReadProgram]  # the program as it is read where its zero sits there
 SHIFT = np.array([0.011, 0.017, 0.023, 0.0, 0.0, 0.0])  # m; tells the axes of a point that follow the work from others
+_Leg = tuple[
+    int, FloatArray, FloatArray, BoolArray
+]  # row of the move; ends (2, 6), in the machine (2, 3), which follow
 LEG_SAMPLES = 40  # of an anchored rapid, at most; 25 mm apart over a metre, and reach changes slowly
 
+COLUMNS = ("position", "tangent", "abc", "weight", "line", "tool_length", "cutting")  # as sampled
 MOST_COMPARED = 6000  # samples of a long path that are compared with each other, evenly spread
-CORNER = rad_from_deg(10.0)  # a sharper one is kept before samples along straight cuts are
-SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
 
 
 @dataclass(frozen=True)
-class Anchored:
+class Anchored(Columns):
     """q samples of rapids that do not wholly move with the work: (1 - u) start + u end. SI.
 
     Attributes
     ----------
     work, machine
-        (2, q, 3) m, start and end in the set-up frame and in the machine's.
+        (q, 2, 3) m, start and end in the set-up frame and in the machine's.
     follows
-        (2, q, 3) axes of start and end that move with the work; the others stay at `machine`.
+        (q, 2, 3) axes of start and end that move with the work; the others stay at `machine`.
     u
         (q,) place along the line, 0 to 1.
     abc
@@ -66,23 +63,19 @@ class Anchored:
     def __len__(self) -> int:
         return len(self.u)
 
-    def take(self, rows: IntArray | BoolArray) -> Anchored:
-        """Some of the samples."""
-        ends = {name: getattr(self, name)[:, rows] for name in ("work", "machine", "follows")}
-        rest = {name: getattr(self, name)[rows] for name in ("u", "abc", "tool_length", "move", "line")}
-        return Anchored(**ends, **rest)
-
     def placed(self, turn: FloatArray, zero: FloatArray) -> FloatArray:
         """(k, q, 3) m, positions at k placements: turns (k, 3, 3) and program zeros (k, 3)."""
-        ends = []
-        for work, machine, follows in zip(self.work, self.machine, self.follows, strict=True):
-            moved = product(work, np.swapaxes(turn, 1, 2)) + zero[:, None]
-            ends.append(np.where(follows, moved, machine))
-        return np.asarray(ends[0] + self.u[:, None] * (ends[1] - ends[0]))
+        start, end = (
+            np.where(follows, product(work, np.swapaxes(turn, 1, 2)) + zero[:, None], machine)
+            for work, machine, follows in zip(
+                *(np.swapaxes(ends, 0, 1) for ends in (self.work, self.machine, self.follows)), strict=True
+            )
+        )
+        return np.asarray(start + self.u[:, None] * (end - start))
 
 
 @dataclass(frozen=True)
-class WorkPath:
+class WorkPath(Columns):
     """Samples of a program in the set-up frame. SI.
 
     Attributes
@@ -116,20 +109,14 @@ class WorkPath:
     def __len__(self) -> int:
         return len(self.line)
 
-    def take(self, rows: IntArray | BoolArray) -> WorkPath:
-        """Some of the samples; the anchored rapids stay."""
-        kept = {f.name: getattr(self, f.name)[rows] for f in fields(self) if f.name != "anchored"}
-        return WorkPath(**kept, anchored=self.anchored)
-
     def alone(self, rows: BoolArray) -> WorkPath:
         """Some of the samples as a path of their own, which the headline figures are about."""
         some = self.take(rows)
-        nothing = np.zeros(len(self.anchored), dtype=bool)
-        return replace(some, headline=np.ones(len(some), dtype=bool), anchored=self.anchored.take(nothing))
+        return replace(some, headline=np.ones(len(some), dtype=bool), anchored=self.anchored.take(slice(0)))
 
 
 def work_path(
-    program: Program, step: float, load: Load | None = None, present: Pose | None = None, read: Read | None = None
+    program: ReadProgram, step: float, load: Load | None = None, present: Pose | None = None, read: Read | None = None
 ) -> WorkPath:
     """Sample a program in the set-up frame.
 
@@ -164,45 +151,33 @@ def work_path(
     samples = samples.take(~_bound(moves)[samples.move])
     counted = samples.cutting & (samples.weight > 0.0)
     headline = headline_rows(load or Load(), samples.tangent, samples.abc, counted)
-    return WorkPath(
-        samples.position,
-        samples.tangent,
-        samples.abc,
-        samples.weight,
-        samples.line,
-        samples.tool_length,
-        headline,
-        samples.cutting,
-        _anchored(program, np.array(present or program.origin), read),
-    )
+    columns = {name: getattr(samples, name) for name in COLUMNS}
+    anchored = _anchored(program, np.array(present or program.origin), read)
+    return WorkPath(**columns, headline=headline, anchored=anchored)
 
 
-def _anchored(program: Program, present: FloatArray, read: Read | None) -> Anchored:
+def _anchored(program: ReadProgram, present: FloatArray, read: Read | None) -> Anchored:
     """The anchored rapids of a program, sampled.
 
     Where there are ends in machine coordinates the program is read for two other zeros: there no such move is without
     length by chance, and the axes of a point that moved with the zero follow the work.
     """
-    at, moves = present, program.moves
+    zero, moves = present, program.moves
     follows = np.repeat(~moves.from_machine.T[..., None], 3, axis=2)
     if moves.from_machine.any() and read is not None:
-        at, further = present + SHIFT, present + 2.0 * SHIFT
-        moves, again = (_read_at(read, zero) for zero in (at, further))
+        zero, further = present + SHIFT, present + 2.0 * SHIFT
+        moves, again = (read((x, y, z, a, b, c)).moves for x, y, z, a, b, c in (zero.tolist(), further.tolist()))
         follows = np.repeat(~moves.from_machine.T[..., None], 3, axis=2)
         if len(again) == len(moves):
-            moved = _tips(place(again, further)) - _tips(place(moves, at))
+            moved = _tips(place(again, further)) - _tips(place(moves, zero))
             follows = np.asarray(np.abs(moved - SHIFT[:3]) < np.abs(moved))
-    ends, machine = np.stack([moves.start, moves.end]), _tips(place(moves, at))
+    ends, machine = np.stack([moves.start, moves.end]), _tips(place(moves, zero))
     rows = np.flatnonzero(_bound(moves))
-    legs = [_leg(int(i), ends[:, i], machine[:, i], follows[:, i], moves) for i in rows]
+    legs = [(i, ends[:, i], machine[:, i], follows[:, i]) for i in rows.tolist()]
     if len(rows) and rows[0] == 0 and program.dialect != CUTTER_LOCATION:
         standing = _tips(place(moves.take(slice(0, 1)), present))[:, 0]
-        legs += _approach(ends[:, 0], standing, follows[:, 0], moves)
-    if not legs:
-        legs = [_leg(0, np.zeros((2, 6)), np.zeros((2, 3)), np.ones((2, 3), dtype=bool), moves, count=0)]
-    columns = [f.name for f in fields(Anchored)]
-    axis = {name: 1 if name in ("work", "machine", "follows") else 0 for name in columns}
-    return Anchored(**{n: np.concatenate([getattr(leg, n) for leg in legs], axis=axis[n]) for n in columns})
+        legs += _approach(ends[:, 0], standing, follows[:, 0])
+    return _sampled(legs, moves)
 
 
 def _bound(moves: Moves) -> BoolArray:
@@ -213,53 +188,43 @@ def _bound(moves: Moves) -> BoolArray:
     return bound
 
 
-def _read_at(read: Read, zero: FloatArray) -> Moves:
-    x, y, z, a, b, c = (float(v) for v in zero)
-    return read((x, y, z, a, b, c)).moves
-
-
 def _tips(moves: Moves) -> FloatArray:
     """(2, n, 3) m, start and end of every move."""
     return np.stack([moves.start[:, :3], moves.end[:, :3]])
 
 
-def _leg(
-    move: int, ends: FloatArray, machine: FloatArray, follows: BoolArray, moves: Moves, count: int | None = None
-) -> Anchored:
-    """One straight rapid from `ends` (2, 6), some axes of which stay at `machine` (2, 3), sampled."""
-    if count is None:
-        length = float(np.linalg.norm(machine[1] - machine[0]))
-        count = int(np.clip(np.ceil(length / 5e-3), 2, LEG_SAMPLES))
-    u = np.linspace(0.0, 1.0, count)
-
-    def repeated(values: AnyArray) -> AnyArray:
-        return np.repeat(values[:, None], count, axis=1)
-
-    return Anchored(
-        work=repeated(ends[:, :3]),
-        machine=repeated(machine),
-        follows=repeated(follows),
-        u=u,
-        abc=ends[0, 3:] + u[:, None] * (ends[1, 3:] - ends[0, 3:]),
-        tool_length=np.full(count, moves.tool_length[move] if len(moves) else np.nan),
-        move=np.full(count, move, dtype=np.int64),
-        line=np.full(count, moves.line[move] if len(moves) else 0, dtype=np.int64),
-    )
-
-
-def _approach(ends: FloatArray, machine: FloatArray, follows: BoolArray, moves: Moves) -> list[Anchored]:
+def _approach(ends: FloatArray, machine: FloatArray, follows: BoolArray) -> list[_Leg]:
     """The first rapid once more, from where the control stands now: straight, and X and Y before Z.
 
     Its start does not move with the work when an offset is keyed in, or when the program is rewritten.
     """
-    standing, corner = np.zeros(3, dtype=bool), np.array([True, True, False]) & follows[1]
-    start, end = (ends[0], machine[0], standing), (ends[1], machine[1], follows[1])
+    corner = np.array([True, True, False]) & follows[1]
+    start, end = (ends[0], machine[0], np.zeros(3, dtype=bool)), (ends[1], machine[1], follows[1])
     between = (np.concatenate([ends[1, :2], ends[0, 2:]]), np.concatenate([machine[1, :2], machine[0, 2:]]), corner)
-    legs = []
-    for one, other in ((start, end), (start, between), (between, end)):
-        work, at, moving = (np.stack(pair) for pair in zip(one, other, strict=True))
-        legs.append(_leg(0, work, at, moving, moves))
-    return legs
+    return [
+        (0, np.stack([first[0], last[0]]), np.stack([first[1], last[1]]), np.stack([first[2], last[2]]))
+        for first, last in ((start, end), (start, between), (between, end))
+    ]
+
+
+def _sampled(legs: Sequence[_Leg], moves: Moves) -> Anchored:
+    """Samples of straight rapids, evenly along each."""
+    lengths = [float(np.linalg.norm(machine[1] - machine[0])) for _, _, machine, _ in legs]
+    counts = [int(np.clip(np.ceil(length / 5e-3), 2, LEG_SAMPLES)) for length in lengths]
+    leg = np.repeat(np.arange(len(legs)), counts)
+    move = np.array([row for row, _, _, _ in legs], dtype=np.int64)[leg]
+    ends = np.array([ends for _, ends, _, _ in legs]).reshape(-1, 2, 6)[leg]
+    u = np.concatenate([np.zeros(0), *(np.linspace(0.0, 1.0, count) for count in counts)])
+    return Anchored(
+        work=ends[:, :, :3],
+        machine=np.array([machine for _, _, machine, _ in legs]).reshape(-1, 2, 3)[leg],
+        follows=np.array([follows for _, _, _, follows in legs], dtype=bool).reshape(-1, 2, 3)[leg],
+        u=u,
+        abc=ends[:, 0, 3:] + u[:, None] * (ends[:, 1, 3:] - ends[:, 0, 3:]),
+        tool_length=moves.tool_length[move],
+        move=move,
+        line=moves.line[move],
+    )
 
 
 def representative_path(path: WorkPath, count: int) -> WorkPath:
@@ -290,13 +255,7 @@ def _outermost(position: FloatArray, rows: IntArray) -> IntArray:
 
 def with_rows(few: WorkPath, whole: WorkPath, rows: IntArray) -> WorkPath:
     """A path that stands for the whole, with some samples of the whole added, which stand for no length."""
-    some = whole.take(rows)
-    columns = {
-        f.name: np.concatenate([getattr(few, f.name), getattr(some, f.name)])
-        for f in fields(few)
-        if f.name not in ("anchored", "weight")
-    }
-    return WorkPath(**columns, weight=np.concatenate([few.weight, np.zeros(len(rows))]), anchored=few.anchored)
+    return WorkPath.joined([few, replace(whole.take(rows), weight=np.zeros(len(rows)))])
 
 
 def _spread(path: WorkPath, rows: IntArray, count: int) -> tuple[IntArray, FloatArray]:
@@ -337,92 +296,3 @@ def placed_path(path: WorkPath | Samples, placement: FloatArray) -> tuple[FloatA
     turn = rotation_matrices(placement[3:])
     position = path.position @ turn.T + placement[:3]
     return position, path.tangent @ turn.T, place_orientations(path.abc, placement)
-
-
-@dataclass(frozen=True)
-class DrawnPath:
-    """m samples of a path in the set-up frame, and their stiffness at k placements. SI.
-
-    Attributes
-    ----------
-    position, axis
-        (m, 3) m, tool tip; (m, 3) unit vectors from the tip up the tool.
-    s
-        (m,) m along the path, rapids included.
-    cut
-        (m,) number of the cut: samples of different cuts have a rapid between them.
-    plunge
-        (m,) plunges along the tool axis, where they stand beside the headline figures.
-    stiffness
-        (k, m) N/m along the load; nan out of reach.
-    samples
-        How many samples the whole path has.
-    """
-
-    position: FloatArray
-    axis: FloatArray
-    s: FloatArray
-    cut: IntArray
-    plunge: BoolArray
-    stiffness: FloatArray
-    samples: int
-
-
-def drawn_path(
-    model: StiffnessModel,
-    program: Program,
-    placements: FloatArray,
-    load: Load,
-    *,
-    force: float,
-    step: float,
-    points: int,
-) -> DrawnPath:
-    """At most `points` samples of the cutting path, evaluated at placements (k, 6) m and rad.
-
-    `program` is in the set-up frame, as read; `step` is the distance in m of the samples that are chosen from.
-    """
-    samples = sample_moves(program.moves, step)
-    counted = samples.cutting & (samples.weight > 0.0)
-    rows = np.flatnonzero(counted if counted.any() else samples.cutting)
-    cut = np.unique(np.cumsum(~samples.cutting)[rows], return_inverse=True)[1]
-    chosen = thinned_rows(samples.take(rows), cut, points)
-    few = samples.take(rows[chosen])
-    placed = zip(*(placed_path(few, placement) for placement in placements), strict=True)
-    position, tangent, abc = (np.concatenate(parts) for parts in placed)
-    tools = np.tile(few.tool_length, len(placements))
-    stiffness = evaluate(model, position, abc, tangent, tools, load, force).stiffness
-    counting = few.weight > 0.0
-    beside = plunging_rows(load, few.tangent, few.abc, counting)
-    beside &= ~headline_rows(load, few.tangent, few.abc, counting)
-    axis = rotation_matrices(few.abc)[:, :, 2]
-    return DrawnPath(few.position, axis, few.s, cut[chosen], beside, stiffness.reshape(len(placements), -1), len(rows))
-
-
-def thinned_rows(samples: Samples, cut: IntArray, points: int) -> IntArray:
-    """Rising rows of at most `points` samples: ends of cuts, then corners, then evenly along the path.
-
-    Of more cuts than there is room for, some are left out whole.
-    """
-    n = len(samples)
-    if n <= points:
-        return np.arange(n)
-    first = np.flatnonzero(np.diff(cut, prepend=-1))
-    last = np.append(first[1:] - 1, n - 1)
-    cuts = _evenly(np.arange(len(first)), points // 2)
-    kept = np.unique(np.concatenate([first[cuts], last[cuts]]))
-    if len(cuts) < len(first):
-        return kept
-    cosine = np.einsum("ij,ij->i", samples.tangent[1:], samples.tangent[:-1])
-    corners = np.flatnonzero((np.diff(cut) == 0) & (np.diff(samples.move) != 0) & (cosine < np.cos(CORNER)))
-    corners = _evenly(corners, max(0, int(SHARE_OF_CORNERS * points) - len(kept)) // 2)
-    kept = np.unique(np.concatenate([kept, corners, corners + 1]))  # both of a corner's samples: the tangent jumps
-    others = np.setdiff1d(np.arange(n), kept)
-    return np.sort(np.concatenate([kept, _evenly(others, points - len(kept))]))
-
-
-def _evenly(rows: IntArray, count: int) -> IntArray:
-    """`count` of the rows, evenly spread; all if there are no more."""
-    if len(rows) <= count:
-        return rows
-    return rows[np.linspace(0, len(rows) - 1, max(count, 0)).astype(np.int64)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, cast
@@ -11,18 +11,18 @@ import numpy as np
 
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.placement.climb import Bounds
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.evaluator import PlacementFigures
+from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
-from toolpath_stiff.placement.task import Task
+from toolpath_stiff.placement.task import SearchedFront, SearchRecord, Task
 from toolpath_stiff.results import FolderResult
-from toolpath_stiff.rewriting.program import OffsetBlocks, offset_blocks
+from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
 from toolpath_stiff.stiffness.model import effects_stated
-from toolpath_stiff.units import deg_from_rad, mm_from_m
+from toolpath_stiff.units import ShopPose, deg_from_rad, mm_from_m, number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,8 +34,36 @@ AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
 NAMES = ("x", "y", "z", "tilt-a", "tilt-b", "rotate")
 
 
+@dataclass(frozen=True)
+class Worsening:
+    """A figure that is worse at the chosen placement than at the present one: mean, range or weakest."""
+
+    figure: str
+    chosen_N_per_mm: float  # noqa: N815
+    before_N_per_mm: float  # noqa: N815
+    worse_by_N_per_mm: float  # noqa: N815
+
+
+@dataclass(frozen=True)
+class Written:
+    """The program written for the placement: its file, where it was analysed again, and how far that differs."""
+
+    file: str
+    analysed_at: Mapping[str, float]
+    relative_difference: Mapping[str, float]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Refused:
+    """The reason why the program could not be written for the placement."""
+
+    file: str
+    refused: str
+
+
 @dataclass(frozen=True, repr=False)
-class Placement(FolderResult):
+class Placement(FolderResult, SearchedFront):
     r"""A program at the placement that was chosen for it, and the others of the front.
 
     Attributes
@@ -84,37 +112,35 @@ class Placement(FolderResult):
     shown_by: ClassVar[str] = "place.page"
 
     task: Task
-    front: list[PlacementRow]
-    search: dict[str, Any]
     chosen: PlacementRow
     present: PlacementRow | None
     present_figures: PlacementFigures
     present_reason: str
     best: Analysis
     before: Analysis | None
-    program: Program
+    program: ReadProgram
     rewritten: bytes | None
-    written: dict[str, Any] | None
+    written: Written | Refused | None
     inputs: tuple[str, ...] = ()
 
     @property
-    def origin_mm_deg(self) -> tuple[float, ...]:
+    def origin_mm_deg(self) -> ShopPose:
         """The chosen placement: what `analyze` takes as `origin_mm_deg`."""
         return self.chosen.origin_mm_deg
 
     @property
     def objective(self) -> str:
-        """What the recommended placement is best at."""
-        return str(self.search["options"]["--objective"])
+        """The objective of the recommended placement."""
+        return self.task.rules.objective
 
     @property
     def picked(self) -> bool:
         """Another one of the front than the recommended placement is chosen."""
-        return bool(self.chosen.number != self.search["recommended"])
+        return self.chosen.number != self.search.recommended
 
     @cached_property
-    def worse(self) -> list[dict[str, Any]]:
-        """What is worse there than at the present placement, and by how much."""
+    def worse(self) -> list[Worsening]:
+        """Figures that are worse there than at the present placement, and by how much."""
         if self.present is None:
             return []
         worse = []
@@ -122,14 +148,13 @@ class Placement(FolderResult):
             chosen, before = getattr(self.chosen, key), getattr(self.present, key)
             worse_by = chosen - before if figure == "range" else before - chosen
             if worse_by > ROUNDING * self.present.mean_N_per_mm:
-                values = {"chosen_N_per_mm": chosen, "before_N_per_mm": before, "worse_by_N_per_mm": worse_by}
-                worse.append({"figure": figure, **values})
+                worse.append(Worsening(figure, chosen, before, worse_by))
         return worse
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What deserves a look, what gets worse first."""
-        warnings = [nothing_better_words(self.search)] if self.search.get("nothing_better") else []
+        """Sentences that deserve a look, what gets worse first."""
+        warnings = [nothing_better_words(self.search)] if self.search.nothing_better else []
         warnings += [self._worse_words(worse) for worse in self.worse]
         if self.worse and not self.picked:
             warnings.append("no placement was found within the bounds that is as good as the present one in all three")
@@ -139,9 +164,9 @@ class Placement(FolderResult):
                 f"{self.present_reason or 'no figures'}"
             )
         warnings += [
-            f"line {rapid['line']}: no placement within the bounds keeps this rapid within reach ({rapid['reason']}); "
+            f"line {rapid.line}: no placement within the bounds keeps this rapid within reach ({rapid.reason}); "
             "it does not follow the work, and was left out of the search"
-            for rapid in self.search["rapids_left_out"]
+            for rapid in self.search.rapids_left_out
         ]
         warnings += [] if self.present is None else _present_words(self.task.rules.margin, self.present_figures)
         if self.chosen.extrapolated_share:
@@ -158,12 +183,12 @@ class Placement(FolderResult):
             )
         return list(dict.fromkeys([*warnings, *self.best.warnings]))
 
-    def _worse_words(self, worse: dict[str, Any]) -> str:
-        share = 100.0 * worse["worse_by_N_per_mm"] / max(abs(worse["before_N_per_mm"]), 1e-12)
-        chosen, before = (f"{worse[key]:,.0f}".replace(",", " ") for key in ("chosen_N_per_mm", "before_N_per_mm"))
+    def _worse_words(self, worse: Worsening) -> str:
+        share = 100.0 * worse.worse_by_N_per_mm / max(abs(worse.before_N_per_mm), 1e-12)
         return (
-            f"WORSE: at the {'picked' if self.picked else 'recommended'} placement {WORSE[worse['figure']]} than at "
-            f"the present one, {chosen} instead of {before} N/mm ({share:.1f} % worse)"
+            f"WORSE: at the {'picked' if self.picked else 'recommended'} placement {WORSE[worse.figure]} than at the "
+            f"present one, {number(worse.chosen_N_per_mm)} instead of {number(worse.before_N_per_mm)} N/mm "
+            f"({share:.1f} % worse)"
         )
 
     @property
@@ -180,17 +205,17 @@ class Placement(FolderResult):
 
     @property
     def refusal(self) -> str:
-        """Why the program could not be written for the placement, "" unless that is so."""
-        return str((self.written or {}).get("refused", ""))
+        """The reason why the program could not be written for the placement, "" unless that is so."""
+        return self.written.refused if isinstance(self.written, Refused) else ""
 
     @property
     def offsets(self) -> OffsetBlocks:
-        """What to key in at the control."""
+        """Offsets to key in at the control."""
         return offset_blocks(self.program, self.best.origin)
 
     @property
     def trade_offs(self) -> dict[str, dict[str, float]]:
-        """What the choice costs in each objective: the best on the front beside it."""
+        """The cost of the choice in each objective: the best on the front beside it."""
         return {
             name: {
                 "chosen_N_per_mm": getattr(self.chosen, key),
@@ -206,41 +231,46 @@ class Placement(FolderResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
-        offsets = self.offsets
-        return {
-            "warnings": self.warnings,
-            "worse": self.worse,
-            "program": self.program.name,
-            **self.machine_stated,
-            "load": str(self.best.load),
-            "force_N": self.best.force,
-            "objective": self.objective,
-            "chosen": vars(self.chosen).copy(),
-            "picked": self.picked,
-            "recommended": vars(self.front[self.search["recommended"] - 1]).copy(),
-            "before": None if self.present is None else self.present.figures(),
-            "before_reason": self.present_reason or None,
-            "trade_offs": self.trade_offs,
-            "front": [vars(row).copy() for row in self.front],
-            "binding_limits": self._binding_limits(),
-            "offset_blocks": {
-                "linuxcnc": offsets.linuxcnc or None,
-                "linuxcnc_reason": offsets.linuxcnc_reason or None,
-                "fanuc": offsets.fanuc or None,
-                "fanuc_reason": offsets.fanuc_reason or None,
-            },
-            "written": self.written,
-            "search": self.search,
-            "assumptions": self.best.assumptions,
-        }
+        offsets, (first, *others) = self.offsets, self._binding_limits()
+        smallest = float(self.best.at.margin[self.best.samples.cutting].min())
+        document: dict[str, Any] = to_dict(
+            {
+                "warnings": self.warnings,
+                "worse": self.worse,
+                "program": self.program.name,
+                **self.machine_stated,
+                "load": str(self.best.load),
+                "force_N": self.best.force,
+                "objective": self.objective,
+                "chosen": self.chosen,
+                "picked": self.picked,
+                "recommended": self.front[self.search.recommended - 1],
+                "before": None if self.present is None else self.present.figures(),
+                "before_reason": self.present_reason or None,
+                "trade_offs": self.trade_offs,
+                "front": self.front,
+                "binding_limits": [
+                    {"limit": first, "smallest_margin": smallest},
+                    *({"limit": name} for name in others),
+                ],
+                "offset_blocks": {
+                    "linuxcnc": offsets.linuxcnc or None,
+                    "linuxcnc_reason": offsets.linuxcnc_reason or None,
+                    "fanuc": offsets.fanuc or None,
+                    "fanuc_reason": offsets.fanuc_reason or None,
+                },
+                "written": self.written,
+                "search": self.search,
+                "assumptions": self.best.assumptions,
+            }
+        )
+        return document
 
-    def _binding_limits(self) -> list[dict[str, Any]]:
+    def _binding_limits(self) -> list[str]:
         """The limits that the cuts come nearest to, at most three."""
-        at, cutting = self.best.at, self.best.samples.cutting
-        near = np.argsort(at.margin + np.where(cutting, 0.0, np.inf), kind="stable")[:200]
-        names = list(dict.fromkeys(at.limits[int(at.limit[i])].name for i in near))[:3]
-        smallest = float(at.margin[cutting].min())
-        return [{"limit": name, **({"smallest_margin": smallest} if i == 0 else {})} for i, name in enumerate(names)]
+        poses, cutting = self.best.at, self.best.samples.cutting
+        near = np.argsort(poses.margin + np.where(cutting, 0.0, np.inf), kind="stable")[:200]
+        return list(dict.fromkeys(poses.limits[int(poses.limit[i])].name for i in near))[:3]
 
     def to_frame(self) -> pd.DataFrame:
         """The front, one placement a row, as in `placements.csv`."""
@@ -252,28 +282,21 @@ class Placement(FolderResult):
         """The front: mean against range, the chosen and the present placement marked."""
         return cast("Figure", self.view.front_picture.figure(self))
 
-    def __str__(self) -> str:
-        return str(self.view.text(self))
-
     def _short(self) -> str:
         words = [f"{axis}{value:.6g}" for axis, value in zip("XYZABC", self.origin_mm_deg, strict=True)]
         return f"{self.program.name}, {' '.join(words)} of {len(self.front)} placements"
 
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content of each file that `save` writes."""
-        return cast("Mapping[str, Content]", self.view.files(self, plots=plots))
 
-
-def nothing_better_words(search: dict[str, Any]) -> str:
-    """That the front is the present placement alone, and how hard another was looked for."""
+def nothing_better_words(search: SearchRecord) -> str:
+    """A sentence: the front is the present placement alone, and how hard another was looked for."""
     return (
-        f"nothing better than the present placement was found within the bounds, in {search['searches']} searches from "
-        f"the beginning, {search['pose_evaluations']} poses evaluated"
+        f"nothing better than the present placement was found within the bounds, in {search.searches} searches from "
+        f"the beginning, {search.pose_evaluations} poses evaluated"
     )
 
 
 def _present_words(margin: float, present: PlacementFigures) -> list[str]:
-    """What the present placement itself does not keep."""
+    """Rules that the present placement itself does not keep, in sentences."""
     words = []
     if present.rapid_margin[0] < 0.0:
         words.append("at the present placement a rapid is out of reach")
@@ -291,7 +314,7 @@ def _present_words(margin: float, present: PlacementFigures) -> list[str]:
 
 
 def bound_warnings(bounds: Bounds, placement: FloatArray, workspace: FloatArray) -> list[str]:
-    """Which bounds of the search a placement (6,) lies on, with the options that widen them by half."""
+    """Bounds of the search that a placement (6,) lies on, with the options that widen them by half."""
     words = []
     for i in bounds.free:
         if bounds.round[i] or (i == 2 and bounds.heights):
@@ -299,25 +322,20 @@ def bound_warnings(bounds: Bounds, placement: FloatArray, workspace: FloatArray)
         low, high = float(bounds.low[i]), float(bounds.high[i])
         # The file's rotation is within 0 to 360 degrees, the bounds may lie elsewhere.
         value = low + float(np.mod(placement[i] - low + 1e-9, 2.0 * np.pi)) - 1e-9 if i == 5 else float(placement[i])
-        span = high - low
-        ends = [(value - low, low, -1), (high - value, high, 1)]
-        for room, end, side in ends:
-            limit = float(workspace[(side + 1) // 2, i]) if i < 3 else np.inf
-            if room > AT_BOUND * span or (np.isfinite(limit) and (limit - end) * side <= 1e-9):
+        span, (least, most) = high - low, workspace[:, i].tolist() if i < 3 else (-np.inf, np.inf)
+        unit, shown = ("mm", mm_from_m) if i < 3 else ("degrees", deg_from_rad)
+        for end, limit, side in ((low, least, -1), (high, most, 1)):
+            if (end - value) * side > AT_BOUND * span or (limit - end) * side <= 1e-9:
                 continue  # not there, or the end is the machine's own and cannot be widened
-            wider = [low - 0.5 * span, high] if side < 0 else [low, high + 0.5 * span]
-            if i < 3:
-                wider = [max(wider[0], float(workspace[0, i])), min(wider[1], float(workspace[1, i]))]
-            unit, shown = ("mm", mm_from_m) if i < 3 else ("degrees", deg_from_rad)
+            wider = max(low - 0.5 * span * (side < 0), least), min(high + 0.5 * span * (side > 0), most)
             words.append(
                 f"the search ended on its own bound of {NAMES[i]}, {round(shown(end), 3):g} {unit}: widen it with "
                 f"--{NAMES[i]}={round(shown(wider[0]), 3):g}:{round(shown(wider[1]), 3):g}"
             )
-    if len(bounds.heights) > 1:
-        for end, which in ((min(bounds.heights), "lowest"), (max(bounds.heights), "highest")):
-            if abs(placement[2] - end) < 1e-9:
-                words.append(
-                    f"the search took the {which} height, {mm_from_m(end):g} mm, of {both_names('--z-values')}: "
-                    "try one beyond it"
-                )
+    ends = {min(bounds.heights): "lowest", max(bounds.heights): "highest"} if len(bounds.heights) > 1 else {}
+    words += [
+        f"the search took the {which} height, {mm_from_m(end):g} mm, of {both_names('--z-values')}: try one beyond it"
+        for end, which in ends.items()
+        if abs(placement[2] - end) < 1e-9
+    ]
     return words

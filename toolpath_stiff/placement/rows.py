@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -14,15 +15,7 @@ from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.placement.search import PlacementResult
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import (
-    Pose,
-    deg_from_rad,
-    m_from_mm,
-    mm_from_m,
-    n_per_mm_from_n_per_m,
-    rad_from_deg,
-    um_from_m,
-)
+from toolpath_stiff.units import Pose, ShopPose, n_per_mm_from_n_per_m, pose_in_mm, pose_in_si, um_from_m
 
 # The three objectives and where their values stand.
 FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "weakest": "min_N_per_mm"}
@@ -50,65 +43,49 @@ class PlacementRow:
     rapid_margin: float | None = None
 
     @property
-    def origin_mm_deg(self) -> tuple[float, ...]:
+    def origin_mm_deg(self) -> ShopPose:
         """X, Y, Z in mm, A, B, C in degrees."""
         return self.x_mm, self.y_mm, self.z_mm, self.a_deg, self.b_deg, self.rotation_deg
-
-    def figures(self) -> dict[str, float | None]:
-        """The row without number and margins, as `placement.json` has the present placement."""
-        return {name: value for name, value in vars(self).items() if name not in ("number", "margin", "rapid_margin")}
 
     @property
     def origin(self) -> Pose:
         """The placement in m and rad."""
-        x, y, z = (m_from_mm(v) for v in self.origin_mm_deg[:3])
-        a, b, c = (rad_from_deg(v) for v in self.origin_mm_deg[3:])
-        return x, y, z, a, b, c
+        return pose_in_si(self.origin_mm_deg)
+
+    def figures(self) -> dict[str, float | None]:
+        """The row without number and margins, as `placement.json` has the present placement."""
+        return {name: value for name, value in vars(self).items() if name not in ("number", "margin", "rapid_margin")}
 
 
 COLUMNS = tuple(field.name for field in fields(PlacementRow))
 PLACEMENT = COLUMNS[1:7]
 
 
-def placement_mm_deg(placement: Pose | FloatArray) -> tuple[float, float, float, float, float, float]:
+def placement_mm_deg(placement: Pose | FloatArray) -> ShopPose:
     """A placement (6,) in mm and degrees; the rotation within 0 to 360."""
-    x, y, z, a, b, c = (float(v) for v in placement)
-    return mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c) % 360.0
+    x, y, z, a, b, c = pose_in_mm(map(float, placement))
+    return x, y, z, a, b, c % 360.0
 
 
-def front_rows(
+def numbered_rows(
     model: StiffnessModel, path: WorkPath, load: Load, search: PlacementResult, force: float
 ) -> list[PlacementRow]:
     """The front, numbered from 1 by rising mean; deflections under `force` in N."""
-    figures = search.figures
-    values = [figures.mean, figures.spread, figures.lowest, np.full((2, len(search.front)), np.nan)]
+    front, figures = search.front, search.figures
+    plunge_mean = plunge_lowest = np.full(len(front), np.nan)
     plunging = plunging_rows(load, path.tangent, path.abc, path.cutting & (path.weight > 0.0)) & ~path.headline
     if plunging.any():  # a class of their own
-        plunges = Evaluator(model, path.alone(plunging), load, force).figures(search.front)
-        values[3] = np.array([plunges.mean, plunges.lowest])
-    stiffness = n_per_mm_from_n_per_m(np.vstack(values)).T.tolist()
-    return [
-        PlacementRow(
-            i + 1,
-            *placement_mm_deg(placement),
-            mean,
-            spread,
-            lowest,
-            um_from_m(force * float(figures.compliance[i])),
-            _finite(plunge_mean),
-            _finite(plunge_lowest),
-            float(figures.extrapolated[i]),
-            _finite(figures.margin[i]),
-            _finite(figures.rapid_margin[i]),
-        )
-        for i, (placement, (mean, spread, lowest, plunge_mean, plunge_lowest)) in enumerate(
-            zip(search.front, stiffness, strict=True)
-        )
-    ]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+        plunges = Evaluator(model, path.alone(plunging), load, force).figures(front)
+        plunge_mean, plunge_lowest = plunges.mean, plunges.lowest
+    stiffnesses = (figures.mean, figures.spread, figures.lowest, plunge_mean, plunge_lowest)
+    mean, spread, lowest, *of_plunges = (n_per_mm_from_n_per_m(values) for values in stiffnesses)
+    deflection = um_from_m(force * figures.compliance)
+    shares = (figures.extrapolated, figures.margin, figures.rapid_margin)
+    rows = []
+    for i, values in enumerate(np.stack([mean, spread, lowest, deflection, *of_plunges, *shares], axis=1).tolist()):
+        cells: list[Any] = [value if np.isfinite(value) else None for value in values]
+        rows.append(PlacementRow(i + 1, *placement_mm_deg(front[i]), *cells))
+    return rows
 
 
 def analyzed_row(analysis: Analysis, number: int | None = None, like: PlacementRow | None = None) -> PlacementRow:

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import pairwise, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -23,20 +24,12 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.evidence import LAW_PRIOR
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.planning.forecasts import forecast_all
 from toolpath_stiff.planning.gaps import ReadingNoise, pair_shares, repeat_and_clamping
-from toolpath_stiff.planning.rivals import forecast_all, unfitted_rivals
-from toolpath_stiff.planning.visits import (
-    AXES,
-    READING_EVERY,
-    Costs,
-    Menu,
-    Visits,
-    axis_levels,
-    draw_poses,
-    images,
-    reachable,
-    visits_in_full,
-)
+from toolpath_stiff.planning.menu import Menu
+from toolpath_stiff.planning.poses import axis_levels, draw_poses, images, reachable
+from toolpath_stiff.planning.rivals import unfitted_rivals
+from toolpath_stiff.planning.visits import AXES, READING_EVERY, Visits, visits_of
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.units import RAD_PER_DEG
 
@@ -58,6 +51,9 @@ TABLE, RISER = "table", "riser"
 TRIES = 600  # poses to choose from
 
 
+SHOWS = 3.0  # standard deviations from which on an effect is said to show
+
+
 @dataclass(frozen=True)
 class Campaign:
     """Visits in measuring order.
@@ -65,20 +61,76 @@ class Campaign:
     Attributes
     ----------
     visits
-        The visits, in measuring order.
-    repeats, purposes
-        Which repeat of its place each visit is; what it is for.
-    minutes
-        Work.
+        The visits, in measuring order; the rounds of a reading say which repeat of its place the visit is.
+    kinds
+        What each is for.
+    noise
+        Relative sd of a reading, or (repeat, clamping).
     sees
         Effect -> gap in standard deviations between it, at its usual size, and nothing.
     """
 
     visits: Visits
-    repeats: tuple[int, ...]
-    purposes: tuple[str, ...]
-    minutes: float
+    kinds: tuple[str, ...]
+    noise: float | tuple[float, float]
     sees: Mapping[str, float]
+
+    @property
+    def chosen(self) -> Sequence[int]:
+        """All of them."""
+        return range(len(self.visits))
+
+    @property
+    def why(self) -> tuple[str, ...]:
+        """The purpose of each."""
+        return self.kinds
+
+    @property
+    def poses(self) -> int:
+        """Different poses."""
+        return len({pose.tobytes() for pose in self.visits.pose})
+
+    @property
+    def minutes(self) -> float:
+        """Work."""
+        visits, costs = self.visits, self.visits.menu.costs
+        minutes = len(visits) * costs.pose + costs.reading * len(visits.readings)
+        for before, after in pairwise(zip(visits.setup.tolist(), visits.extension.tolist(), strict=True)):
+            minutes += costs.setup * (before[0] != after[0]) + costs.tool * (before[1] != after[1])
+        return float(minutes)
+
+    @property
+    def sentences(self) -> list[str]:
+        """Sentences on what it takes, and what it would not show."""
+        hidden = ", ".join(name for name, gap in self.sees.items() if gap < SHOWS)
+        lines = [
+            f"{self.poses} poses at {len(np.unique(np.round(self.visits.pose[:, 2], 9)))} heights, {len(self.visits)} "
+            f"clampings, {len(self.visits.readings)} readings: about {self.minutes / 60.0:.0f} hours"
+        ]
+        return lines + (
+            [f"of usual size and alone, these would not show at {self._noise_words} noise: {hidden}"] if hidden else []
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Assumptions."""
+        return (f"seen or not: at a noise of {self._noise_words}, each effect alone at its usual size",)
+
+    @property
+    def _noise_words(self) -> str:
+        """The noise, "2 %"; of a reading and of a clamping, "2 % and 1 %"."""
+        parts = self.noise if isinstance(self.noise, tuple) else (self.noise,)
+        return " and ".join(f"{100 * part:g} %" for part in parts)
+
+    def head(self) -> dict[str, Any]:
+        """The first entries of plan.json."""
+        return {
+            "kind": "campaign",
+            "poses": self.poses,
+            "readings": len(self.visits.readings),
+            "minutes": self.minutes,
+            "detectability": [{"effect": name, "separation_sigma": gap} for name, gap in self.sees.items()],
+        }
 
 
 @dataclass(frozen=True)
@@ -95,7 +147,6 @@ def first_campaign(
     n: int = 24,
     *,
     menu: Menu | None = None,
-    costs: Costs | None = None,
     seed: int = 0,
     effects: Mapping[str, Effect] | None = None,
     noise: float | tuple[float, float] = 0.02,
@@ -109,8 +160,8 @@ def first_campaign(
         What is to be measured.
     n
         Poses; some are visited again with a longer tool, on a riser, or clamped anew.
-    menu, costs
-        What may vary: radius, tilt, heights, loads, tool lengths, set-ups; minutes of work.
+    menu
+        What may vary: radius, tilt, heights, loads, tool lengths, set-ups; what work costs.
     seed
         Of poses and order.
     effects
@@ -127,20 +178,13 @@ def first_campaign(
     """
     if not FEWEST <= n <= MOST:
         raise InputError(f"a first campaign of {n} poses", expected=f"{FEWEST} to {MOST}")
-    costs = costs or Costs()
     menu = menu or Menu(setups=(TABLE, RISER))
     rng = np.random.default_rng(seed)
     poses = _poses(machine, menu, n, rng)
     stops = _ordered(_stops(machine, poses, menu), rng)
     visits = _visits(stops, menu, rng)
-    sees = {} if effects is None else _sees(machine, visits, effects, menu, noise, effect_files)
-    return Campaign(
-        visits,
-        tuple(stop.repeat for stop in stops),
-        tuple(stop.purpose for stop in stops),
-        _minutes(stops, visits, costs),
-        sees,
-    )
+    sees = {} if effects is None else _sees(machine, visits, effects, noise, effect_files)
+    return Campaign(visits, tuple(stop.purpose for stop in stops), noise, sees)
 
 
 def _poses(machine: Machine, menu: Menu, n: int, rng: Generator) -> FloatArray:
@@ -195,7 +239,7 @@ def _spread(chosen: FloatArray, pool: FloatArray, count: int, scale: FloatArray)
 
 
 def _stops(machine: Machine, poses: FloatArray, menu: Menu) -> list[_Stop]:
-    """What is done at which pose."""
+    """Stops at the poses: with longer tools, in other set-ups, clamped anew."""
     n, tool, setup = len(poses), menu.tool_extensions[0], menu.setups[0]
     stops = []
     for k, pose in enumerate(poses):
@@ -234,35 +278,22 @@ def _visits(stops: Sequence[_Stop], menu: Menu, rng: Generator) -> Visits:
     loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads))))
     names, forces = (np.array(column) for column in zip(*product(AXES, loads), strict=True))
     orders = np.array([rng.permutation(len(names)) for _ in stops])
-    return visits_in_full(
-        np.array([stop.pose for stop in stops]),
-        np.array([stop.extension for stop in stops]),
-        np.array([stop.setup for stop in stops], dtype=str),
-        names[orders],
-        forces[orders],
-        READING_EVERY * np.arange(1.0, len(names) + 1.0),
-    )
-
-
-def _minutes(stops: Sequence[_Stop], visits: Visits, costs: Costs) -> float:
-    minutes = len(stops) * costs.pose + costs.reading * len(visits.readings)
-    for before, after in pairwise(stops):
-        minutes += costs.setup * (before.setup != after.setup) + costs.tool * (before.extension != after.extension)
-    return float(minutes)
+    pose, extension, setup, repeat, _ = (np.array(column) for column in zip(*map(astuple, stops), strict=True))
+    time = READING_EVERY * np.arange(1.0, len(names) + 1.0)
+    return visits_of(menu, (pose, extension, setup), names[orders], forces[orders], time, rounds=repeat[:, None])
 
 
 def _sees(
     machine: Machine,
     visits: Visits,
     effects: Mapping[str, Effect],
-    menu: Menu,
     noise: float | tuple[float, float],
     effect_files: Sequence[str | Path],
 ) -> dict[str, float]:
     """Gap between each effect at its usual size and nothing, the strut law refitted."""
-    own = {entry.name for entry in (*machine.effects, *machine.instruments)}
-    names = [name for name in effects if name not in own]
-    rivals = unfitted_rivals([NONE, *names], effects, setup=menu.setups[-1])
+    installed = {entry.name for entry in (*machine.effects, *machine.instruments)}
+    names = [name for name in effects if name not in installed]
+    rivals = unfitted_rivals([NONE, *names], effects, setup=visits.menu.setups[-1])
     rivals = [replace(rival, covariance=LAW_PRIOR**2 * np.eye(2), free=()) for rival in rivals]
     forecasts, _, scatter = forecast_all(machine, rivals, visits.readings, effect_files)
     reading_noise = ReadingNoise(*repeat_and_clamping(noise), scatter)

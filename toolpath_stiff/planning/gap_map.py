@@ -1,22 +1,22 @@
-"""How far one visit would set the two likeliest rivals apart, over the workspace."""
+"""A map of how far one visit would set the two likeliest rivals apart, over the workspace."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import prod
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.gaps import ReadingNoise, pair_shares
+from toolpath_stiff.planning.forecasts import forecast_all
+from toolpath_stiff.planning.gaps import pair_shares
 from toolpath_stiff.planning.plan import RivalPlan, matters
-from toolpath_stiff.planning.rivals import forecast_all
-from toolpath_stiff.planning.visits import AXES, READING_EVERY, ROUND, Menu, Visits, reachable, visits_in_full
+from toolpath_stiff.planning.poses import ROUND, reachable
+from toolpath_stiff.planning.visits import AXES, READING_EVERY, visits_of
 
 ACROSS = 11  # points of the grid a side
 
@@ -65,54 +65,40 @@ def height_groups(z: FloatArray) -> list[FloatArray]:
     return list(np.array_split(heights, min(len(heights), MOST_LEVELS)))
 
 
-def group_of(z: FloatArray, groups: Sequence[FloatArray]) -> NDArray[np.int64]:
+def group_of(z: FloatArray, groups: Sequence[FloatArray]) -> IntArray:
     """(n,) the group that holds each height."""
     lowest = np.array([group[0] for group in groups])
     return np.asarray(np.searchsorted(lowest, np.round(z, 4), side="right") - 1, dtype=np.int64)
 
 
-def levels_of(plan: RivalPlan) -> FloatArray:
-    """(h,) m: the middle height of each group that the plan visits, rising."""
-    return np.array([group[len(group) // 2] for group in height_groups(plan.visits.pose[list(plan.chosen), 2])])
-
-
-def gap_map(machine: Machine, plan: RivalPlan, menu: Menu, effect_files: Sequence[str | Path] = ()) -> GapMap:
+def gap_map(machine: Machine, plan: RivalPlan, effect_files: Sequence[str | Path] = ()) -> GapMap:
     """Gaps of the plan's top pair over the menu's radius at the heights that the plan visits most."""
-    names = top_pair(plan)
-    rivals = [next(rival for rival in plan.rivals if rival.name == name) for name in names]
+    pair, menu = top_pair(plan), plan.visits.menu
+    rivals = [next(rival for rival in plan.rivals if rival.name == name) for name in pair]
     side = np.linspace(-menu.radius, menu.radius, ACROSS)
-    levels = levels_of(plan)
+    groups = height_groups(plan.visits.pose[list(plan.chosen), 2])
+    levels = np.array([group[len(group) // 2] for group in groups])
     turns = np.linspace(0.0, 2.0 * np.pi, TILTS, endpoint=False)
     tilts = np.stack([menu.max_tilt * np.cos(turns), menu.max_tilt * np.sin(turns)], axis=1)
     angles = np.concatenate([np.zeros((1, 2)), tilts])
     poses = np.array([[x, y, z, a, b, 0.0] for a, b in angles for z, y, x in product(levels, side, side)])
     good = np.flatnonzero(reachable(machine, poses, 0.0, margin=0.0))
-    found = matters(rivals)
-    setups = menu.setups if found.setup else menu.setups[:1]
-    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads)))) if found.load else (menu.usual_load,)
+    varied = matters(rivals)
+    setups = menu.setups if varied.setup else menu.setups[:1]
+    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads)))) if varied.load else (menu.usual_load,)
     gaps = np.full((len(setups), len(poses)), np.nan)
     if len(good):
-        visits = _at_each(poses[good], setups, loads, menu)
+        # One visit to each pose in each set-up.
+        names, forces = (np.array(column) for column in zip(*product(AXES, loads), strict=True))
+        shape = (len(good) * len(setups), len(names))
+        places = np.tile(poses[good], (len(setups), 1)), np.zeros(shape[0]), np.repeat(setups, len(good))
+        time = max(menu.waits) + READING_EVERY * np.arange(1.0, len(names) + 1.0)
+        visits = visits_of(menu, places, np.broadcast_to(names, shape), np.broadcast_to(forces, shape), time)
         forecasts, answered, scatter = forecast_all(machine, rivals, visits.readings, effect_files)
-        share = pair_shares(visits, forecasts[0], forecasts[1], ReadingNoise(*plan.noise, scatter))
+        share = pair_shares(visits, forecasts[0], forecasts[1], replace(plan.scatter, machine=scatter))
         usable = np.logical_and.reduceat(answered, visits.starts)
         gaps[:, good] = np.where(usable, share.gaps_with(()), np.nan).reshape(len(setups), -1)
     for k, setup in enumerate(setups):
         gaps[k, poses[:, 2] < menu.floors.get(setup, -np.inf) - ROUND] = np.nan
     best = np.fmax.reduce(gaps, axis=0).reshape(len(angles), len(levels), ACROSS, ACROSS)
-    return GapMap(names, side, side, levels, best[0], np.fmax.reduce(best[1:], axis=0), menu.max_tilt)
-
-
-def _at_each(poses: FloatArray, setups: Sequence[str], loads: Sequence[float], menu: Menu) -> Visits:
-    """One visit to each pose in each set-up."""
-    names, forces = (np.array(column) for column in zip(*product(AXES, loads), strict=True))
-    v = len(poses) * len(setups)
-    time = max(menu.waits) + READING_EVERY * np.arange(1.0, len(names) + 1.0)
-    return visits_in_full(
-        np.tile(poses, (len(setups), 1)),
-        np.zeros(v),
-        np.repeat(np.array(setups, dtype=str), len(poses)),
-        np.tile(names, (v, 1)),
-        np.tile(forces, (v, 1)),
-        time if menu.timed else np.full(len(names), np.nan),
-    )
+    return GapMap(pair, side, side, levels, best[0], np.fmax.reduce(best[1:], axis=0), menu.max_tilt)

@@ -18,7 +18,7 @@ from toolpath_stiff.readings.loops import LoopColumns
 from toolpath_stiff.readings.measurements import Measurements, with_offsets
 
 if TYPE_CHECKING:
-    from toolpath_stiff.planning.rivals import Rival
+    from toolpath_stiff.planning.forecasts import Rival
 
 
 PLACES = 40  # with an indicator: a link shows at any pose where it is loaded
@@ -30,13 +30,13 @@ MOST_LOOPS = 4  # one strut or vertex stands for all where an effect is of all
 def loops_between(rivals: Sequence[Rival]) -> tuple[str, ...]:
     """Loops that hold a link at which the rivals differ, the likelier rivals' first."""
     common = set.intersection(*(set(rival.names) for rival in rivals))
-    found: dict[str, None] = {}
+    loops: dict[str, None] = {}
     for rival in rivals:
         for active in rival.effects:
             if active.effect.name not in common:
                 number = max(int(active.values.get("strut", active.values.get("vertex", 1))), 1)
-                found |= dict.fromkeys(_loops_of(active.effect.link, number))
-    return tuple(found)[:MOST_LOOPS]
+                loops |= dict.fromkeys(_loops_of(active.effect.link, number))
+    return tuple(loops)[:MOST_LOOPS]
 
 
 def _loops_of(link: str, number: int) -> tuple[str, ...]:

@@ -1,16 +1,13 @@
-"""Which pose next, at the machine: a plan's tables, and the readings taken so far, without the model.
+"""The next pose, at the machine: from a plan's tables and the readings taken so far, without the model.
 
-A plan's rivals are linear about their fits: each expects ln k of every possible reading as a mean, with a factor of the
-covariance that its parameters and the machine's unknowns leave open. Readings then change all of it in closed form,
-by Bayes' rule: the probabilities of the rivals, their means, their factors (Gaussian conditioning; Rasmussen and
-Williams 2006, Gaussian Processes for Machine Learning, appendix A.2). What a plan has worked out once
-serves every step.
+Readings change what a plan has worked out (`tables`) in closed form, by Bayes' rule: the probabilities of the rivals,
+their means, their factors (Gaussian conditioning; Rasmussen and Williams 2006, Gaussian Processes for Machine
+Learning, appendix A.2). What a plan has worked out once serves every step.
 """
 
 from __future__ import annotations
 
-import io
-import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -18,18 +15,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_names import Mapped
-from toolpath_stiff.errors import FileError, InputError
-from toolpath_stiff.files import read_bytes, write_atomically
-from toolpath_stiff.planning.gaps import SETTLED, ReadingNoise, choose, further_minutes, pair_shares, why_of
-from toolpath_stiff.planning.plan import RivalPlan
-from toolpath_stiff.planning.result import Plan
-from toolpath_stiff.planning.rivals import Forecast, principal
+from toolpath_stiff.files import write_atomically
+from toolpath_stiff.planning.choice import choose, why_of
+from toolpath_stiff.planning.forecasts import Forecast, principal
+from toolpath_stiff.planning.gaps import pair_shares
+from toolpath_stiff.planning.outlook import SETTLED
 from toolpath_stiff.planning.rows import POSE, plan_csv, plan_rows
-from toolpath_stiff.planning.visits import Costs, Menu, Visits, planned_readings
+from toolpath_stiff.planning.tables import Tables
+from toolpath_stiff.planning.visits import Visits
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.rows import COLUMNS, Row, read_rows
 from toolpath_stiff.results import Result
@@ -38,148 +34,10 @@ from toolpath_stiff.units import certain
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLES = "plan_tables.npz"  # in the plan's folder
-
-
-VERSION = 1
-
-
 OUT = 5e-3  # probability below which a rival no longer takes part in the choice
-
-
 DOUBTFUL = 4.0  # standard deviations by which a reading is off under every rival
-
-
 WILD_SHARE = 0.1  # of the readings may be that far off; assumed
-
-
-OF_VISITS = ("pose", "extension", "wait", "setup", "label", "names", "rounds", "members", "starts")
-
-
-def tables_of(planned: Plan) -> bytes:
-    """Content of `TABLES`: everything that the choice of the next visit needs."""
-    plan = planned.choice
-    assert isinstance(plan, RivalPlan)
-    readings, beside = plan.visits.readings, plan.visits.readings.beside
-    arrays: dict[str, Any] = {name: getattr(plan.visits, name) for name in OF_VISITS}
-    arrays |= {
-        "loop": np.full(len(plan.visits), "") if plan.visits.loop is None else plan.visits.loop,
-        "force": readings.force,
-        "time": readings.time,
-        "of_loop": readings.loop,
-        "offset": np.zeros(len(readings)) if beside is None else beside.offset,
-        "toward": np.ones(len(readings)) if beside is None else beside.toward,
-        "usable": plan.usable,
-        "machine": _certain(_canonical(plan.scatter.machine), DIGITS_OF_FACTOR),
-    }
-    for k, one in enumerate(plan.forecasts):
-        arrays[f"mean_{k}"] = _certain(one.mean, DIGITS_OF_MEAN)
-        arrays[f"factor_{k}"] = _certain(_canonical(one.factor), DIGITS_OF_FACTOR)
-    said = {
-        "version": VERSION,
-        "rivals": [[one.name, one.weight] for one in plan.forecasts],
-        "noise": [plan.scatter.repeat, plan.scatter.clamping],
-        "costs": vars(planned.costs),
-        "setups": list(planned.menu.setups),
-        "tools": list(planned.menu.tool_extensions),
-        "waits": list(planned.menu.waits),
-    }
-    file = io.BytesIO()
-    np.savez(file, said=np.frombuffer(json.dumps(said).encode(), dtype=np.uint8), **arrays)
-    return file.getvalue()
-
-
-# Digits of the largest value that are kept: coarse enough that the differences of processors, some 1e-12 in 1e5 values,
-# hardly ever turn one; 0.02 % of a standard deviation, 1e-5 of a stiffness.
-DIGITS_OF_FACTOR, DIGITS_OF_MEAN = 4, 7
-
-
-INDEPENDENT = 1e-4  # of the largest row, by which a row has a direction of its own
-
-
-def _canonical(columns: FloatArray) -> FloatArray:
-    """(m, k) columns with the covariance of (m, q), the same on every processor.
-
-    A factor of a covariance is one of many, turned as the processor's eigenvectors happen to be. This one is lower
-    triangular over the first rows that are independent of those before them, with a positive diagonal.
-    """
-    least = INDEPENDENT * float(np.linalg.norm(columns, axis=1).max(initial=0.0))
-    basis = np.zeros((0, columns.shape[1]))
-    for row in columns:
-        own = row - (row @ basis.T) @ basis
-        own -= (own @ basis.T) @ basis  # once more, against rounding
-        length = float(np.linalg.norm(own))
-        if length > least:
-            basis = np.concatenate([basis, own[None] / length])
-        if len(basis) == columns.shape[1]:
-            break
-    return np.asarray(columns @ basis.T)
-
-
-def _certain(values: FloatArray, digits: int) -> FloatArray:
-    """Values rounded to so many digits of the largest."""
-    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-    return np.round(values, digits - int(np.ceil(np.log10(largest)))) + 0.0 if largest > 0.0 else values
-
-
-@dataclass(frozen=True)
-class Tables:
-    """What a plan has worked out: visits, forecasts of all their readings, noise, what work costs."""
-
-    visits: Visits
-    usable: NDArray[np.bool_]
-    forecasts: tuple[Forecast, ...]
-    noise: ReadingNoise
-    costs: Costs
-    menu: Menu
-    offset: FloatArray
-    toward: FloatArray
-
-    @classmethod
-    def read(cls, folder: str | Path) -> Tables:
-        """Of a plan's folder. Raises `InputError` where it holds none, or those of another version."""
-        path = Path(folder) / TABLES
-        try:
-            with np.load(io.BytesIO(read_bytes(path, "the plan's tables")), allow_pickle=False) as file:
-                found = {name: file[name] for name in file.files}
-            said = json.loads(found.pop("said").tobytes())
-            if said["version"] != VERSION:
-                raise ValueError
-            return _tables(found, said)
-        except FileError as error:
-            raise InputError(
-                error.found, expected="the folder of a plan between rivals", hint="make one with tps plan"
-            ) from None
-        except (ValueError, KeyError, OSError, EOFError):
-            raise InputError(
-                f"{path} is no table of a plan", expected="what tps plan of this version wrote", hint="plan again"
-            ) from None
-
-
-def _tables(found: dict[str, Any], said: dict[str, Any]) -> Tables:
-    which = np.empty(len(found["names"]), dtype=np.int64)
-    for visit, start in enumerate(found["starts"].tolist()):
-        end = found["starts"][visit + 1] if visit + 1 < len(found["starts"]) else len(found["members"])
-        which[found["members"][start:end]] = visit
-    readings = planned_readings(
-        found["pose"][which], found["names"], found["force"], found["extension"][which], found["setup"][which],
-        found["time"], found["of_loop"],
-    )  # fmt: skip
-    visits = Visits(
-        **{name: found[name] for name in OF_VISITS},
-        readings=readings,
-        loop=found["loop"] if any(found["loop"]) else None,
-    )
-    forecasts = tuple(
-        Forecast(name, float(weight), found[f"mean_{k}"], found[f"factor_{k}"])
-        for k, (name, weight) in enumerate(said["rivals"])
-    )
-    menu = Menu(setups=tuple(said["setups"]), tool_extensions=tuple(said["tools"]), waits=tuple(said["waits"]))
-    repeat, clamping = said["noise"]
-    noise = ReadingNoise(repeat, clamping, found["machine"])
-    return Tables(
-        visits, found["usable"], forecasts, noise, Costs(**said["costs"]), menu, found["offset"], found["toward"],
-    )  # fmt: skip
+Key = tuple[float | str, ...]  # what makes two readings the same of a plan, to a micrometre and a microradian
 
 
 class Taken(NamedTuple):
@@ -187,13 +45,13 @@ class Taken(NamedTuple):
 
     rows: IntArray
     logs: FloatArray
-    clamp: NDArray[np.str_]
+    clamp: TextArray
     where: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NextVisit(Result):
-    """Where a plan stands, and the visit to make next.
+    """A plan after some readings, and the visit to make next.
 
     Attributes
     ----------
@@ -232,7 +90,7 @@ class NextVisit(Result):
 
     @property
     def settled(self) -> bool:
-        """Whether one of them has 95 %."""
+        """True where one of them has 95 %."""
         return not self.unlike and max(self.weights.values()) >= SETTLED
 
     @cached_property
@@ -246,7 +104,7 @@ class NextVisit(Result):
 
     @property
     def sentences(self) -> list[str]:
-        """Where the plan stands, and what is next."""
+        """Sentences on where the plan stands, and what is next."""
         chances = ", ".join(f"{name} {_percent(weight)}" for name, weight in self.weights.items())
         lines = [f"after {len(self.taken.rows)} readings of this plan: {chances}"]
         if self.unlike:
@@ -261,9 +119,7 @@ class NextVisit(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Probabilities, the next visit and its rows."""
-        minutes = None
-        if self.visit is not None:
-            minutes = float(further_minutes(self.tables.visits, (), self.tables.costs, self.tables.menu)[self.visit])
+        minutes = None if self.visit is None else float(self.tables.visits.further_minutes(())[self.visit])
         return {
             "rivals": [{"name": name, "probability": weight} for name, weight in self.probability.items()],
             "readings": len(self.taken.rows),
@@ -304,29 +160,50 @@ def _percent(share: float) -> str:
     return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
 
 
-def next_visit(folder: str | Path, files: tuple[str, ...] = (), columns: Mapped = None) -> NextVisit:
-    """Where to go next after some readings of a plan.
+def next_visit(
+    folder: str | Path, data: Sequence[str | Path] | str | Path = (), *, columns: Mapped = None
+) -> NextVisit:
+    """The pose of a plan to go to next, after the readings so far.
 
     Parameters
     ----------
     folder
-        Of the plan.
-    files
-        Measurement files with the readings taken so far, rows still empty among them; none: the plan's own plan.csv,
-        and those of the visits chosen one by one.
+        Where `plan` has been saved; a plan between explanations, not a first campaign.
+    data
+        Measurement files with the plan's readings taken so far, rows still empty among them; unless given, the
+        folder's own plan.csv and next_1.csv, next_2.csv ... Readings from before the plan are in it already.
+    columns
+        Which columns the files call otherwise: "stiffness=stiff_mean:N/um", or such a dict.
 
     Raises
     ------
     InputError, InputErrors
-        The folder holds no tables; a file cannot be read, bad rows.
+        The folder holds no plan between explanations; a file cannot be read, every bad row.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import toolpath_stiff as tps
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = tps.plan(machine="nist", between=("spindle_compliance", "none"), n=2).save(folder, plots=False)
+    ...     found = tps.next_visit(folder)
+    ...     [file.name for file in found.save()]
+    ['next_1.csv']
+    >>> found
+    <NextVisit: 0 readings, open>
+    >>> found.probability, found.settled
+    ({'spindle_compliance': 0.5, 'none': 0.5}, False)
+    >>> len(found.to_frame()) == len(found.to_dict()["rows"]) == len(found.rows)
+    True
     """
     tables = Tables.read(folder)
-    taken, notes = _taken(tables, files or own_files(folder), columns)
+    files = (data,) if isinstance(data, str | Path) else data
+    taken, notes = _taken(tables, tuple(map(str, files)) or own_files(folder), columns)
     forecasts, far = tables.forecasts, list[tuple[int, float]]()
     if len(taken.rows):
         forecasts, far = conditioned(tables, taken)
         notes += [f"{taken.where[k]}: {size:.1f} standard deviations off under every rival" for k, size in far]
-    probability = {one.name: one.weight for one in sorted(forecasts, key=lambda one: -one.weight)}
+    probability = {rival.name: rival.weight for rival in sorted(forecasts, key=lambda rival: -rival.weight)}
     unlike = len(far) > max(1.0, WILD_SHARE * len(taken.rows))
     done = unlike or max(probability.values()) >= SETTLED
     visit, why = (None, "") if done else _next(tables, forecasts, taken)
@@ -347,24 +224,24 @@ def conditioned(tables: Tables, taken: Taken) -> tuple[tuple[Forecast, ...], lis
     scatter = tables.noise.repeat**2 * np.eye(len(taken.rows)) + tables.noise.clamping**2 * same
     inverse = np.linalg.inv(scatter)
     logs, means, factors, off = [], [], [], []
-    for one in tables.forecasts:
-        factor = np.concatenate([one.factor, tables.noise.machine], axis=1)
-        own, residual = factor[taken.rows], taken.logs - one.mean[taken.rows]
-        pulled = own.T @ inverse
-        inner = np.eye(factor.shape[1]) + pulled @ own
+    for rival in tables.forecasts:
+        factor = np.concatenate([rival.factor, tables.noise.machine], axis=1)
+        measured, residual = factor[taken.rows], taken.logs - rival.mean[taken.rows]
+        pulled = measured.T @ inverse
+        inner = np.eye(factor.shape[1]) + pulled @ measured
         moved = np.linalg.solve(inner, pulled @ residual)
         square = residual @ inverse @ residual - (pulled @ residual) @ moved
-        logs.append(np.log(one.weight) - 0.5 * (square + np.linalg.slogdet(inner)[1]))
-        means.append(one.mean + factor @ moved)
+        logs.append(np.log(rival.weight) - 0.5 * (square + np.linalg.slogdet(inner)[1]))
+        means.append(rival.mean + factor @ moved)
         # (1 + G^T R^-1 G)^-1 = L^-T L^-1 of the lower L of what is inverted.
         factors.append(principal(np.linalg.solve(np.linalg.cholesky(inner), factor.T).T))
-        deviation = np.sqrt(np.diag(scatter) + (own**2).sum(axis=1))
+        deviation = np.sqrt(np.diag(scatter) + (measured**2).sum(axis=1))
         off.append(np.abs(residual) / deviation)
     weights = np.exp(np.array(logs) - max(logs))
     weights /= weights.sum()
     forecasts = tuple(
-        Forecast(one.name, float(weight), mean, factor)
-        for one, weight, mean, factor in zip(tables.forecasts, weights, means, factors, strict=True)
+        Forecast(rival.name, float(weight), mean, factor)
+        for rival, weight, mean, factor in zip(tables.forecasts, weights, means, factors, strict=True)
     )
     least = np.min(off, axis=0)
     return forecasts, [(int(k), float(least[k])) for k in np.flatnonzero(least > DOUBTFUL)]
@@ -372,70 +249,65 @@ def conditioned(tables: Tables, taken: Taken) -> tuple[tuple[Forecast, ...], lis
 
 def _next(tables: Tables, forecasts: tuple[Forecast, ...], taken: Taken) -> tuple[int | None, str]:
     """The visit that lowers the bound on a mistake most per minute, from where the machine stands now; what for."""
-    visits = tables.visits
+    visits, noise = tables.visits, tables.noise
     if not len(taken.rows):
         forecasts = tuple(
-            replace(one, factor=principal(np.concatenate([one.factor, tables.noise.machine], axis=1)))
-            for one in forecasts
+            replace(each, factor=principal(np.concatenate([each.factor, noise.machine], axis=1))) for each in forecasts
         )
-    kept = [one for one in forecasts if one.weight >= OUT]
-    weights = {one.name: one.weight / sum(other.weight for other in kept) for one in kept}
-    own = ReadingNoise(tables.noise.repeat, tables.noise.clamping, np.zeros((len(tables.noise.machine), 0)))
-    shares = {(f.name, g.name): pair_shares(visits, f, g, own) for f, g in combinations(kept, 2)}
-    been = _been(tables, taken)
-    usable = tables.usable & ~been
+    kept = [forecast for forecast in forecasts if forecast.weight >= OUT]
+    total = sum(forecast.weight for forecast in kept)
+    weights = {forecast.name: forecast.weight / total for forecast in kept}
+    alone = replace(noise, machine=np.zeros((len(noise.machine), 0)))
+    shares = {(f.name, g.name): pair_shares(visits, f, g, alone) for f, g in combinations(kept, 2)}
+    usable = tables.usable & ~_been(visits, taken)
     if not usable.any():
         return None, ""
-    setups, tools = tables.menu.setups, tables.menu.tool_extensions
     if len(taken.rows):
-        last = taken.rows[-1]
-        now, tool = str(visits.readings.setup[last]), float(visits.readings.tool_extension[last])
-        setups = (now, *(name for name in setups if name != now))
-        tools = (tool, *(one for one in tools if one != tool))
-    menu = Menu(setups=setups, tool_extensions=tools, waits=tables.menu.waits)
-    chosen = choose(visits, usable, shares, weights, 1, tables.costs, menu)
-    return (chosen[0], why_of(visits, chosen[0], shares, menu)) if chosen else (None, "")
+        last, menu = taken.rows[-1], visits.menu
+        setup, tool = str(visits.readings.setup[last]), float(visits.readings.tool_extension[last])
+        setups, tools = dict.fromkeys([setup, *menu.setups]), dict.fromkeys([tool, *menu.tool_extensions])
+        visits = replace(visits, menu=replace(menu, setups=tuple(setups), tool_extensions=tuple(tools)))
+    chosen = choose(visits, usable, shares, weights, 1)
+    return (chosen[0], why_of(visits, chosen[0], shares)) if chosen else (None, "")
 
 
-def _been(tables: Tables, taken: Taken) -> NDArray[np.bool_]:
+def _been(visits: Visits, taken: Taken) -> BoolArray:
     """(v,) visits to poses of readings taken, with the same tool and set-up and the same second indicator."""
-    visits, readings = tables.visits, tables.visits.readings
-    found = np.zeros(len(visits), dtype=bool)
-    loops = np.full(len(visits), "") if visits.loop is None else visits.loop
+    readings, been = visits.readings, np.zeros(len(visits), dtype=bool)
     for clamp in np.unique(taken.clamp):
         rows = taken.rows[taken.clamp == clamp]
         across = next((str(name) for name in readings.loop[rows] if name), "")
         pose = np.concatenate([readings.position[rows[0]], readings.angles[rows[0]]])
-        found |= (
+        been |= (
             (np.abs(visits.pose - pose) < 1e-6).all(axis=1)
             & (visits.extension == readings.tool_extension[rows[0]])
             & (visits.setup == readings.setup[rows[0]])
-            & np.isin(loops, ["", across])
+            & np.isin(visits.loop, ["", across])
         )
-    return found
+    return been
 
 
 def _taken(tables: Tables, files: tuple[str, ...], columns: Mapped) -> tuple[Taken, list[str]]:
     """The readings of measurement files that are the plan's, in their order; how many are not."""
     readings = tables.visits.readings
-    known: dict[tuple[Any, ...], int] = {}
-    for k in range(len(readings)):
-        known.setdefault(
-            _key(
-                readings.position[k], readings.angles[k], readings.direction[k], float(readings.force[k]),
-                float(readings.tool_extension[k]), str(readings.setup[k]), str(readings.loop[k]),
-            ),
-            k,
-        )  # fmt: skip
+    numbers = [readings.position, readings.angles, readings.direction]
+    numbers += [column[:, None] for column in (readings.force, readings.tool_extension)]
+    names = zip(readings.setup.tolist(), readings.loop.tolist(), strict=True)
+    known: dict[Key, int] = {}
+    for k, (row, (setup, loop)) in enumerate(zip(np.concatenate(numbers, axis=1).tolist(), names, strict=True)):
+        known.setdefault(_key(row, setup, loop), k)
     rows, logs, clamps, where, others = [], [], [], [], 0
     for table in [mapped_table(name, "measurements", COLUMNS, columns) for name in files]:
         for row in read_rows(table, planned=True).rows:
-            own = known.get(_of_row(row, tables.menu.setups[0]))
-            value = np.nan if own is None else _log(row, float(tables.offset[own]), float(tables.toward[own]))
-            if own is None:
+            tool = 0.0 if np.isnan(row.tool_extension) else row.tool_extension
+            setup, loop = row.labels["setup"] or tables.visits.menu.setups[0], row.labels["loop"]
+            place = known.get(_key([*row.position, *row.angles, *row.direction, row.force, tool], setup, loop))
+            if place is None:
                 others += 1
-            elif np.isfinite(value):
-                rows.append(own)
+                continue
+            value = _log(row, float(tables.offset[place]), float(tables.toward[place]))
+            if np.isfinite(value):
+                rows.append(place)
                 logs.append(value)
                 clamps.append(f"{table.file} {row.labels['clamp'] or row.position}")
                 where.append(f"{table.file}:{row.line}")
@@ -443,24 +315,15 @@ def _taken(tables: Tables, files: tuple[str, ...], columns: Mapped) -> tuple[Tak
     return Taken(np.array(rows, dtype=np.int64), np.array(logs), np.array(clamps, dtype=str), tuple(where)), notes
 
 
-def _of_row(row: Row, setup: str) -> tuple[Any, ...]:
-    extension = 0.0 if np.isnan(row.tool_extension) else row.tool_extension
-    return _key(
-        row.position, row.angles, row.direction, row.force, extension, row.labels["setup"] or setup, row.labels["loop"]
-    )
-
-
-def _key(
-    position: Any, angles: Any, direction: Any, force: float, tool: float, setup: str, loop: str
-) -> tuple[Any, ...]:
-    """What makes two readings the same of a plan, to a micrometre and a microradian."""
-    numbers = [*position, *angles, *direction, force * 1e-3, tool]
-    return (*(round(float(value), 6) + 0.0 for value in numbers), setup, loop)
+def _key(numbers: Sequence[float], setup: str, loop: str) -> Key:
+    """The key of position, angles, direction, force and tool; the force to a millinewton."""
+    *lengths, force, tool = numbers
+    return (*(round(float(value), 6) + 0.0 for value in (*lengths, 1e-3 * force, tool)), setup, loop)
 
 
 def _log(row: Row, offset: float, toward: float) -> float:
     """Ln k of a row as the plan compares it; nan where it has not been taken."""
-    if row.beside is None:
+    if row.of_tip:
         return float(np.log(row.stiffness))
-    joined = offset + toward * row.beside.compliance
+    joined = offset + toward * row.compliance
     return float(-np.log(joined)) if joined > 0.0 else float("nan")

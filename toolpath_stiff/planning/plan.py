@@ -1,4 +1,4 @@
-"""What to measure next, or first: which measurements would tell rival explanations apart, per minute of work.
+"""Plans between rivals: the measurements that would tell rival explanations apart, per minute of work.
 
 Visits are chosen one after another. Each lowers the bound on the chance of taking one rival for another,
 
@@ -11,53 +11,34 @@ has been told apart counts no more; one that cannot be told apart takes nothing 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.noise import LEAST
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.planning.gaps import (
-    MOST_REPEATS,
-    SETTLED,
-    Expectation,
-    GapShares,
-    ReadingNoise,
-    choose,
-    enough,
-    expectation,
-    in_order,
-    kind_of,
-    pair_shares,
-    plan_minutes,
-    repeat_and_clamping,
-    repeats_needed,
-    same_place,
-    why_of,
-)
+from toolpath_stiff.planning.choice import Pair, choose, in_order, why_of
+from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all
+from toolpath_stiff.planning.gaps import GapShares, ReadingNoise, pair_shares, repeat_and_clamping
 from toolpath_stiff.planning.indicators import loops_between, with_indicators
-from toolpath_stiff.planning.rivals import Forecast, Rival, forecast_all
-from toolpath_stiff.planning.visits import Costs, Matters, Menu, Visits, possible_visits
+from toolpath_stiff.planning.menu import Menu
+from toolpath_stiff.planning.outlook import SETTLED, Expectation, expected_outcome
+from toolpath_stiff.planning.visits import Matters, Visits, possible_visits
 
 MOST_RIVALS = 6  # a plan that separates more would separate none well
-
-
-MOST_VISITS = 200
-
-
+MOST_VISITS, MOST_REPEATS = 200, 64
 LEAST_GAP = 1.0  # standard deviations after all visits: below, tip stiffness cannot tell the two apart
-
-
 LEAST_GAIN = 0.01  # of a probability that is printed in whole per cent: less is no reason to measure
-
-
 # Where an indicator reads a link's own deflection.
 INDICATORS = {
     "tool": "between spindle nose and platform, and tool tip and spindle nose",
@@ -73,7 +54,7 @@ INDICATORS = {
 
 @dataclass(frozen=True)
 class PairGap:
-    """How far two rivals are apart.
+    """The gap between two rivals.
 
     Attributes
     ----------
@@ -94,70 +75,198 @@ class PairGap:
     indicator_across: dict[str, str]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RivalPlan:
-    """Visits to make, in order, and what is to be expected of them.
+    """Visits that tell rivals apart, and what is to be expected of them.
 
     Attributes
     ----------
-    visits
-        All that were possible.
-    chosen
-        Numbers of the chosen ones, in measuring order.
+    visits, usable
+        All that were possible; (v,) those that all rivals have an answer to.
+    picked
+        Numbers of the chosen ones, the best first.
+    seed
+        Of their order, and of the expected outcome.
+    rivals, forecasts
+        Those considered, the most probable first; what they expect of all readings.
+    scatter
+        How readings and the machine scatter.
     shares
         Pair of rivals -> what each visit adds to their gap.
-    pairs
-        The gaps, the narrowest first.
-    kinds, why
-        Of each chosen visit: what it changes, one word or two; what it is for, a sentence.
-    before, after
-        Expected before and after the plan; the probabilities of the truth and of a settled verdict.
-    enough
-        How many of the poses, the best ones, should do for a probability of `SETTLED` for the truth; None: not all.
-    repeats
-        How often each visit must be repeated, clamped anew, for a probability of `SETTLED` for the truth; None if
-        no number up to `MOST_REPEATS` does.
-    minutes
-        Work.
-    rivals
-        Those considered, the most probable first.
-    noise
-        Repeat noise of a reading and scatter of a clamping, relative sd.
     notes
         What was assumed or left out.
-    forecasts, usable, scatter
-        What the choice was made from: of each rival for all readings; (v,) visits that all rivals have an answer to;
-        how readings and the machine scatter.
+    verdict, errors
+        Of the diagnosis of the data, "" if none was made; mean errors so far, %.
     """
 
     visits: Visits
-    chosen: tuple[int, ...]
-    shares: dict[tuple[str, str], GapShares]
-    pairs: tuple[PairGap, ...]
-    kinds: tuple[str, ...]
-    why: tuple[str, ...]
-    before: Expectation
-    after: Expectation
-    enough: int | None
-    repeats: int | None
-    minutes: float
+    usable: BoolArray
+    picked: tuple[int, ...]
+    seed: int
     rivals: tuple[Rival, ...]
-    noise: tuple[float, float]
-    notes: tuple[str, ...]
     forecasts: tuple[Forecast, ...]
-    usable: NDArray[np.bool_]
     scatter: ReadingNoise
+    shares: Mapping[Pair, GapShares]
+    notes: tuple[str, ...]
+    verdict: str = ""
+    errors: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def chosen(self) -> tuple[int, ...]:
+        """Numbers of the chosen visits, in measuring order."""
+        return in_order(self.visits, self.picked, self.seed)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The change that each chosen visit brings, one word or two."""
+        return tuple(self.visits.kind(visit) for visit in self.chosen)
+
+    @property
+    def why(self) -> tuple[str, ...]:
+        """The purpose of each chosen visit, a sentence."""
+        return tuple(why_of(self.visits, visit, self.shares) for visit in self.chosen)
+
+    @property
+    def minutes(self) -> float:
+        """Work."""
+        return self.visits.minutes(self.chosen)
+
+    @cached_property
+    def pairs(self) -> tuple[PairGap, ...]:
+        """The gaps, the narrowest first, the links at which two rivals differ, and where an indicator reads them."""
+        pairs = []
+        for names, share in self.shares.items():
+            both = [rival for rival in self.rivals if rival.name in names]
+            common = set.intersection(*(set(rival.names) for rival in both))
+            effects = [active.effect for rival in both for active in rival.effects]
+            links = [effect.link for effect in effects if effect.name not in common]
+            best, gap = float(share.gaps_with(())[self.usable].max()), share.gap(self.chosen)
+            pairs.append(PairGap(names, gap, best, gap >= LEAST_GAP, {link: INDICATORS[link] for link in links}))
+        return tuple(sorted(pairs, key=lambda pair: pair.separation_sigma))
 
     @property
     def separable(self) -> bool:
-        """Whether any pair can be told apart by tip stiffness."""
+        """True where any pair can be told apart by tip stiffness."""
         return any(pair.separable for pair in self.pairs)
+
+    def expected(self, count: int | None = None, repeats: int = 1) -> Expectation:
+        """The expected outcome of the best visits (None: all), each made so often."""
+        rows = [self.visits.rows(visit) for visit in self.picked[:count]]
+        visit_of = np.repeat(np.arange(len(rows)), [len(some) for some in rows])
+        noise = self.scatter.shared_out(repeats)
+        return expected_outcome(self.forecasts, np.concatenate(rows), visit_of, noise, self.seed)
+
+    @property
+    def before(self) -> Expectation:
+        """The probabilities of the truth and of a settled verdict as they are now."""
+        weights = [forecast.weight for forecast in self.forecasts]
+        return Expectation(float(np.square(weights).sum()), float(max(weights) >= NAMED))
+
+    @cached_property
+    def after(self) -> Expectation:
+        """The same after the plan, to be expected."""
+        return self.expected()
+
+    @cached_property
+    def enough(self) -> int | None:
+        """The number of poses, the best ones, that should bring the truth a probability of `SETTLED`; None: not all."""
+        counts = range(1, len(self.picked) + 1)
+        return next((count for count in counts if self.expected(count).truth >= SETTLED), None)
+
+    @cached_property
+    def repeats(self) -> int | None:
+        """The repeats of each visit, clamped anew, that this takes; None: not even `MOST_REPEATS` do."""
+
+        def settles(repeats: int) -> bool:
+            return self.expected(repeats=repeats).truth >= SETTLED
+
+        if self.after.truth >= SETTLED:
+            return 1
+        if not settles(MOST_REPEATS):
+            return None
+        return bisect_left(range(MOST_REPEATS + 1), True, lo=1, hi=MOST_REPEATS, key=settles)
 
     @property
     def gains(self) -> bool:
-        """Whether the truth becomes likelier, or the verdict settled, on average, and more of it would go on so."""
+        """True where the truth becomes likelier, or the verdict settled, on average, and more of it would go on so."""
         rises = (self.after.truth - self.before.truth, self.after.settled - self.before.settled)
         return bool(max(rises) >= LEAST_GAIN and (self.separable or self.repeats is not None))
+
+    @property
+    def _rise(self) -> str:
+        """Never "100 %" for what is only expected."""
+        before, after = (_percent(expected.truth) for expected in (self.before, self.after))
+        return f"from {before} to {after}"
+
+    @property
+    def _work(self) -> str:
+        count = len(self.chosen)
+        return f"{count} pose{'s' if count > 1 else ''}, about {self.minutes:.0f} minutes"
+
+    @property
+    def sentences(self) -> list[str]:
+        """The promises of the plan."""
+        lines = [
+            f"{self._work}: the probability of the right explanation is expected to rise {self._rise}, "
+            f"and the verdict to be settled in {_percent(self.after.settled)} of cases"
+        ]
+        if not self.gains:
+            lines = [self.nothing_gained]
+        elif self.enough is not None and self.enough < len(self.chosen):
+            lines.append(f"{self.enough} of the poses should do for {100 * SETTLED:.0f} %; the others are in reserve")
+        elif self.repeats is None:
+            lines.append(
+                f"{100 * SETTLED:.0f} % is not expected from repeats of these poses, up to {MOST_REPEATS} of them"
+            )
+        elif self.repeats > 1:
+            lines.append(f"{100 * SETTLED:.0f} % is expected after {self.repeats} repeats of each, clamped anew")
+        for pair in self.pairs:
+            if not pair.separable:
+                places = "; or ".join(f"{link}: {place}" for link, place in pair.indicator_across.items())
+                lines.append(
+                    f"tip stiffness cannot tell {pair.effects[0]} from {pair.effects[1]} ({pair.separation_sigma:.1f} "
+                    f"sigma after all poses); put an indicator across the link: {places}"
+                )
+        if self.errors:
+            steps = ", ".join(f"{name} {value:.2f} %" for name, value in self.errors.items())
+            lines.insert(int(not self.gains), f"mean error so far: {steps}")
+        return lines
+
+    @property
+    def nothing_gained(self) -> str:
+        """A sentence: the plan is not worth its minutes, and what would tell its two likeliest rivals apart instead."""
+        first, second = (rival.name for rival in self.rivals[:2])
+        pair = next(pair for pair in self.pairs if {first, second} == set(pair.effects))
+        beside = bool((self.visits.readings.loop != "").any())  # indicators take part already
+        places = [] if beside else list(pair.indicator_across.values())
+        across = dict.fromkeys(place.split(":")[0] for place in places if not place.startswith("none: "))
+        parts = ["nothing worth measuring" + ("" if beside else " at the tip")]
+        parts += [f"an indicator {' or '.join(across)} would tell {first} from {second}"] if across else []
+        parts += dict.fromkeys(place.removeprefix("none: ") for place in places if place.startswith("none: "))
+        return f"{'; '.join(parts)}. {self._work}, would bring the probability of the right explanation {self._rise}"
+
+    def head(self) -> dict[str, Any]:
+        """The first entries of plan.json."""
+        return {
+            "kind": "rivals",
+            "verdict": self.verdict,
+            "mean_abs_error_percent": self.errors,
+            "rivals": [{"name": rival.name, "probability": rival.weight} for rival in self.rivals],
+            "poses": len(self.chosen),
+            "readings": int(self.visits.counts[list(self.chosen)].sum()),
+            "minutes": self.minutes,
+            "expected": {
+                "probability_of_truth_before": self.before.truth,
+                "probability_of_truth_after": self.after.truth,
+                "settled_before": self.before.settled,
+                "settled_after": self.after.settled,
+                "settled_at": NAMED,
+                "poses_to_settle": self.enough,
+                "repeats_to_settle": self.repeats,
+            },
+            "worth_measuring": self.gains,
+            "pairs": self.pairs,
+        }
 
 
 def plan_measurements(
@@ -167,7 +276,6 @@ def plan_measurements(
     n: int = 6,
     *,
     menu: Menu | None = None,
-    costs: Costs | None = None,
     seed: int = 0,
     effect_files: Sequence[str | Path] = (),
     strut_spread: float = STRUT_SPREAD,
@@ -184,7 +292,7 @@ def plan_measurements(
         Relative sd of one reading, re-clamping included; or (repeat, clamping).
     n
         Visits: poses, each with one tool, set-up and clamping.
-    menu, costs
+    menu
         What may vary (`Menu.of(data)` after some measurements), and what it costs.
     seed
         Of the poses to choose from, and of the expected outcome.
@@ -205,7 +313,7 @@ def plan_measurements(
     if repeat < LEAST:
         repeat = LEAST
         notes.append(f"planned for a noise of {100 * LEAST:g} % a reading: nobody measures better")
-    menu, costs = menu or Menu(), costs or Costs()
+    menu = menu or Menu()
     visits = possible_visits(machine, menu, matters(ranked), np.random.default_rng(seed))
     if menu.indicators:
         visits = with_indicators(machine, visits, loops_between(ranked), repeat)
@@ -217,39 +325,13 @@ def plan_measurements(
     forecasts = [
         replace(f, mean=np.where(good, f.mean, 0.0), factor=np.where(good[:, None], f.factor, 0.0)) for f in forecasts
     ]
-    noise = ReadingNoise(repeat, clamping, scatter)
-    notes.extend(_floors_in_words(menu, visits))
-    shares = {(f.name, g.name): pair_shares(visits, f, g, noise) for f, g in combinations(forecasts, 2)}
-    weights = {f.name: f.weight for f in forecasts}
-    picked = choose(visits, usable, shares, weights, n, costs, menu)
-    chosen = in_order(visits, picked, menu, seed)
-    return RivalPlan(
-        visits=visits,
-        chosen=chosen,
-        shares=shares,
-        pairs=_pairs(ranked, shares, chosen, usable),
-        kinds=tuple(kind_of(visits, visit, menu) for visit in chosen),
-        why=tuple(why_of(visits, visit, shares, menu) for visit in chosen),
-        before=Expectation(
-            float(np.square([f.weight for f in forecasts]).sum()), float(max(weights.values()) >= NAMED)
-        ),
-        after=expectation(visits, picked, forecasts, noise, seed),
-        enough=enough(visits, picked, forecasts, noise, seed),
-        repeats=repeats_needed(visits, picked, forecasts, noise, seed),
-        minutes=plan_minutes(visits, chosen, costs, menu),
-        rivals=ranked,
-        noise=(repeat, clamping),
-        notes=tuple(notes),
-        forecasts=tuple(forecasts),
-        usable=usable,
-        scatter=noise,
-    )
-
-
-def _floors_in_words(menu: Menu, visits: Visits) -> list[str]:
     floors = {name: low for name, low in menu.floors.items() if name in visits.setup}
     words = ", ".join(f"{1e3 * low:.4g} mm" + (f" in set-up {name}" if name else "") for name, low in floors.items())
-    return [f"no pose lower than was measured before: {words}; name heights to go lower"] if floors else []
+    notes += [f"no pose lower than was measured before: {words}; name heights to go lower"] if floors else []
+    noise = ReadingNoise(repeat, clamping, scatter)
+    shares = {(f.name, g.name): pair_shares(visits, f, g, noise) for f, g in combinations(forecasts, 2)}
+    picked = choose(visits, usable, shares, {f.name: f.weight for f in forecasts}, n)
+    return RivalPlan(visits, usable, picked, seed, ranked, tuple(forecasts), noise, shares, tuple(notes))
 
 
 def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
@@ -272,7 +354,7 @@ def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
 
 
 def matters(rivals: Sequence[Rival]) -> Matters:
-    """What the rivals' answers hang on."""
+    """Columns that the rivals' answers hang on."""
     actives = [active for rival in rivals for active in rival.effects]
     needs = {column for active in actives for column in active.effect.needs}
     # A set-up that an effect acts on is a text among its values.
@@ -281,79 +363,6 @@ def matters(rivals: Sequence[Rival]) -> Matters:
     return Matters(load=loaded or "force_N" in needs, setup="setup" in needs or bool(chosen), time="time_min" in needs)
 
 
-def random_visits(plan: RivalPlan, n: int, seed: int) -> tuple[int, ...]:
-    """As many visits to different places drawn blindly from the same menu: what planning is compared with."""
-    free = np.ones(len(plan.visits), dtype=bool)
-    rng = np.random.default_rng(seed)
-    found: list[int] = []
-    while len(found) < n and free.any():
-        visit = int(rng.choice(np.flatnonzero(free)))
-        found.append(visit)
-        free &= ~same_place(plan.visits, visit)
-    return tuple(found)
-
-
-def _pairs(
-    rivals: Sequence[Rival],
-    shares: dict[tuple[str, str], GapShares],
-    chosen: Sequence[int],
-    usable: NDArray[np.bool_],
-) -> tuple[PairGap, ...]:
-    """The gaps, the narrowest first, with the links at which two rivals differ and where an indicator reads them."""
-    pairs = []
-    for names, share in shares.items():
-        both = [rival for rival in rivals if rival.name in names]
-        common = set.intersection(*(set(rival.names) for rival in both))
-        links = [active.effect.link for rival in both for active in rival.effects if active.effect.name not in common]
-        best, gap = float(share.gaps_with(())[usable].max()), share.gap(chosen)
-        pairs.append(PairGap(names, gap, best, gap >= LEAST_GAP, {link: INDICATORS[link] for link in links}))
-    return tuple(sorted(pairs, key=lambda pair: pair.separation_sigma))
-
-
 def _percent(share: float) -> str:
     """Never "100 %" for what is only expected."""
     return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"
-
-
-def plan_text(plan: RivalPlan) -> list[str]:
-    """What the plan promises, in sentences."""
-    count = len(plan.chosen)
-    lines = [
-        f"{count} pose{'s' if count > 1 else ''}, about {plan.minutes:.0f} minutes: the probability of the right "
-        f"explanation is expected to rise from {_percent(plan.before.truth)} to {_percent(plan.after.truth)}, "
-        f"and the verdict to be settled in {_percent(plan.after.settled)} of cases"
-    ]
-    if not plan.gains:
-        lines = [nothing_gained(plan)]
-    elif plan.enough is not None and plan.enough < count:
-        lines.append(f"{plan.enough} of the poses should do for {100 * SETTLED:.0f} %; the others are in reserve")
-    elif plan.repeats is None:
-        lines.append(f"{100 * SETTLED:.0f} % is not expected from repeats of these poses, up to {MOST_REPEATS} of them")
-    elif plan.repeats > 1:
-        lines.append(f"{100 * SETTLED:.0f} % is expected after {plan.repeats} repeats of each, clamped anew")
-    for pair in plan.pairs:
-        if not pair.separable:
-            first, second = pair.effects
-            places = "; or ".join(f"{link}: {place}" for link, place in pair.indicator_across.items())
-            lines.append(
-                f"tip stiffness cannot tell {first} from {second} ({pair.separation_sigma:.1f} sigma after all poses); "
-                f"put an indicator across the link: {places}"
-            )
-    return lines
-
-
-def nothing_gained(plan: RivalPlan) -> str:
-    """That a plan is not worth its minutes, and what would tell its two likeliest rivals apart instead."""
-    count = len(plan.chosen)
-    first, second = (rival.name for rival in plan.rivals[:2])
-    pair = next(pair for pair in plan.pairs if {first, second} == set(pair.effects))
-    beside = bool((plan.visits.readings.loop != "").any())  # indicators take part already
-    places = [] if beside else list(pair.indicator_across.values())
-    across = dict.fromkeys(place.split(":")[0] for place in places if not place.startswith("none: "))
-    parts = ["nothing worth measuring" + ("" if beside else " at the tip")]
-    parts += [f"an indicator {' or '.join(across)} would tell {first} from {second}"] if across else []
-    parts += dict.fromkeys(place.removeprefix("none: ") for place in places if place.startswith("none: "))
-    return "; ".join(parts) + (
-        f". {count} pose{'s' if count > 1 else ''}, about {plan.minutes:.0f} minutes, would bring the probability of "
-        f"the right explanation from {_percent(plan.before.truth)} to {_percent(plan.after.truth)}"
-    )

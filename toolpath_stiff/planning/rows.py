@@ -17,9 +17,7 @@ POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 VECTOR = ("dx", "dy", "dz")
 
 
-def plan_rows(
-    visits: Visits, chosen: Sequence[int], taken: Iterable[str] = (), repeats: Sequence[int] = ()
-) -> list[dict[str, Any]]:
+def plan_rows(visits: Visits, chosen: Sequence[int], taken: Iterable[str] = ()) -> list[dict[str, Any]]:
     """Rows of a measurement file in shop units, in measuring order.
 
     Parameters
@@ -28,8 +26,6 @@ def plan_rows(
         The visits in measuring order; each is one clamping.
     taken
         Names of points that new points must not have.
-    repeats
-        Which repeat of its place each visit is, where places are clamped several times; else the rounds of a visit.
     """
     names = _point_names(visits, chosen, set(taken))
     readings = visits.readings
@@ -51,9 +47,7 @@ def plan_rows(
                 | ({"loop": str(readings.loop[row]), "displacement_um": ""} if beside else {})
                 | {"force_N": _round(readings.force[row])}
                 | ({"setup": str(visits.setup[visit])} if named else {})
-                | {"clamp": clamp}
-                | {"repeat": repeats[clamp - 1] if len(repeats) else int(visits.rounds[row])}
-                | {"point": names[clamp - 1]}
+                | {"clamp": clamp, "repeat": int(visits.rounds[row]), "point": names[clamp - 1]}
                 | ({"time_min": _round(min_from_s(readings.time[row]))} if timed else {})
                 | {"tool_extension_mm": _round(mm_from_m(visits.extension[visit]))}
             )

@@ -1,4 +1,4 @@
-"""What could be measured next: visits to poses, all reachable, and what each costs.
+"""Visits that could be made next: to poses, all reachable, and what each costs.
 
 A visit is one pose with one tool in one set-up, clamped once: the indicator is zeroed and readings are taken along
 some directions under one load or two. Visits are what costs time; further directions and loads at the same visit are
@@ -7,34 +7,23 @@ cheap.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
-from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
-from toolpath_stiff import defaults
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.planning.menu import MINUTE, Menu
+from toolpath_stiff.planning.poses import ROUND, draw_poses, reachable
 from toolpath_stiff.readings.measurements import Measurements
-from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import RAD_PER_DEG
-
-T = TypeVar("T")
-
+from toolpath_stiff.units import min_from_s
 
 AXES = ("X", "Y", "Z")
-
-
 DIAGONALS = ("XY", "XZ", "YZ")
-
-
 VECTORS: dict[str, tuple[float, float, float]] = {
     "X": (1.0, 0.0, 0.0),
     "Y": (0.0, 1.0, 0.0),
@@ -43,167 +32,8 @@ VECTORS: dict[str, tuple[float, float, float]] = {
     "XZ": (0.5**0.5, 0.0, 0.5**0.5),
     "YZ": (0.0, 0.5**0.5, 0.5**0.5),
 }
-
-
-MINUTE = 60.0
-
-
 READING_EVERY = 1.0 * MINUTE  # s between readings after zeroing; assumed
-
-
 MOST_PLACES = 400  # places with their tool, set-up and waiting; more would cost time and change little
-
-
-MARGIN = 0.02  # share of each limit's span that planned poses keep clear of it; assumed
-
-
-ROUND, ROUND_ANGLE = 5e-3, 0.5 * RAD_PER_DEG  # planned poses are round figures, which a person keys in
-
-
-UPRIGHT_SHARE = 0.25  # share of the poses with a vertical spindle
-
-
-STEEP_SHARE = 0.5  # share of the others with the largest tilt
-
-
-LOADS = (1e-3, 1e6)  # N, that a plan may ask for
-
-
-SETUP_ELSEWHERE = "table"  # the work on the bare table, where the data know only one set-up, with a name
-
-
-@dataclass(frozen=True)
-class Menu:
-    """What a plan may vary. Defaults are assumed; each is an option of `tps plan`.
-
-    Attributes
-    ----------
-    heights
-        m, of the tool tip; empty: five levels of the machine's reach on its axis.
-    radius
-        m, farthest from the machine's axis.
-    max_tilt
-        rad, of the spindle.
-    loads
-        N.
-    tool_extensions
-        m, longer than the reference tool; the first is in the spindle now.
-    setups
-        Names of set-ups; the first is on the table now.
-    waits
-        s between zeroing and the first reading; more than one lets a drift show.
-    oblique
-        Whether readings along the diagonals XY, XZ, YZ may be planned.
-    rounds
-        How often a reading may be taken in one clamping.
-    measured
-        Poses (m, 6) in m and rad that have been measured before, and may be again in another way.
-    labels
-        Names of these poses.
-    floors
-        Set-up -> m, below which the tool tip shall not go in it: a riser has a height that no column tells.
-    timed
-        Whether readings carry a time.
-    usual_load
-        N, where the load does not matter.
-    indicators
-        Whether a second indicator may be set across a link.
-    """
-
-    heights: tuple[float, ...] = ()
-    radius: float = 0.3
-    max_tilt: float = 25.0 * RAD_PER_DEG
-    loads: tuple[float, ...] = (500.0, 1000.0, 4000.0)
-    tool_extensions: tuple[float, ...] = (0.0, 0.15)
-    setups: tuple[str, ...] = ("",)
-    waits: tuple[float, ...] = (0.0, 10.0 * MINUTE)
-    oblique: bool = True
-    rounds: int = 2
-    measured: FloatArray = field(default_factory=lambda: np.zeros((0, 6)))
-    labels: tuple[str, ...] = ()
-    floors: Mapping[str, float] = field(default_factory=dict)
-    timed: bool = True
-    usual_load: float = defaults.FORCE
-    indicators: bool = False
-
-    def __post_init__(self) -> None:
-        if self.rounds < 1:
-            raise InputError(f"{self.rounds} rounds of readings in a plan", expected="1 or more")
-        for name in ("loads", "tool_extensions", "setups", "waits"):
-            if not getattr(self, name):
-                raise InputError(f"a plan without {name.replace('_', ' ')}", expected="at least one")
-        if not LOADS[0] <= min(self.loads) <= max(self.loads) <= LOADS[1]:
-            raise InputError(
-                f"a plan with loads of {', '.join(f'{load:g}' for load in self.loads)} N",
-                expected=f"{LOADS[0]:g} to {LOADS[1]:g} N",
-            )
-        if min(self.waits) < 0.0 or self.radius < 0.0 or self.max_tilt < 0.0:
-            raise InputError("a plan with a negative waiting time, radius or tilt", expected="0 or more")
-
-    @classmethod
-    def of(cls, data: Measurements) -> Menu:
-        """The menu after some measurements: also their poses, set-ups, tools and loads."""
-        poses = np.concatenate([data.position, data.angles], axis=1)
-        _, first = np.unique(np.round(poses, 6), axis=0, return_index=True)
-        first = np.sort(first)
-        setups = _by_last_use(map(str, data.setup))
-        if len(setups) == 1 and setups[0]:
-            setups = (*setups, SETUP_ELSEWHERE if setups[0] != SETUP_ELSEWHERE else "riser")
-        tools = _by_last_use(map(float, np.round(data.tool_extension, 6)))
-        counted = np.unique(data.force, return_counts=True)
-        return cls(
-            loads=tuple(sorted({*cls.loads, *data.force.tolist()})) if "force_N" not in data.missing else cls.loads,
-            tool_extensions=tuple(dict.fromkeys((*tools, *cls.tool_extensions))),
-            setups=setups,
-            measured=poses[first],
-            labels=tuple(data.point[first].tolist()),
-            floors={name: _lowest(data, name) for name in setups},
-            timed="time_min" not in data.missing,
-            usual_load=float(counted[0][np.argmax(counted[1])]),
-        )
-
-
-def _by_last_use(values: Iterable[T]) -> tuple[T, ...]:
-    """Distinct values, the one of the last reading first."""
-    return tuple(dict.fromkeys(reversed(list(values))))
-
-
-def _lowest(data: Measurements, setup: str) -> float:
-    """Lowest tool tip measured in a set-up; in one that was never used, the lowest of all."""
-    own = data.setup == setup
-    return float(data.position[own if own.any() else slice(None), 2].min())
-
-
-@dataclass(frozen=True)
-class Costs:
-    """Minutes of work; assumed, and the user's to change.
-
-    Attributes
-    ----------
-    reading
-        One more direction or load at a visit.
-    pose
-        Moving to another pose, clamping gauge and indicator, zeroing.
-    tool
-        Another tool.
-    setup
-        Another set-up: a riser on or off.
-    indicator
-        A second indicator across a link of the load path.
-    """
-
-    reading: float = 1.0
-    pose: float = 15.0
-    tool: float = 10.0
-    setup: float = 45.0
-    indicator: float = 10.0
-
-    def __post_init__(self) -> None:
-        if (
-            not min(self.reading, self.pose, self.tool, self.setup, self.indicator) >= 0.0
-            or self.pose + self.reading <= 0.0
-        ):
-            raise InputError("costs of a plan", expected="minutes, 0 or more, and a pose that costs something")
 
 
 @dataclass(frozen=True)
@@ -212,35 +42,38 @@ class Visits:
 
     Attributes
     ----------
+    menu
+        What they are chosen from.
     pose
         (v, 6) m and rad.
     extension, wait
         (v,) m; s.
     setup, label
         (v,) name of the set-up; of the point, if it was measured before.
+    loop
+        (v,) what a second indicator is set across, "" where there is none.
     readings
         The m readings that the visits are made of, stiffness empty.
     names, rounds
-        (m,) direction of each reading, a key of `VECTORS`; which reading it is of its kind in the clamping.
+        (m,) direction of each reading, a key of `VECTORS`; which reading it is of its kind.
     members
         Indices into `readings`, visit after visit.
     starts
         (v,) where each visit's members begin.
-    loop
-        (v,) what a second indicator is set across, "" where there is none; None: nowhere.
     """
 
+    menu: Menu
     pose: FloatArray
     extension: FloatArray
     wait: FloatArray
-    setup: NDArray[np.str_]
-    label: NDArray[np.str_]
+    setup: TextArray
+    label: TextArray
+    loop: TextArray
     readings: Measurements
-    names: NDArray[np.str_]
+    names: TextArray
     rounds: IntArray
     members: IntArray
     starts: IntArray
-    loop: NDArray[np.str_] | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -252,21 +85,53 @@ class Visits:
 
     def rows(self, visit: int) -> IntArray:
         """Indices of a visit's readings, in measuring order."""
-        own = self.members[self.starts[visit] : self.starts[visit] + self.counts[visit]]
-        return own[np.argsort(np.nan_to_num(self.readings.time[own]), kind="stable")]
-
-    def across(self, visit: int) -> str:
-        """What a second indicator is set across at a visit; "" where there is none."""
-        return "" if self.loop is None else str(self.loop[visit])
+        rows = self.members[self.starts[visit] : self.starts[visit] + self.counts[visit]]
+        return rows[np.argsort(np.nan_to_num(self.readings.time[rows]), kind="stable")]
 
     def tilt(self, visit: int) -> float:
         """Angle of the spindle from the vertical, rad."""
         return float(np.arccos(np.clip(np.cos(self.pose[visit, 3]) * np.cos(self.pose[visit, 4]), -1.0, 1.0)))
 
+    def same_place(self, visit: int) -> BoolArray:
+        """(v,) visits to the same pose with the same tool in the same set-up: other readings there are no new pose."""
+        there = (self.pose == self.pose[visit]).all(axis=1)
+        return np.asarray(
+            there & (self.extension == self.extension[visit]) & (self.setup == self.setup[visit]), dtype=bool
+        )
+
+    def kind(self, visit: int) -> str:
+        """The dearest thing that the visit changes."""
+        if self.setup[visit] != self.menu.setups[0]:
+            return "another set-up"
+        if self.loop[visit]:
+            return "an indicator"
+        if self.wait[visit] > self.menu.waits[0]:
+            return "waiting"
+        if self.extension[visit] != self.menu.tool_extensions[0]:
+            return "another tool"
+        return "tilted" if self.tilt(visit) > 1e-6 else "vertical"
+
+    def further_minutes(self, chosen: Sequence[int]) -> FloatArray:
+        """(v,) minutes that each visit adds to those chosen; visits of one set-up and tool are made together."""
+        costs, tool, rows = self.menu.costs, self.menu.tool_extensions[0], list(chosen)
+        setups = [self.menu.setups[0], *self.setup[rows].tolist()]
+        equipped = set(zip(setups, [tool, *self.extension[rows].tolist()], strict=True))
+        known = [  # in a new set-up the tool that is in the spindle stays there
+            there in equipped or (there[0] not in setups and there[1] == tool)
+            for there in zip(self.setup.tolist(), self.extension.tolist(), strict=True)
+        ]
+        minutes = costs.pose + costs.reading * self.counts + min_from_s(self.wait)
+        minutes = minutes + costs.indicator * (self.loop != "") + costs.setup * ~np.isin(self.setup, setups)
+        return np.asarray(minutes + costs.tool * ~np.array(known))
+
+    def minutes(self, chosen: Sequence[int]) -> float:
+        """Minutes of work for the chosen visits."""
+        return sum(float(self.further_minutes(chosen[:k])[visit]) for k, visit in enumerate(chosen))
+
 
 @dataclass(frozen=True)
 class Matters:
-    """Which columns the rivals' answers hang on; only these are varied."""
+    """Columns that the rivals' answers hang on; only these are varied."""
 
     load: bool = False
     setup: bool = False
@@ -275,6 +140,10 @@ class Matters:
 
 def possible_visits(machine: Machine, menu: Menu, matters: Matters, rng: Generator) -> Visits:
     """Every visit that a plan may choose from.
+
+    Each place is offered with every choice of directions, loads and rounds. X, Y, Z are always read: what the rivals do
+    not think of shows there. Readings are taken round by round, the axes before the diagonals, in random order: a drift
+    does not look like a direction.
 
     Raises
     ------
@@ -286,7 +155,6 @@ def possible_visits(machine: Machine, menu: Menu, matters: Matters, rng: Generat
     per_pose = len(tools) * len(setups) * len(waits)
     new = draw_poses(machine, menu, max(MOST_PLACES // per_pose - len(menu.measured), 40), rng)
     poses = np.concatenate([menu.measured, new])
-    labels = (*menu.labels, *[""] * len(new))
     places = [
         (pose, tool, setup, wait)
         for tool in tools
@@ -299,90 +167,99 @@ def possible_visits(machine: Machine, menu: Menu, matters: Matters, rng: Generat
             f"machine {machine.name} reaches none of the poses that the plan may choose from",
             hint="allow other heights, less tilt or a smaller radius",
         )
-    which = np.array([place[0] for place in places])
-    loads = menu.loads if matters.load else (menu.usual_load,)
+    which, extension, setup, wait = (np.array(column) for column in zip(*places, strict=True))
+    loads, every_round = menu.loads if matters.load else (menu.usual_load,), range(1, menu.rounds + 1)
     directions = AXES + DIAGONALS if menu.oblique else AXES
-    jobs = [Job(*job) for job in product(range(1, menu.rounds + 1), directions, loads)]
-    readings = _readings(poses[which], places, jobs, menu.timed, rng)
-    members, starts, owner = _variants(len(places), jobs, loads)
-    return Visits(
-        pose=poses[which][owner],
-        extension=np.array([place[1] for place in places])[owner],
-        wait=np.array([place[3] for place in places])[owner],
-        setup=np.array([place[2] for place in places], dtype=str)[owner],
-        label=np.array([labels[i] for i in which], dtype=str)[owner],
-        readings=readings,
-        names=np.tile([job.direction for job in jobs], len(places)),
-        rounds=np.tile([job.round for job in jobs], len(places)),
-        members=members,
-        starts=starts,
+    rounds, names, forces = (np.array(column) for column in zip(*product(every_round, directions, loads), strict=True))
+    axes = np.isin(names, AXES)
+    groups = [np.flatnonzero((rounds == last) & (axes == first)) for last, first in product(every_round, (True, False))]
+    slots = np.empty((len(places), len(names)))
+    for place in range(len(places)):
+        slots[place, np.concatenate([rng.permutation(group) for group in groups])] = np.arange(1, len(names) + 1)
+    load_choices: list[tuple[float, ...]] = [(load,) for load in loads]
+    load_choices += [(min(loads), max(loads))] if len(loads) > 1 else []
+    named = [AXES, directions] if menu.oblique else [AXES]
+    choices = [
+        np.flatnonzero(np.isin(names, some) & np.isin(forces, under) & (rounds <= last))
+        for some, under, last in product(named, load_choices, every_round)
+    ]
+    return visits_of(
+        menu,
+        (poses[which], extension, setup),
+        np.broadcast_to(names, slots.shape),
+        np.broadcast_to(forces, slots.shape),
+        wait[:, None] + slots * READING_EVERY,
+        rounds=rounds,
+        wait=wait,
+        label=np.array([*menu.labels, *[""] * len(new)], dtype=str)[which],
+        choices=choices,
     )
 
 
-class Job(NamedTuple):
-    """One reading at a visit: which round it belongs to, its direction (a key of `VECTORS`), its load in N."""
+def visits_of(
+    menu: Menu,
+    places: tuple[FloatArray, FloatArray, TextArray],
+    names: TextArray,
+    force: FloatArray,
+    time: FloatArray,
+    *,
+    rounds: IntArray | int = 1,
+    wait: FloatArray | None = None,
+    label: TextArray | None = None,
+    choices: Sequence[IntArray] | None = None,
+) -> Visits:
+    """Visits to p places with k readings each, or with some of these.
 
-    round: int
-    direction: str
-    load: float
-
-
-def _variants(places: int, jobs: Sequence[Job], loads: Sequence[float]) -> tuple[IntArray, IntArray, IntArray]:
-    """Members, starts and place of the visits: each place with every choice of directions, loads and rounds.
-
-    X, Y, Z are always read: what the rivals do not think of shows there.
+    Parameters
+    ----------
+    menu
+        What they are chosen from.
+    places
+        Poses (p, 6), tools' extensions and set-ups (p,).
+    names, force, time
+        (p, k) directions, N, s (or (k,)).
+    rounds
+        (p, k) or (k,): which reading it is of its kind.
+    wait, label
+        (p,) s; names of points.
+    choices
+        Each place is a visit for every choice of its readings; None: one with all of them.
     """
-    load_choices: list[tuple[float, ...]] = [(load,) for load in loads]
-    if len(loads) > 1:
-        load_choices.append((min(loads), max(loads)))
-    named = [AXES, VECTORS] if any(job.direction not in AXES for job in jobs) else [AXES]
-    choices = [
-        np.array([k for k, job in enumerate(jobs) if job.direction in names and job.load in some and job.round <= last])
-        for names, some, last in product(named, load_choices, sorted({job.round for job in jobs}))
-    ]
-    members, starts, owner, at = [], [], [], 0
-    for place, choice in product(range(places), choices):
-        members.append(place * len(jobs) + choice)
-        starts.append(at)
-        owner.append(place)
-        at += len(choice)
-    return np.concatenate(members), np.array(starts), np.array(owner)
-
-
-def _readings(
-    poses: FloatArray, places: Sequence[tuple[int, float, str, float]], jobs: Sequence[Job], timed: bool, rng: Generator
-) -> Measurements:
-    """Every place with every job, in that order.
-
-    Round by round, the axes before the diagonals, in random order: a drift does not look like a direction.
-    """
-    count = len(jobs)
-    groups = [
-        np.array([k for k, job in enumerate(jobs) if job.round == last and (job.direction in AXES) == axes], dtype=int)
-        for last, axes in product(sorted({job.round for job in jobs}), (True, False))
-    ]
-    slots = np.empty((len(places), count))
-    for place in range(len(places)):
-        slots[place, np.concatenate([rng.permutation(group) for group in groups])] = np.arange(1, count + 1)
-    waits = np.array([place[3] for place in places])
-    return planned_readings(
-        np.repeat(poses, count, axis=0),
-        np.tile([job.direction for job in jobs], len(places)),
-        np.tile([job.load for job in jobs], len(places)),
-        np.repeat([place[1] for place in places], count),
-        np.repeat(np.array([place[2] for place in places], dtype=str), count),
-        (waits[:, None] + slots * READING_EVERY).ravel() if timed else np.full(len(places) * count, np.nan),
+    pose, extension, setup = places
+    p, k = names.shape
+    choices = choices or [np.arange(k)]
+    place, counts = np.repeat(np.arange(p), len(choices)), np.tile([len(choice) for choice in choices], p)
+    return Visits(
+        menu=menu,
+        pose=pose[place],
+        extension=extension[place],
+        wait=np.zeros(len(place)) if wait is None else wait[place],
+        setup=setup[place],
+        label=np.full(len(place), "") if label is None else label[place],
+        loop=np.full(len(place), ""),
+        readings=planned_readings(
+            np.repeat(pose, k, axis=0),
+            names.ravel(),
+            force.ravel(),
+            np.repeat(extension, k),
+            np.repeat(setup, k),
+            np.broadcast_to(time, (p, k)).ravel() if menu.timed else np.full(p * k, np.nan),
+        ),
+        names=names.ravel(),
+        rounds=np.broadcast_to(rounds, (p, k)).ravel(),
+        members=(k * np.arange(p)[:, None] + np.concatenate(choices)).ravel(),
+        starts=np.cumsum(counts) - counts,
     )
 
 
 def planned_readings(
     pose: FloatArray,
-    names: NDArray[np.str_],
+    names: TextArray,
     force: FloatArray,
     extension: FloatArray,
-    setup: NDArray[np.str_],
+    setup: TextArray,
     time: FloatArray,
-    loop: NDArray[np.str_] | None = None,
+    loop: TextArray | None = None,
 ) -> Measurements:
     """Readings that have not been taken.
 
@@ -422,95 +299,3 @@ def planned_readings(
         extra={},
         missing=tuple(sorted(missing)),
     )
-
-
-def visits_in_full(
-    pose: FloatArray,
-    extension: FloatArray,
-    setup: NDArray[np.str_],
-    names: NDArray[np.str_],
-    force: FloatArray,
-    time: FloatArray,
-) -> Visits:
-    """Visits (v,) with k readings each, taken once: along `names` (v, k) under `force` (v, k), at `time` (k,)."""
-    v, count = names.shape
-    readings = planned_readings(
-        np.repeat(pose, count, axis=0), names.ravel(), force.ravel(), np.repeat(extension, count),
-        np.repeat(setup, count), np.tile(time, v),
-    )  # fmt: skip
-    members = np.arange(v * count)
-    return Visits(
-        pose, extension, np.zeros(v), setup, np.full(v, ""), readings, names.ravel(),
-        np.ones(v * count, dtype=np.int64), members, members[::count].copy(),
-    )  # fmt: skip
-
-
-def draw_poses(machine: Machine, menu: Menu, count: int, rng: Generator) -> FloatArray:
-    """(m, 6) round, reachable poses with the reference tool, m <= count; a quarter of them with a vertical spindle."""
-    levels = np.array(menu.heights or axis_levels(machine))
-    found: list[FloatArray] = []
-    for batch in range(8):
-        m = count
-        radius, azimuth = menu.radius * np.sqrt(rng.random(m)), rng.uniform(0.0, 2.0 * np.pi, m)
-        # The largest tilts mostly tell the most.
-        tilt, about = menu.max_tilt * np.sqrt(rng.uniform(0.16, 1.0, m)), rng.uniform(0.0, 2.0 * np.pi, m)
-        tilt[rng.random(m) < STEEP_SHARE] = menu.max_tilt
-        tilt[rng.random(m) < UPRIGHT_SHARE] = 0.0
-        position = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), rng.choice(levels, m)], axis=1)
-        # Toward zero: rounding never tilts further than allowed.
-        angles = np.stack([tilt * np.cos(about), tilt * np.sin(about), np.zeros(m)], axis=1)
-        angles = np.trunc(angles / ROUND_ANGLE + 1e-9 * np.sign(angles)) * ROUND_ANGLE
-        position[:, :2] = np.trunc(position[:, :2] / ROUND) * ROUND
-        poses = np.concatenate([position, angles], axis=1) + 0.0
-        if batch == 0:
-            poses[: len(levels)] = np.stack([np.array([0.0, 0.0, z, 0.0, 0.0, 0.0]) for z in levels])[:m]
-        found += list(poses[reachable(machine, poses, 0.0)])
-        if len(found) >= count:
-            break
-    return np.array(found[:count]).reshape(-1, 6)
-
-
-def axis_levels(machine: Machine, count: int = 5) -> tuple[float, ...]:
-    """Heights in m, from the lowest to the highest that the tip reaches on the axis, a tenth of the way from each end.
-
-    The machine's axis is its base frame's Z.
-    """
-    low, high = machine.limits.workspace[:, 2]
-    if not np.isfinite(high - low):
-        middle, size = machine.limits.neutral_pose[2], float(np.ptp(machine.frame_joints[:, 2]))
-        size = max(size, 0.2 * float(np.abs(machine.frame_joints[:, :2]).max()))
-        low, high = middle - size, middle + size
-    tries = np.linspace(low, high, 200)
-    poses = np.zeros((len(tries), 6))
-    poses[:, 2] = tries
-    good = tries[reachable(machine, poses, 0.0)]
-    if not len(good):
-        raise InputError(
-            f"machine {machine.name} reaches no pose on its axis with a vertical spindle",
-            hint="give the heights of the plan",
-        )
-    ends = good[0] + 0.1 * np.ptp(good), good[-1] - 0.1 * np.ptp(good)
-    return tuple((np.round(np.linspace(*ends, count) / (2.0 * ROUND)) * 2.0 * ROUND).tolist())
-
-
-def reachable(machine: Machine, pose: FloatArray, tool_extension: float, margin: float = MARGIN) -> NDArray[np.bool_]:
-    """(n,) whether the machine takes poses (n, 6) with such a tool, clear of its limits and of a strut law at zero."""
-    rotation = rotation_matrices(pose[:, 3:])
-    struts = solve_struts(machine, pose[:, :3], rotation, machine.reference_tool_length + tool_extension)
-    stiff = (machine.strut_law.stiffness(struts.lengths) > 0.0).all(axis=1)
-    return np.asarray(stiff & (reach(machine, pose[:, :3], struts, rotation).margin >= margin))
-
-
-def images(pose: FloatArray) -> FloatArray:
-    """(3, 6) a vertical pose (6,) and its images turned by 120 and 240 degrees about the machine's axis."""
-    turned = np.repeat(pose[None], 3, axis=0)
-    for k, angle in enumerate((0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)):
-        c, s = np.cos(angle), np.sin(angle)
-        turned[k, :2] = c * pose[0] - s * pose[1], s * pose[0] + c * pose[1]
-    return turned
-
-
-def with_options(menu: Menu, **changes: Any) -> Menu:
-    """The menu with those options that are not None. Who names the heights knows how low a set-up may be used."""
-    given: dict[str, Any] = {n: tuple(v) if isinstance(v, list) else v for n, v in changes.items() if v is not None}
-    return replace(menu, **given | ({"floors": {}} if "heights" in given else {}))

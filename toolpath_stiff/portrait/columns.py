@@ -30,7 +30,10 @@ from toolpath_stiff.stiffness.terms import (
     variable_values,
 )
 
-Shapes = tuple[tuple[tuple[str, Constants], ...], FloatArray]  # shape and constants; (s, n) or (s, n, 6) values
+Shape = tuple[str, Constants]  # and its constants
+
+
+Shapes = tuple[tuple[Shape, ...], FloatArray]  # shape and constants; (s, n) or (s, n, 6) values
 
 
 BUMPS, MOST_EDGES = 5, 5
@@ -48,7 +51,7 @@ TURNED = 0.1  # rms change of stiffness at which a resistance to turning is look
 PHASES = 3  # of half a turn; the other half is the other sign's
 
 
-def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "") -> list[tuple[str, Constants]]:
+def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "") -> list[Shape]:
     """Shapes over the values that a variable takes, with their constants; none where it does not vary.
 
     `signed`: of what may change to both sides, where one side of each shape says it all; `column`: of a tilt. About a
@@ -56,78 +59,47 @@ def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "")
     """
     if variable in ("constant", "direction", "setup"):
         return [("offset", ())]
-    different = np.unique(np.round(values, 9))
-    if variable == "force sign":
-        return _signs(signed) if len(different) > 1 else []
-    if len(different) < 2 or different[-1] - different[0] <= 1e-9 * max(abs(different[-1]), 1e-9):
-        return []
-    low, high = float(different[0]), float(different[-1])
-    many = len(different)
-    found: list[tuple[str, Constants]] = []
-    if variable in ("load", "strut force") and not (signed and many == 2):
-        # Of what may change to both sides, less of what friction holds is play.
-        play = variable == "strut force" and not signed
-        found += _of_a_force(low, high, float(np.median(values)), many > 2, play)
-    found += _slopes(low, high, signed, many > 4)
-    return found if many == 2 else found + _bent(variable, different, signed, column)
-
-
-def _bent(variable: str, different: FloatArray, signed: bool, column: str) -> list[tuple[str, Constants]]:
-    """Shapes that are no straight lines, over three values or more of a variable, ascending."""
     sides = (1.0,) if signed else (1.0, -1.0)
-    low, high = float(different[0]), float(different[-1])
-    many, place = len(different), variable in (*PLACE, "strut length")
-    found = _squares(low, high, place)
-    if column in SWINGS:
-        found.append(("square", (("centre", 0.0), ("reach", high))))
-    edges = [0.0] if column in AXES else _edges(different, MOST_EDGES if place else 3)
-    found += [("threshold", (("edge", edge), ("side", side))) for edge in edges for side in sides]
-    if place and many > 4:
-        found += _bumps(low, high)
-    if (place or variable not in VARIABLES) and many > 8:
-        found += _periodic(variable, low, high - low, many, signed)
-    return found
-
-
-def _signs(signed: bool) -> list[tuple[str, Constants]]:
-    """Tension or compression alone."""
-    return [("sign", (("side", side),)) for side in ((1.0,) if signed else (1.0, -1.0))]
-
-
-def _of_a_force(low: float, high: float, reference: float, several: bool, play: bool) -> list[tuple[str, Constants]]:
-    """Powers of a force, what friction holds below some of it, and play that some of it uses up."""
-    powers: list[tuple[str, Constants]] = [
-        ("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)
-    ]
-    held = [low + share * (high - low) for share in (0.05, 0.15, 0.3)] if several else [0.5 * low, 0.9 * low]
-    used_up: list[tuple[str, Constants]] = [("threshold", (("within", force),)) for force in held if play]
-    return [*powers, *(("threshold", (("beyond", force),)) for force in held), *used_up]
-
-
-def _squares(low: float, high: float, place: bool) -> list[tuple[str, Constants]]:
-    """Squares about the middle of the range, and of a place about the machine's axis."""
-    centres = [0.5 * (low + high)] + ([0.0] if low < 0.0 < high and place else [])
-    return [("square", (("centre", c), ("reach", max(high - c, c - low)))) for c in centres]
-
-
-def _bumps(low: float, high: float) -> list[tuple[str, Constants]]:
-    """Bumps over the range of a place, of two widths."""
-    return [
-        ("bump", (("centre", float(c)), ("width", (high - low) / parts)))
-        for c in np.linspace(low, high, BUMPS)
-        for parts in (4.0, 8.0)
-    ]
-
-
-def _slopes(low: float, high: float, signed: bool, within: bool) -> list[tuple[str, Constants]]:
-    """Straight lines over the range, and from its middle on."""
-    middle = 0.5 * (low + high)
+    different = np.unique(np.round(values, 9))
+    low, high, many = float(different[0]), float(different[-1]), len(different)
+    if variable == "force sign":
+        return [("sign", (("side", side),)) for side in sides] if many > 1 else []
+    if many < 2 or high - low <= 1e-9 * max(abs(high), 1e-9):
+        return []
+    middle, place = 0.5 * (low + high), variable in (*PLACE, "strut length")
+    shapes: list[Shape] = []
+    if variable in ("load", "strut force") and not (signed and many == 2):
+        # Powers of a force, and what friction holds below some of it. Of what may change to both sides, less of what
+        # friction holds is play, which some of a force uses up.
+        reference = float(np.median(values))
+        shapes += [("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)]
+        held = [low + share * (high - low) for share in (0.05, 0.15, 0.3)] if many > 2 else [0.5 * low, 0.9 * low]
+        shapes += [("threshold", (("beyond", force),)) for force in held]
+        play = held if variable == "strut force" and not signed else []
+        shapes += [("threshold", (("within", force),)) for force in play]
+    # Straight lines over the range, and from its middle on.
+    bent = [low, high] if signed else [high, low]
+    bent = bent if many > 4 else []
     if signed:
-        begins = (middle,) if within else ()
-        bent = [(("from", b), ("end", e)) for b in begins for e in (low, high)]
-        return [("slope", (("start", middle), ("end", high))), *(("threshold", at) for at in bent)]
-    lines = [(low, high), (high, low)] + ([(middle, high), (middle, low)] if within else [])
-    return [("slope", (("start", start), ("end", end))) for start, end in lines]
+        shapes.append(("slope", (("start", middle), ("end", high))))
+        shapes += [("threshold", (("from", middle), ("end", end))) for end in bent]
+    else:
+        lines = [(low, high), (high, low), *((middle, end) for end in bent)]
+        shapes += [("slope", (("start", start), ("end", end))) for start, end in lines]
+    if many == 2:
+        return shapes
+    # Squares about the middle of the range, and of a place about the machine's axis.
+    centres = [middle, *([0.0] if low < 0.0 < high and place else [])]
+    shapes += [("square", (("centre", c), ("reach", max(high - c, c - low)))) for c in centres]
+    shapes += [("square", (("centre", 0.0), ("reach", high)))] if column in SWINGS else []
+    edges = [0.0] if column in AXES else _edges(different, MOST_EDGES if place else 3)
+    shapes += [("threshold", (("edge", edge), ("side", side))) for edge in edges for side in sides]
+    if place and many > 4:
+        bumps = product(np.linspace(low, high, BUMPS).tolist(), (4.0, 8.0))
+        shapes += [("bump", (("centre", centre), ("width", (high - low) / parts))) for centre, parts in bumps]
+    if (place or variable not in VARIABLES) and many > 8:
+        shapes += _periodic(variable, low, high - low, many, signed)
+    return shapes
 
 
 def _edges(different: FloatArray, most: int) -> list[float]:
@@ -138,49 +110,46 @@ def _edges(different: FloatArray, most: int) -> list[float]:
     return [*between.tolist(), 0.0] if different[0] < 0.0 < different[-1] else between.tolist()
 
 
-def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -> list[tuple[str, Constants]]:
+def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -> list[Shape]:
     """Waves over the range: some turns of a place, down to a screw's lead in a strut's length."""
     turns = np.arange(1.0, min(MOST_TURNS, many / 3.0) + 0.5)
     if variable == "strut length":
         # So close that between two neighbours a wave over the whole range loses a quarter of a turn at most.
         turns = np.arange(1.0, min(span / SHORTEST_PITCH, many / 3.0), 0.5)
-    found: list[tuple[str, Constants]] = []
-    for turn in turns.tolist():
-        period = span / turn
-        phases = np.arange(PHASES if signed else 2 * PHASES) / (2.0 * PHASES)
-        found += [("periodic", (("period", period), ("crest", low + float(p) * period))) for p in phases]
-    return found
+    phases = np.arange(PHASES if signed else 2 * PHASES) / (2.0 * PHASES)
+    waves = product((span / turns).tolist(), phases.tolist())
+    return [("periodic", (("period", period), ("crest", low + phase * period))) for period, phase in waves]
 
 
 def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
     """The same term with constants about its own: steps of a grid's spacing times `finer`."""
     at = term.constants
-    names = [name for name in at if name not in ("first", "second", "side", "power", "reference", "reach")]
+    names = set(at) - {"first", "second", "side", "power", "reference", "reach"}
     if not names or term.shape == "sign":
         return []
     values = ground.values(term.variable, term.column)
     low, high = float(values.min()), float(values.max())
     step = finer * (high - low) / BUMPS
-    moves: dict[str, FloatArray] = {name: at[name] + step * np.linspace(-0.5, 0.5, 7) for name in names}
-    for name in {"width", "period"} & set(names):
+    about = np.linspace(-0.5, 0.5, 7)
+    moves = {name: at[name] + step * about for name in at if name in names}
+    for name in {"width", "period"} & names:
         spread = 0.7 if name == "width" else 0.25 * at["period"] / (high - low)
         moves[name] = at[name] * np.exp(finer * np.linspace(-spread, spread, 7))
     if "crest" in names:
-        moves["crest"] = at["crest"] + finer * at["period"] / (2 * PHASES) * np.linspace(-0.5, 0.5, 7)
+        moves["crest"] = at["crest"] + finer * at["period"] / (2 * PHASES) * about
+    begins = "from" if "from" in at else "start"
     if "end" in at:  # where it begins; its end is a matter of scale
-        begins = "from" if "from" in at else "start"
-        moves = {begins: np.clip(moves[begins], low - step, high + step)}
         if begins == "start" and len(term.signs) > 1:
             return []
-    found = []
-    for values_of in product(*moves.values()):
-        new = at | dict(zip(moves, (float(v) for v in values_of), strict=True))
-        if "width" in new and new["width"] < (high - low) / 30.0:
-            continue
-        if "end" in at and (new["end"] - new[begins]) * (at["end"] - at[begins]) <= 0.0:
-            continue
-        found.append(replace(term, at=tuple(new.items())))
-    return found if moves else []
+        moves = {begins: np.clip(moves[begins], low - step, high + step)}
+    near = []
+    for constants in product(*(move.tolist() for move in moves.values())):
+        new = at | dict(zip(moves, constants, strict=True))
+        narrow = "width" in new and new["width"] < (high - low) / 30.0
+        turned = "end" in at and (new["end"] - new[begins]) * (at["end"] - at[begins]) <= 0.0
+        if not (narrow or turned):
+            near.append(replace(term, at=tuple(new.items())))
+    return near
 
 
 class Ground:
@@ -195,7 +164,7 @@ class Ground:
     """
 
     def __init__(self, predictor: Predictor, compliance: FloatArray, law: FloatArray) -> None:
-        data, path = predictor.data, predictor.full_path()
+        data, path = predictor.data, predictor.full_path
         forces = predictor.strut_forces()
         self.predictor, self.data, self.compliance = predictor, data, compliance
         self.path: LoadPath = replace(path, strut_forces=forces * data.force[:, None], direction=data.direction)
@@ -208,16 +177,13 @@ class Ground:
 
     def values(self, variable: str, column: str = "") -> FloatArray:
         """(n,) or (n, 6) of a variable, SI; also the order of the readings (0 to 1) and further columns."""
-        key = (variable, column)
-        if key not in self._values:
-            if variable == "order":
-                found = np.linspace(0.0, 1.0, len(self.data))
-            elif variable in self.data.extra:
-                found = self.data.extra[variable]
-            else:
-                found = variable_values(variable, self.path, column)
-            self._values[key] = found
-        return self._values[key]
+        if variable == "order":
+            return np.linspace(0.0, 1.0, len(self.data))
+        if variable in self.data.extra:
+            return self.data.extra[variable]
+        if (variable, column) not in self._values:
+            self._values[variable, column] = variable_values(variable, self.path, column)
+        return self._values[variable, column]
 
     def known(self, variable: str) -> bool:
         """Whether the readings say what a variable is."""

@@ -7,8 +7,9 @@ series.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Precision, inverse_root
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem, law_prior
-from toolpath_stiff.inference.gates import Simulator, set_wild_aside
+from toolpath_stiff.inference.gates import set_wild_aside, simulate
 from toolpath_stiff.inference.noise import Noise, Scatter, scaled_inverse
 from toolpath_stiff.portrait.columns import Ground, shapes_near
 from toolpath_stiff.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of, products
@@ -38,6 +39,9 @@ STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
 
 
 NOT_LINEAR, AT_SIZE = ("turning",), 3  # actions that are not linear in their size, and fits at the size of the last
+
+
+FINER = (1.0, 0.4)  # shares of a grid's spacing, for constants about those of a term
 
 
 ROUNDS = 2  # searches for wild readings
@@ -89,7 +93,6 @@ class Description:
         return np.asarray(np.sqrt(np.maximum(np.diag(self.fit.covariance)[2:], 0.0)) / self.scale)
 
 
-@dataclass
 class Selection:
     """The search on one set of readings, beside a base fit.
 
@@ -99,19 +102,20 @@ class Selection:
         Readings, model and scatter; the fit that leaves something.
     noise, seed
         Of the simulated campaigns.
+
+    Attributes
+    ----------
+    compliance, rest
+        (n,) m/N of the base fit; what of it the struts do not contribute.
+    ground
+        What columns are made from.
     """
 
-    problem: Problem
-    base: Fit
-    noise: Noise
-    seed: int
-    compliance: FloatArray = field(init=False)
-    rest: FloatArray = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.compliance = np.exp(self.base.residual - self.problem.observed)
-        self.rest = self.compliance - self.problem.predictor.strut_part(self.base.law)
-        self.ground = Ground(self.problem.predictor, self.compliance, self.base.law)
+    def __init__(self, problem: Problem, base: Fit, noise: Noise, seed: int) -> None:
+        self.problem, self.base, self.noise, self.seed = problem, base, noise, seed
+        self.compliance = np.exp(base.residual - problem.observed)
+        self.rest = self.compliance - problem.predictor.strut_part(base.law)
+        self.ground = Ground(problem.predictor, self.compliance, base.law)
 
     @cached_property
     def dictionary(self) -> Dictionary:
@@ -145,7 +149,7 @@ class Selection:
             laws, size = laws + step[:, :2], np.clip(size + step[:, 2:], low, high)
             if done < SETTLED:
                 break
-        residual = self._linearised(laws, size, columns)[0]
+        residual, _ = self._linearised(laws, size, columns)
         posterior = -0.5 * precision.squares(residual) - 0.5 * (laws**2).sum(axis=1) / LAW_PRIOR**2
         return Sizes(laws, size, residual, posterior)
 
@@ -168,105 +172,107 @@ class Selection:
         """Terms fitted together, with the readings that this fit takes for wild."""
         low, high = self.limits(terms, scale)
         for _ in range(ROUNDS):
-            found = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
-            law, again = found.law[0], self.problem.scatter.with_wild(found.residual[0], scatter)
+            sizes = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
+            law, again = sizes.law[0], self.problem.scatter.with_wild(sizes.residual[0], scatter)
             if again is scatter:
                 break
             scatter = again
-        found = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
-        sized = tuple(t.sized(float(u / s)) for t, u, s in zip(terms, found.size[0], scale, strict=True))
-        jacobian = self._linearised(found.law, found.size, columns[None])[1][0]
+        sizes = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
+        sized = tuple(t.sized(float(u / s)) for t, u, s in zip(terms, sizes.size[0], scale, strict=True))
+        residual, jacobian = sizes.residual[0], self._linearised(sizes.law, sizes.size, columns[None])[1][0]
         for k, term in enumerate(sized):
             if term.action in NOT_LINEAR:
-                grows = self.ground.slope(term) / scale[k]
-                jacobian[2 + k] = -grows * np.exp(self.problem.observed - found.residual[0])
+                jacobian[2 + k] = -self.ground.slope(term) / scale[k] * np.exp(self.problem.observed - residual)
         information = scatter.precision.times(jacobian) @ jacobian.T + law_prior(len(jacobian))
+        covariance = np.asarray(scaled_inverse(information))
         fit = replace(
-            self.base, law=found.law[0], residual=found.residual[0], jacobian=jacobian.T,
-            covariance=np.asarray(scaled_inverse(information)), scatter=scatter,
-        )  # fmt: skip
-        return Description(sized, columns, scale, fit, float(found.posterior[0]) + scatter.log_price)
+            self.base, law=sizes.law[0], residual=residual, jacobian=jacobian.T, covariance=covariance, scatter=scatter
+        )
+        return Description(sized, columns, scale, fit, float(sizes.posterior[0]) + scatter.log_price)
+
+    def only(self, description: Description, rows: Sequence[int]) -> Description:
+        """Some terms of a description, in this order, refitted."""
+        rows, fit = list(rows), description.fit
+        terms = [description.terms[k] for k in rows]
+        return self.described(terms, description.columns[rows], description.scale[rows], fit.law, fit.scatter)
+
+    def without(self, description: Description, k: int) -> Description:
+        """A description less one of its terms, refitted."""
+        return self.only(description, [j for j in range(len(description.terms)) if j != k])
 
     def scores(self, before: Description) -> FloatArray:
         """(N,) twice the gain in log likelihood of each term beside a description, linearised."""
-        projected = self._projected(before)
-        pulls = set_wild_aside(projected.times(before.fit.residual[None]), projected).pulls
-        return np.asarray(self._gains(-pulls @ self.dictionary.columns.T, before)[0])
+        return np.asarray(self._gains(before.fit.residual[None], before)[0])
 
     def chance(self, before: Description, gain: float) -> tuple[float, float]:
         """How often the best of all terms gains as much by chance; the gain that it rarely reaches."""
-        projected = self._projected(before)
-        draws = Simulator.of(self.noise, self.problem.scatter.covariance, self.seed, DRAWS).draws
-        pulls = set_wild_aside(projected.times(draws), projected).pulls
-        best = self._gains(-pulls @ self.dictionary.columns.T, before).max(axis=-1)
+        draws = simulate(self.noise, self.problem.scatter.covariance, self.seed, DRAWS)
+        best = self._gains(draws, before).max(axis=-1)
         return float((1.0 + (best >= gain).sum()) / (1.0 + len(best))), float(np.quantile(best, 1.0 - JOINS))
-
-    def _projected(self, before: Description) -> Precision:
-        return before.fit.projected
 
     @cached_property
     def _squares(self) -> FloatArray:
         """(N,) information of each term by itself under the base fit's scatter."""
         return np.asarray(self.base.scatter.precision.squares(self.dictionary.columns))
 
-    def _gains(self, slope: FloatArray, before: Description) -> FloatArray:
-        """(s, N) of slopes (s, N), where the size goes to an allowed side.
+    def _gains(self, residuals: FloatArray, before: Description) -> FloatArray:
+        """(s, N) twice the gain in log likelihood for residuals (s, n), where the size goes to an allowed side.
 
         Beside a description each term has the information A - A J (J^T A J + prior)^-1 J^T A leaves of it.
         """
+        projected, columns = before.fit.projected, self.dictionary.columns
+        slope = -set_wild_aside(projected.times(residuals), projected)[0] @ columns.T
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
         root = inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
-        information = self._squares - ((self.dictionary.columns @ (weighted.T @ root)) ** 2).sum(axis=1)
+        information = self._squares - ((columns @ (weighted.T @ root)) ** 2).sum(axis=1)
         allowed = self.dictionary.signed | (slope > 0.0)
         seen = information > 1e-6 * self._squares
         return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))
 
     def finalists(self, gains: FloatArray) -> list[Entry]:
         """The best of all terms, and of every link and variable."""
-        count: dict[tuple[str, str], int] = {}
+        count: Counter[tuple[str, str]] = Counter()
         chosen = []
         order = np.argsort(-gains, kind="stable")
         for rank, i in enumerate(order[gains[order] > 0.0].tolist()):
             entry = self.dictionary.entries[i]
             kind = (entry.local.link, entry.variable)
-            if rank < FINALISTS or count.get(kind, 0) < EACH:
+            if rank < FINALISTS or count[kind] < EACH:
                 chosen.append(entry)
-                count[kind] = count.get(kind, 0) + 1
+                count[kind] += 1
         return chosen
 
     def together(self, before: Description, terms: Sequence[Term]) -> Sizes:
         """Each of some terms refitted along with a description."""
-        columns = np.stack([self.ground.column(one) for one in terms]) / self.compliance
+        columns = np.stack([self.ground.column(term) for term in terms]) / self.compliance
         scale = np.maximum(np.sqrt((columns**2).mean(axis=1)), 1e-300)
-        own = np.stack(self.limits(terms, scale))  # (2, G)
-        shared = np.stack(self.limits(before.terms, before.scale))  # (2, p)
-        count = len(terms)
-        both = np.concatenate(
-            [np.repeat(before.columns[None], count, axis=0), (columns / scale[:, None])[:, None]], axis=1
-        )
-        low, high = (
-            np.concatenate([np.repeat(shared[k][None], count, axis=0), own[k][:, None]], axis=1) for k in (0, 1)
-        )
-        return self.fitted(both, low, high, before.fit.law, before.fit.scatter.precision)
+
+        def beside(shared: FloatArray, each: FloatArray) -> FloatArray:
+            """(G, p + 1, ..) of what all share (p, ..) and of each term (G, ..)."""
+            return np.concatenate([np.repeat(shared[None], len(terms), axis=0), each[:, None]], axis=1)
+
+        limits = zip(self.limits(before.terms, before.scale), self.limits(terms, scale), strict=True)
+        low, high = (beside(shared, each) for shared, each in limits)
+        every = beside(before.columns, columns / scale[:, None])
+        return self.fitted(every, low, high, before.fit.law, before.fit.scatter.precision)
 
     def grown(self, before: Description) -> Description | None:
         """A description with the best further term, its constants settled; None where none has a size."""
         entries = self.finalists(self.scores(before))
         if not entries:
             return None
-        found = self.together(before, [entry.term for entry in entries])
+        sizes = self.together(before, [entry.term for entry in entries])
         # Under the law of few places for many constants, the likelier of two that fit alike.
-        best = int(np.argmax(found.posterior))
-        grown = self.settled(before, self.extended(before, entries[best].term))
-        return self._best_place(before, grown)
+        best = entries[int(np.argmax(sizes.posterior))].term
+        return self._best_place(before, self.settled(before, self.extended(before, best)))
 
     def _best_place(self, before: Description, grown: Description) -> Description:
         """The last term's variable and shape where they fit best."""
         entries = crossed(grown.terms[-1], self.ground)
         if len(entries) < 2:
             return grown
-        found = self.together(self.scattered(before, grown), [entry.term for entry in entries])
-        logs = found.posterior + np.array([entry.log_prior for entry in entries])
+        sizes = self.together(self.scattered(before, grown), [entry.term for entry in entries])
+        logs = sizes.posterior + np.array([entry.log_prior for entry in entries])
         best = entries[int(np.argmax(logs))].term
         if best == grown.terms[-1]:
             return grown
@@ -280,19 +286,13 @@ class Selection:
     def extended(self, before: Description, term: Term) -> Description:
         """A description with a term more, all refitted."""
         column, scale = self._scaled(term)
-        grown = self.described(
-            (*before.terms, term),
-            np.concatenate([before.columns, column[None]]),
-            np.append(before.scale, scale),
-            before.fit.law,
-            before.fit.scatter,
-        )
-        if all(one.action not in NOT_LINEAR for one in grown.terms):
-            return grown
-        for _ in range(AT_SIZE):
-            scaled = [self._scaled(one) for one in grown.terms]
-            columns, scales = np.stack([column for column, _ in scaled]), np.array([scale for _, scale in scaled])
-            grown = self.described(grown.terms, columns, scales, grown.fit.law, grown.fit.scatter)
+        columns, scales = np.concatenate([before.columns, column[None]]), np.append(before.scale, scale)
+        grown = self.described((*before.terms, term), columns, scales, before.fit.law, before.fit.scatter)
+        if any(sized.action in NOT_LINEAR for sized in grown.terms):
+            for _ in range(AT_SIZE):
+                scaled = [self._scaled(sized) for sized in grown.terms]
+                columns, scales = np.stack([column for column, _ in scaled]), np.array([scale for _, scale in scaled])
+                grown = self.described(grown.terms, columns, scales, grown.fit.law, grown.fit.scatter)
         return grown
 
     def _scaled(self, term: Term) -> tuple[FloatArray, float]:
@@ -303,14 +303,11 @@ class Selection:
 
     def settled(self, before: Description, grown: Description) -> Description:
         """With finer constants of the last term's shape."""
-        for finer in (1.0, 0.4):
+        for finer in FINER:
             near = shapes_near(grown.terms[-1], self.ground, finer)
             if not near:
                 return grown
-            found = self.together(self.scattered(before, grown), near)
-            better = self.extended(before, near[int(np.argmax(found.posterior))])
-            if better.posterior > grown.posterior:
-                grown = better
+            grown = self._likelier(before, self.scattered(before, grown), near, grown)[0]
         return grown
 
     def multiplied(self, before: Description, whole: Description, k: int) -> Description | None:
@@ -319,28 +316,25 @@ class Selection:
         terms = products(whole.terms[k], self.ground)
         if not terms:
             return None
-        found = self.together(others, terms)
-        best = self.extended(before, terms[int(np.argmax(found.posterior))])
+        best, _ = self._likelier(before, others, terms)
         second = best.terms[-1].second
         assert second is not None
-        for finer in (1.0, 0.4):
+        for finer in FINER:
             near = shapes_near(second, self.ground, finer)
             if not near:
                 return best
-            factors = [replace(best.terms[-1], times=Factor(t.variable, t.shape, t.at, t.column)) for t in near]
-            found = self.together(others, factors)
-            better = self.extended(before, factors[int(np.argmax(found.posterior))])
-            if better.posterior > best.posterior:
-                best, second = better, near[int(np.argmax(found.posterior))]
+            factors = [Factor(term.variable, term.shape, term.at, term.column) for term in near]
+            best, i = self._likelier(before, others, [replace(best.terms[-1], times=one) for one in factors], best)
+            second = second if i is None else near[i]
         return best
 
-    def without(self, description: Description, k: int) -> Description:
-        """A description less one of its terms, refitted."""
-        kept = [j for j in range(len(description.terms)) if j != k]
-        return self.described(
-            [description.terms[j] for j in kept], description.columns[kept], description.scale[kept],
-            description.fit.law, description.fit.scatter,
-        )  # fmt: skip
+    def _likelier(
+        self, before: Description, others: Description, terms: Sequence[Term], known: Description | None = None
+    ) -> tuple[Description, int | None]:
+        """The likeliest of some further terms, refitted, and which it is; None where `known` is likelier."""
+        i = int(np.argmax(self.together(others, terms).posterior))
+        better = self.extended(before, terms[i])
+        return (better, i) if known is None or better.posterior > known.posterior else (known, None)
 
 
 def _bounded_step(
@@ -348,17 +342,14 @@ def _bounded_step(
 ) -> FloatArray:
     """(G, 2 + p) Newton steps; sizes that would leave their bounds are held there and the others solved again."""
     scale = np.sqrt(np.maximum(np.einsum("gii->gi", information), 1e-300))
-    matrix = information / (scale[:, :, None] * scale[:, None, :])
-    matrix += 1e-10 * np.eye(matrix.shape[-1])
+    matrix = information / (scale[:, :, None] * scale[:, None, :]) + 1e-10 * np.eye(scale.shape[1])
     right = gradient / scale
     step = np.linalg.solve(matrix, right[..., None])[..., 0] / scale
     moved = size + step[:, 2:]
-    goal = np.clip(moved, low, high)
-    held = np.zeros(step.shape, dtype=bool)
+    goal, held, fixed = np.clip(moved, low, high), np.zeros(step.shape, dtype=bool), np.zeros(step.shape)
     held[:, 2:] = goal != moved
     if not held.any():
         return np.asarray(step)
-    fixed = np.zeros(step.shape)
     fixed[:, 2:] = np.where(held[:, 2:], goal - size, 0.0)
     left = right - np.einsum("gij,gj->gi", matrix, fixed * scale)
     free = ~held

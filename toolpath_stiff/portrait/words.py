@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.portrait.alike import Alike
-from toolpath_stiff.stiffness.contract import joined
+from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.stiffness.terms import PINS, SWINGS, Term
 from toolpath_stiff.units import RAD_PER_DEG
 

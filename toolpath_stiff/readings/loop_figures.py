@@ -25,7 +25,6 @@ from toolpath_stiff.readings.raw_shape import Play, Shape, play_of, shape_of, si
 from toolpath_stiff.readings.rows import SOFTEST, STIFFEST
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
-ONE_SIDE = 0.05  # of the range: a force set on a bench that goes less far to the other side is of one side
 CLOSED = 3  # turns of the drive, from which the records hold a closed cycle
 STEPS = 3.0  # of the indicator, that it misses while it stands still, from which that is told of
 
@@ -36,6 +35,8 @@ class LoopFigures:
 
     Attributes
     ----------
+    loop
+        Its records; none of a strut whose stiffness was worked out elsewhere.
     stiffness
         N/m, the paper's equation 12.
     force
@@ -57,20 +58,21 @@ class LoopFigures:
     tension, compression
         N/m, slopes of the two sides of a strut on a bench; beyond the lost motion where there is any.
     beyond
-        N/m, what the secant of a strut on a bench would be without lost motion (`raw_records.play_of`). nan
+        N/m, what the secant of a strut on a bench would be without lost motion (`raw_shape.play_of`). nan
         without a closed cycle that reaches both sides.
     plays
         Whether the record shows lost motion.
     """
 
+    loop: Loop
     stiffness: float
     force: float
-    deflection: float
-    lost_motion: float
-    loop_width: float
-    linearity: float
-    closure: float
-    shape: Shape
+    deflection: float = math.nan
+    lost_motion: float = math.nan
+    loop_width: float = math.nan
+    linearity: float = math.nan
+    closure: float = math.nan
+    shape: Shape = Shape()  # noqa: RUF009  (frozen)
     tension: float = math.nan
     compression: float = math.nan
     beyond: float = math.nan
@@ -83,11 +85,19 @@ class LoopFigures:
 
     @property
     def side(self) -> float:
-        """1 of a tension that is stated, -1 of a compression, 0 where neither is."""
+        """1 of tension, -1 of compression, as recorded or stated; 0 of both or unknown."""
+        if len(self.loop.force):
+            return self.loop.side
         return 0.0 if math.isnan(self.force) else math.copysign(1.0, self.force)
 
-
-NO_FIGURES = LoopFigures(*(math.nan,) * 7, Shape())
+    @property
+    def standstill(self) -> tuple[float, float, float] | None:
+        """Where the indicator of a bench stood still while the force went on, as `stands_still`; None: it did not."""
+        loop = self.loop
+        if loop.jog is not None or not len(loop.force):
+            return None
+        still = stands_still(loop.force, loop.displacement, turns_of(loop.drive))
+        return still if still and abs(still[2] - still[1]) / self.stiffness > STEPS * loop.resolution else None
 
 
 def reduce_loop(loop: Loop) -> LoopFigures:
@@ -98,6 +108,42 @@ def reduce_loop(loop: Loop) -> LoopFigures:
     InputError
         The loop does not reach both sides, or gives no stiffness that could be.
     """
+    drive, turns = loop.drive, turns_of(loop.drive)
+    force, deflection = _between_extremes(loop, turns)
+    cycle = loop.part(closed_cycle(turns)) if len(turns) >= CLOSED else loop
+    ways = [slice(start, end + 1) for start, end in pairwise(turns_of(cycle.drive)[:CLOSED])]
+    width = _loop_width(cycle, ways[0])
+    play = _play(loop, turns)
+    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width, gap=play.shown)
+    if play.shown:
+        # Lost motion adds the same to the compliance of both sides: their difference is kept, and together they give
+        # the deflection without it at the extremes.
+        high, low = float(drive.max()), float(drive.min())
+        apart = 1.0 / sides[0] - 1.0 / sides[1]
+        pushed = (deflection - play.size - apart * high) / (high - low)
+        pulled = pushed + apart
+        sides = (1.0 / pulled, 1.0 / pushed) if min(pulled, pushed) > 0.0 else (math.nan, math.nan)
+    main_force, main = cycle.force[ways[0]], cycle.deflection[ways[0]]
+    secant = main[0] + (main[-1] - main[0]) * (main_force - main_force[0]) / (main_force[-1] - main_force[0])
+    return LoopFigures(
+        loop,
+        stiffness=force / deflection,
+        force=loop.side * force if loop.side else force / 2.0,
+        deflection=deflection,
+        lost_motion=_lost_motion(cycle),
+        loop_width=width,
+        linearity=float(np.abs(main - secant).max() / deflection),
+        closure=float(loop.deflection[-1] - loop.deflection[0]),
+        shape=shape_of(cycle.force, cycle.deflection, ways, width),
+        tension=sides[0],
+        compression=sides[1],
+        beyond=force / (deflection - play.size),
+        plays=play.shown,
+    )
+
+
+def _between_extremes(loop: Loop, turns: list[int]) -> tuple[float, float]:
+    """Force (N) and deflection (m) between the extremes. Raises `InputError` where they give no stiffness."""
     where = {"file": loop.file or None, "line": loop.line}
     drive = loop.drive
     high, low = float(drive.max()), float(drive.min())
@@ -107,87 +153,48 @@ def reduce_loop(loop: Loop) -> LoopFigures:
             expected="extremes on both sides of zero, as 0, +200, -200, 0 um",
             **where,  # type: ignore[arg-type]
         )
-    turns = turns_of(drive)
     if len(turns) >= CLOSED:
-        ends = ends_without_drift(drive, loop.force, loop.deflection, turns, loop.same)
-        force, deflection = ends.force, ends.deflection
+        force, deflection = ends_without_drift(drive, loop.force, loop.deflection, turns, loop.same)
     else:
         at_high, at_low = drive >= high - loop.same, drive <= low + loop.same
-        force = float(loop.force[at_high].mean() - loop.force[at_low].mean())
-        deflection = float(loop.deflection[at_high].mean() - loop.deflection[at_low].mean())
-    stiffness = force / deflection if deflection else math.inf
-    if not SOFTEST <= n_per_mm_from_n_per_m(stiffness) <= STIFFEST:
-        raise MeasurementError(
-            f"{loop.title}: {force:g} N over a deflection of {um_from_m(deflection):g} um",
-            expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm",
-            hint=_hint(loop, stiffness),
-            **where,  # type: ignore[arg-type]
-        )
-    cycle = loop.part(closed_cycle(turns)) if len(turns) >= CLOSED else loop
-    width = _loop_width(cycle)
-    play = _play(loop, turns)
-    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width, gap=play.shown)
-    beyond = force / (deflection - play.size)
-    if play.shown:
-        sides = _sides_beyond(sides, (high, -low), deflection - play.size)
-    return LoopFigures(
-        stiffness=stiffness,
-        force=one_side * force if (one_side := side_of(loop)) else force / 2.0,
-        deflection=deflection,
-        lost_motion=_lost_motion(cycle, float(cycle.drive.max()), float(cycle.drive.min())),
-        loop_width=width,
-        linearity=_linearity(cycle, deflection),
-        closure=float(loop.deflection[-1] - loop.deflection[0]),
-        shape=shape_of(cycle.force, cycle.deflection, _ways(cycle), width),
-        tension=sides[0],
-        compression=sides[1],
-        beyond=beyond,
-        plays=play.shown,
-    )
-
-
-def _hint(loop: Loop, stiffness: float) -> str:
-    """What may be wrong with a loop that gives no stiffness that could be."""
+        force, deflection = (float(of[at_high].mean() - of[at_low].mean()) for of in (loop.force, loop.deflection))
+    stiffness = n_per_mm_from_n_per_m(force / deflection) if deflection else math.inf
+    if SOFTEST <= stiffness <= STIFFEST:
+        return force, deflection
     if loop.jog is not None:
-        return "force, jog and displacement count positive the same way; displacement is what the indicator read"
-    if stiffness < 0.0:
-        return (
+        hint = "force, jog and displacement count positive the same way; displacement is what the indicator read"
+    elif stiffness < 0.0:
+        hint = (
             "tension and stretch are positive: one of the two columns counts the other way; turn its sign, "
             "or say --compression-positive (compression_positive=True)"
         )
-    return (
-        "tension and stretch are positive; a slope needs two forces; another unit than N and um is said by a mapping: "
-        '--columns "force=force_N:kN, displacement=displacement_um:mm" (columns=)'
+    else:
+        hint = (
+            "tension and stretch are positive; a slope needs two forces; another unit than N and um is said by a "
+            'mapping: --columns "force=force_N:kN, displacement=displacement_um:mm" (columns=)'
+        )
+    raise MeasurementError(
+        f"{loop.title}: {force:g} N over a deflection of {um_from_m(deflection):g} um",
+        expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm",
+        hint=hint,
+        **where,  # type: ignore[arg-type]
     )
 
 
-def side_of(loop: Loop) -> float:
-    """1 of a bench record under tension alone, -1 under compression alone, 0 of any other loop."""
-    if loop.jog is not None or not len(loop.force):
-        return 0.0
-    least = ONE_SIDE * float(np.ptp(loop.force))
-    return 1.0 if loop.force.min() >= -least else -1.0 if loop.force.max() <= least else 0.0
-
-
-def _lost_motion(loop: Loop, high: float, low: float) -> float:
+def _lost_motion(loop: Loop) -> float:
     """Straight lines through the outer half of each side, both passes; their distance at zero force."""
-    drive, same, at_zero = loop.drive, loop.same, []
-    if not low < 0.0 < high or side_of(loop):
+    drive, at_zero = loop.drive, []
+    high, low = float(drive.max()), float(drive.min())
+    if not low < 0.0 < high or loop.side:
         return math.nan
     for outer in (drive >= 0.5 * high - SAME_JOG, drive <= 0.5 * low + SAME_JOG):
         force, deflection = loop.force[outer], loop.deflection[outer]
-        if np.ptp(drive[outer]) < same or np.ptp(force) == 0.0:
+        if np.ptp(drive[outer]) < loop.same or np.ptp(force) == 0.0:
             return math.nan
         centred = force - force.mean()
         slope = (centred @ deflection) / (centred @ centred)
         at_zero.append(float(deflection.mean() - slope * force.mean()))
     return at_zero[0] - at_zero[1]
-
-
-def _ways(loop: Loop) -> list[slice]:
-    """The records from one extreme to the other, whichever comes first, and of a closed cycle those back."""
-    turns = turns_of(loop.drive)[:CLOSED]
-    return [slice(one, other + 1) for one, other in pairwise(turns)]
 
 
 def _sides(loop: Loop, turns: list[int], width: float, gap: bool) -> tuple[float, float]:
@@ -202,7 +209,7 @@ def _sides(loop: Loop, turns: list[int], width: float, gap: bool) -> tuple[float
 
 def _play(loop: Loop, turns: list[int]) -> Play:
     """The lost motion of a strut on a bench, of all its closed cycles."""
-    if loop.jog is not None or len(turns) < CLOSED or side_of(loop):
+    if loop.jog is not None or len(turns) < CLOSED or loop.side:
         return Play(math.nan, False)
     records = closed_cycles(turns)
     cycles = loop.part(records)
@@ -210,20 +217,8 @@ def _play(loop: Loop, turns: list[int]) -> Play:
     return play_of(cycles.force, cycles.deflection, np.where(way == 1, 1.0, -1.0))
 
 
-def _sides_beyond(sides: tuple[float, float], reach: tuple[float, float], deflection: float) -> tuple[float, float]:
-    """Slopes of the two sides in N/m without lost motion, which adds the same to the compliance of both.
-
-    Their difference in compliance is kept; together they give the deflection (m) without it at the forces `reach`.
-    """
-    apart = 1.0 / sides[0] - 1.0 / sides[1]
-    pushed = (deflection - apart * reach[0]) / sum(reach)
-    pulled = pushed + apart
-    return (1.0 / pulled, 1.0 / pushed) if min(pulled, pushed) > 0.0 else (math.nan, math.nan)
-
-
-def _loop_width(loop: Loop) -> float:
+def _loop_width(loop: Loop, main: slice) -> float:
     """The way from extreme to extreme against the way there and the way back, at the forces of the latter."""
-    main = _ways(loop)[0]
     order = np.argsort(loop.force[main], kind="stable")
     force, deflection = loop.force[main][order], loop.deflection[main][order]
     other = np.r_[0 : main.start, main.stop : len(loop.force)].astype(int)
@@ -233,13 +228,6 @@ def _loop_width(loop: Loop) -> float:
     return float(np.abs(loop.deflection[other] - np.interp(loop.force[other], force, deflection)).max())
 
 
-def _linearity(loop: Loop, deflection: float) -> float:
-    main = _ways(loop)[0]
-    force, read = loop.force[main], loop.deflection[main]
-    secant = read[0] + (read[-1] - read[0]) * (force - force[0]) / (force[-1] - force[0])
-    return float(np.abs(read - secant).max() / deflection)
-
-
 def in_tension(loop: Loop) -> Loop:
     """A loop of a bench with tension positive; its displacement counts the way that makes a stiffness positive."""
     if loop.jog is not None or not len(loop.force):
@@ -247,14 +235,6 @@ def in_tension(loop: Loop) -> Loop:
     force = -loop.force
     way = 1.0 if float((force - force.mean()) @ (loop.displacement - loop.displacement.mean())) > 0.0 else -1.0
     return replace(loop, force=force, displacement=way * loop.displacement)
-
-
-def stuck_at(loop: Loop, figures: LoopFigures) -> tuple[float, float, float] | None:
-    """Where the indicator of a bench stood still while the force went on, as `stands_still`; None where it did not."""
-    if loop.jog is not None or not len(loop.force):
-        return None
-    still = stands_still(loop.force, loop.displacement, turns_of(loop.drive))
-    return still if still and abs(still[2] - still[1]) / figures.stiffness > STEPS * loop.resolution else None
 
 
 def reduce_loops(loops: Iterable[Loop]) -> list[LoopFigures]:

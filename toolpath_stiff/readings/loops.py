@@ -1,4 +1,4 @@
-"""Readings of an indicator beside the tip: what a row of a measurement file says of them, and how they are compared.
+"""Readings of an indicator beside the tip: how they are compared.
 
 Stiffnesses are compared by their logarithms. A joint that does not give way reads zero, which has none; and a strut
 gets longer or shorter. So a loop's reading y (displacement per load, m/N) is compared as that of a spring in series
@@ -14,10 +14,9 @@ is a stiffness of its own and has no offset.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,16 +25,6 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.stiffness.measuring_loop import TIP, WORDS, MeasuringLoop, measuring_loop
-from toolpath_stiff.units import m_from_um
-
-LARGEST_UM = 1e6
-
-
-LEAST_FORCE = 1e-3  # N, of either sign
-
-
-SOFTEST_ALONE, STIFFEST_ALONE = 1e5, 1e10  # N/m; beyond, the unit of a strut measured alone is wrong
-
 
 # Scatter of one reading where no `sd_um` says: a lever indicator or probe with its stand, and the load; assumed.
 INDICATOR_SD, LOAD_SHARE = 0.3e-6, 0.02  # m; of the reading
@@ -50,75 +39,12 @@ WIDEST = 0.05  # of offset and reading: relative sd up to which the logarithm is
 BACKWARDS = 3.0  # times a reading of the wrong sign, so that its logarithm exists
 
 
-class LoopReading(NamedTuple):
-    """One reading.
-
-    m/N per load (nan if planned), its sd in m/N (nan: not stated), N, length of a strut alone in m, and its side: 1
-    under tension, -1 under compression.
-    """
-
-    compliance: float
-    sd: float
-    force: float
-    length: float
-    side: float = 1.0
-
-
 def loop_of(text: str) -> MeasuringLoop:
     """The loop that a cell names. Raises `InputError`."""
     found = measuring_loop(text)
     if found is None:
         raise MeasurementError(f"loop {text!r}", expected=WORDS)
     return found
-
-
-def loop_reading(
-    record: Mapping[str, str], numbers: Mapping[str, float], loop: MeasuringLoop, planned: bool
-) -> LoopReading:
-    """What a row says of a loop beside the tip.
-
-    Parameters
-    ----------
-    record
-        Column -> cell.
-    numbers
-        The same of the columns that hold numbers, nan where a cell is empty or absent: `displacement_um`,
-        `stiffness_N_per_mm`, `force_N` and `LOOP_COLUMNS`.
-    loop
-        Which loop.
-    planned
-        Whether the reading may be absent.
-
-    Raises
-    ------
-    InputError
-        There is no reading, or two that disagree, or one that cannot be.
-    """
-    alone = loop.kind == "alone"
-    own = numbers["strut_force_N"]
-    if not alone and not (math.isnan(own) and math.isnan(numbers["length_mm"])):
-        raise MeasurementError(f"strut_force_N or length_mm in a row of loop {loop}", expected="loop strut 1 alone")
-    force = own if alone and not math.isnan(own) else numbers["force_N"]
-    if abs(force) < LEAST_FORCE:
-        raise MeasurementError(f"strut_force_N = {force:g}", expected="a force: tension positive, compression negative")
-    moved, stiffness = numbers["displacement_um"], numbers["stiffness_N_per_mm"]
-    if math.isnan(moved) == math.isnan(stiffness) and not (planned and math.isnan(moved)):
-        found = "neither displacement_um nor" if math.isnan(moved) else "displacement_um and"
-        raise MeasurementError(f"loop {loop}: {found} stiffness_N_per_mm", expected="one of them")
-    if not math.isnan(moved) and math.isnan(force):
-        raise MeasurementError(f"loop {loop}: displacement_um without its load", expected="force_N")
-    compliance = m_from_um(moved) / force if math.isnan(stiffness) else 1e-3 / stiffness
-    # A sign of the direction turns what does not read along the load.
-    if record.get("direction", "").startswith("-") and not (loop.along_load or alone):
-        compliance = -compliance
-    if alone and not (planned or 1.0 / STIFFEST_ALONE <= compliance <= 1.0 / SOFTEST_ALONE):
-        raise MeasurementError(
-            f"loop {loop}: {1e9 * compliance:.4g} nm/N",
-            expected=f"{1e9 / STIFFEST_ALONE:g} to {1e9 / SOFTEST_ALONE:g} nm/N; longer under tension is positive",
-        )
-    size = abs(force)
-    side = math.copysign(1.0, force)
-    return LoopReading(compliance, m_from_um(numbers["sd_um"]) / size, size, 1e-3 * numbers["length_mm"], side)
 
 
 @dataclass(frozen=True)
@@ -146,10 +72,7 @@ class LoopColumns:
 
     def select(self, rows: NDArray[Any]) -> LoopColumns:
         """Of some of the readings."""
-        return LoopColumns(
-            self.loops,
-            *(getattr(self, f.name)[rows] for f in fields(self)[1:]),
-        )
+        return LoopColumns(self.loops, *(getattr(self, field.name)[rows] for field in fields(self)[1:]))
 
     @classmethod
     def of(cls, names: Sequence[str], length: FloatArray, side: FloatArray | None = None) -> LoopColumns:
@@ -186,11 +109,6 @@ class LoopColumns:
     def alone(self, joined: FloatArray) -> FloatArray:
         """(n,) m/N as read, of compliances with the offset in series: the inverse of `joined`."""
         return np.asarray(self.toward * (joined - self.offset))
-
-
-def assumed_sd(compliance: FloatArray, force: FloatArray) -> FloatArray:
-    """(n,) m/N of loop readings whose scatter nobody states."""
-    return np.hypot(INDICATOR_SD / force, LOAD_SHARE * compliance)
 
 
 def offsets(

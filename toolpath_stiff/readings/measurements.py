@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from importlib import resources
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +20,16 @@ from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.dates import day_of, days_since_first
-from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
+from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, offsets
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measured_poses import pose_warnings
 from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import loop_compliance
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
+from toolpath_stiff.stiffness.model import StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 
@@ -173,17 +175,15 @@ def read_measurements(
     InputErrors
         Bad rows, all of them; poses that are singular or beyond what the machine can be.
     """
-    names = [paths] if isinstance(paths, str | Path) else list(paths)
+    names = list(map(str, [paths] if isinstance(paths, str | Path) else paths))
     if not names:
         raise MeasurementError("no measurements", expected="a CSV file, or nist-table1")
-    seen: set[str] = set()
-    for name in map(str, names):
-        if name in seen:
-            raise MeasurementError(f"{name!r} is given twice", hint="name it once")
-        seen.add(name)
+    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    if twice is not None:
+        raise MeasurementError(f"{twice!r} is given twice", hint="name it once")
     files: list[RowFile] = []
     errors: list[InputError] = []
-    for name in map(str, names):
+    for name in names:
         try:
             files.append(_rows(name, planned, columns))
         except InputErrors as bad:  # those of all files are reported together
@@ -212,91 +212,58 @@ def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
 
 
 def _columns(files: list[RowFile], machine: Machine) -> Measurements:
-    read = [row for file in files for row in file.rows]
-    rows = [_placed(row, machine) for row in read]
+    """Readings as columns; those of loops in m/N until `with_offsets`."""
+    rows = [row for file in files for row in file.rows]
 
     def numbers(name: str) -> FloatArray:
         return np.array([getattr(row, name) for row in rows], dtype=float)
 
-    def texts(name: str) -> TextArray:
-        return np.array([row.labels[name] for row in rows], dtype=str)
-
-    force, time, temperature = numbers("force"), numbers("time"), numbers("temperature")
-    extension = numbers("tool_extension")
+    # A strut on a bench has no pose: it is given the machine's neutral one, which its length overrules.
+    pose = np.concatenate([numbers("position"), numbers("angles")], axis=1)
+    pose = np.where(np.isnan(pose[:, :1]), machine.limits.neutral_pose, pose)
+    labels: dict[str, Any] = {name: np.array([row.labels[name] for row in rows], dtype=str) for name in LABELS}
+    numeric: dict[str, Any] = {name: numbers(name) for name in ("force", "sd", "time", "temperature", "tool_extension")}
     given = {
-        "force_N": ~np.isnan(force),
-        "sd_N_per_mm": ~np.isnan(numbers("sd")),
-        "time_min": ~np.isnan(time),
-        "tool_extension_mm": ~np.isnan(extension),
-        "temperature_C": ~np.isnan(temperature),
-        **{name: texts(name) != "" for name in LABELS},
+        "force_N": ~np.isnan(numeric["force"]),
+        "sd_N_per_mm": np.array([row.of_tip and not np.isnan(row.sd) for row in rows]),
+        "time_min": ~np.isnan(numeric["time"]),
+        "tool_extension_mm": ~np.isnan(numeric["tool_extension"]),
+        "temperature_C": ~np.isnan(numeric["temperature"]),
+        **{name: texts != "" for name, texts in labels.items()},
     }
-    setup, point = texts("setup"), _points(rows, texts("point"))
-    stiffness, sd, beside = _beside(rows)
+    numeric["force"] = np.where(given["force_N"], numeric["force"], defaults.FORCE)
+    numeric["tool_extension"] = np.nan_to_num(numeric["tool_extension"], nan=0.0)
+    beside = None
+    if labels["loop"].any():
+        beside = LoopColumns.of(labels["loop"].tolist(), numbers("length"), numbers("side"))
+    labels["point"] = _points(pose, labels["point"])
+    labels["clamp"] = _clampings(rows, labels["point"], labels["setup"])
     extra, dropped = _extra_columns(rows)
+    dates = np.array([row.date for row in rows], dtype=str)
+    unknown = sum(bool(np.isnan(row.length) and np.isnan(row.position[0])) for row in rows)
+    bench = f"{unknown} readings of struts alone say neither length_mm nor a pose: taken at the neutral pose"
     return Measurements(
-        position=numbers("position"),
-        angles=numbers("angles"),
+        position=pose[:, :3],
+        angles=pose[:, 3:],
         direction=numbers("direction"),
-        stiffness=stiffness,
-        force=np.where(given["force_N"], force, defaults.FORCE),
-        sd=sd,
-        tool_extension=np.where(given["tool_extension_mm"], extension, 0.0),
-        time=time,
-        temperature=temperature,
-        setup=setup,
-        loop=texts("loop"),
-        repeat=texts("repeat"),
-        point=point,
-        clamp=_clampings(rows, point, setup),
+        stiffness=np.where(labels["loop"] == "", numbers("stiffness"), numbers("compliance")),
+        **numeric,
+        **labels,
         file=np.array([row.file for row in rows], dtype=str),
         line=np.array([row.line for row in rows], dtype=np.int64),
         extra=extra,
         # Set-ups and loops may go without a name; of the other columns every reading must have its own.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
-        notes=(*(note for file in files for note in file.notes), *_incomplete(given), *dropped, *_benches(read)),
+        notes=(
+            *(note for file in files for note in file.notes),
+            *_incomplete(given),
+            *(f"column {name} is not in every file and is not used" for name in dropped),
+            *[bench] * bool(unknown),
+        ),
         beside=beside,
-        **_dates(rows),
+        date=dates if (dates != "").any() else None,
+        day=days_since_first(np.array([day_of(date) for date in dates])) if (dates != "").any() else None,
     )
-
-
-def _dates(rows: list[Row]) -> dict[str, Any]:
-    """Dates as text and as days since the first; nothing where no reading has one."""
-    date = np.array([row.date for row in rows], dtype=str)
-    if not (date != "").any():
-        return {}
-    return {"date": date, "day": days_since_first(np.array([day_of(row.date) for row in rows]))}
-
-
-def _benches(rows: list[Row]) -> list[str]:
-    """A remark about struts on a bench of which nobody says how long they were."""
-    unknown = [r for r in rows if r.beside and np.isnan(r.beside.length) and np.isnan(r.position).all()]
-    if not unknown:
-        return []
-    return [f"{len(unknown)} readings of struts alone say neither length_mm nor a pose: taken at the neutral pose"]
-
-
-def _placed(row: Row, machine: Machine) -> Row:
-    """A strut on a bench has no pose: it is given the machine's neutral one, which its length overrules."""
-    if row.beside is None or not np.isnan(row.position).all():
-        return row
-    neutral = machine.limits.neutral_pose
-    return replace(row, position=tuple(neutral[:3]), angles=tuple(neutral[3:]))
-
-
-def _beside(rows: list[Row]) -> tuple[FloatArray, FloatArray, LoopColumns | None]:
-    """Stiffness and its sd, N/m, of loops without their offsets; the loops."""
-    stiffness = np.array([row.stiffness for row in rows])
-    sd = np.array([row.sd for row in rows])
-    if all(row.beside is None for row in rows):
-        return stiffness, sd, None
-    names, length = [row.labels["loop"] for row in rows], np.full(len(rows), np.nan)
-    side = np.array([1.0 if row.beside is None else row.beside.side for row in rows])
-    for i, row in enumerate(rows):
-        if row.beside is not None:
-            length[i] = row.beside.length
-            stiffness[i], sd[i] = row.beside.compliance, row.beside.sd  # m/N until `with_offsets`
-    return stiffness, sd, LoopColumns.of(names, length, side)
 
 
 def with_offsets(data: Measurements, machine: Machine, widest: float = WIDEST) -> Measurements:
@@ -306,23 +273,22 @@ def with_offsets(data: Measurements, machine: Machine, widest: float = WIDEST) -
     """
     if data.beside is None:
         return data
-    rows = data.beside.beside
+    rows, loops = data.beside.beside, data.beside.loops
     read, sd = np.where(rows, data.stiffness, np.nan), np.where(rows, data.sd, np.nan)
     plain = StiffnessModel(machine)
     path = measured_path(plain, data)
     tip = exact.compliance_along(plain, path, data.direction)
     # A joint moves the way its strut does, which the plain machine's joints, being rigid, do not say.
-    loops = [replace(one, kind="strut", where="") if one.kind == "joint" else one for one in data.beside.loops]
-    toward = loop_compliance(plain, path, data.direction, loops, data.beside.which)
-    joint = np.array([one.kind == "joint" for one in data.beside.loops])[data.beside.which]
-    expected = np.where(joint, 0.0, toward)
-    usual = assumed_sd(np.where(np.isnan(read), expected, read), data.force)
+    moving = [replace(loop, kind="strut", where="") if loop.kind == "joint" else loop for loop in loops]
+    toward = loop_compliance(plain, path, data.direction, moving, data.beside.which)
+    expected = np.where(np.array([loop.kind == "joint" for loop in loops])[data.beside.which], 0.0, toward)
     assumed = int((np.isnan(sd) & rows & ~np.isnan(read)).sum())
+    usual = np.hypot(INDICATOR_SD / data.force, LOAD_SHARE * np.where(np.isnan(read), expected, read))
     sd = np.where(np.isnan(sd), usual, sd)
     beside = offsets(data.beside, read, sd, expected, toward, tip, widest)
     stiffness = 1.0 / beside.joined(np.where(rows, read, 1.0))
     # A loop's indicator is not clamped with the tip's gauge: its readings scatter each on its own.
-    own = np.char.add("loop reading ", np.arange(len(data)).astype(str))
+    alone = np.char.add("loop reading ", np.arange(len(data)).astype(str))
     note = (
         f"{assumed} readings of loops beside the tip do not say how far they scatter (sd_um): "
         f"{1e6 * INDICATOR_SD:g} um and {100 * LOAD_SHARE:g} % assumed"
@@ -332,17 +298,16 @@ def with_offsets(data: Measurements, machine: Machine, widest: float = WIDEST) -
         beside=beside,
         stiffness=np.where(rows, stiffness, data.stiffness),
         sd=np.where(rows, sd * stiffness**2, data.sd),
-        clamp=np.where(rows, own, data.clamp),
+        clamp=np.where(rows, alone, data.clamp),
         notes=(*data.notes, note) if assumed else data.notes,
     )
 
 
 def _extra_columns(rows: list[Row]) -> tuple[dict[str, FloatArray], list[str]]:
-    """Further numeric columns that every file has; remarks about those that some lack."""
+    """Further numeric columns that every file has; and those that some lack."""
     common = set.intersection(*(set(row.extra) for row in rows))
     dropped = sorted({name for row in rows for name in row.extra} - common)
-    columns = {name: np.array([row.extra[name] for row in rows]) for name in sorted(common)}
-    return columns, [f"column {name} is not in every file and is not used" for name in dropped]
+    return {name: np.array([row.extra[name] for row in rows]) for name in sorted(common)}, dropped
 
 
 def _incomplete(given: Mapping[str, NDArray[np.bool_]]) -> list[str]:
@@ -357,21 +322,18 @@ def _incomplete(given: Mapping[str, NDArray[np.bool_]]) -> list[str]:
     return notes
 
 
-def _points(rows: list[Row], labels: TextArray) -> TextArray:
+def _points(poses: FloatArray, labels: TextArray) -> TextArray:
     """Labels of the points; readings without one share a label if they share the pose (to 1 um and 1e-6 rad)."""
-    poses: dict[tuple[float, ...], str] = {}
+    names: dict[tuple[float, ...], str] = {}
     taken = set(labels.tolist())
-    found = []
-    for row, label in zip(rows, labels, strict=True):
-        pose = tuple(round(value, 6) + 0.0 for value in (*row.position, *row.angles))
-        if not label and pose not in poses:
-            number = len(poses) + 1
-            while f"P{number}" in taken:
-                number += 1
-            poses[pose] = f"P{number}"
-            taken.add(f"P{number}")
-        found.append(label or poses[pose])
-    return np.array(found, dtype=str)
+    points = []
+    for pose, label in zip((np.round(poses, 6) + 0.0).tolist(), labels, strict=True):
+        key = tuple(pose)
+        if not label and key not in names:
+            names[key] = next(name for n in count(len(names) + 1) if (name := f"P{n}") not in taken)
+            taken.add(names[key])
+        points.append(label or names[key])
+    return np.array(points, dtype=str)
 
 
 def _clampings(rows: list[Row], point: TextArray, setup: TextArray) -> TextArray:

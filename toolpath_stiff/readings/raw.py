@@ -6,20 +6,19 @@ of 100 um), restrained by a force gauge; indicators read how far it really moved
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.column_names import Mapped
+from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError, TableError
 from toolpath_stiff.files import Content, read_bytes, write_atomically
-from toolpath_stiff.readings.dates import day_of
-from toolpath_stiff.readings.history import HistoryDocument
-from toolpath_stiff.readings.loop_figures import NO_FIGURES, LoopFigures, in_tension, reduce_loops
-from toolpath_stiff.readings.mapping import DATE, mapped_table
-from toolpath_stiff.readings.raw_history import remarks, standstills, struts_over_dates
+from toolpath_stiff.readings.history import StrutHistory
+from toolpath_stiff.readings.loop_figures import LoopFigures, in_tension, reduce_loops
+from toolpath_stiff.readings.mapping import mapped_table
+from toolpath_stiff.readings.raw_history import remarks, struts_over_dates
 from toolpath_stiff.readings.raw_records import COLUMNS, Loop, is_table, read_raw, read_stiffnesses
 from toolpath_stiff.readings.raw_rows import loop_entry, measurement_csv
 from toolpath_stiff.results import Result
@@ -46,8 +45,8 @@ class Reduction(Result):
     ----------
     raw
         Names of the files.
-    loops, figures
-        Records in SI, and what each loop says.
+    figures
+        What each loop says, with its records, in SI.
     notes
         What was assumed in reading them.
     read_as
@@ -80,16 +79,20 @@ class Reduction(Result):
     shown_by: ClassVar[str] = "measuring"
 
     raw: tuple[str, ...]
-    loops: tuple[Loop, ...]
     figures: tuple[LoopFigures, ...]
     notes: list[str]
     read_as: tuple[str, ...]
-    history: HistoryDocument
+    history: StrutHistory
 
     @property
-    def recorded(self) -> list[tuple[Loop, LoopFigures]]:
+    def loops(self) -> tuple[Loop, ...]:
+        """Records in SI."""
+        return tuple(figures.loop for figures in self.figures)
+
+    @property
+    def recorded(self) -> list[LoopFigures]:
         """Loops with their records, and what they say; rows of a table of stiffnesses have none."""
-        return [pair for pair in zip(self.loops, self.figures, strict=True) if len(pair[0].force)]
+        return [figures for figures in self.figures if len(figures.loop.force)]
 
     @property
     def title(self) -> str:
@@ -99,8 +102,7 @@ class Reduction(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """One entry a loop, under "loops"; struts measured alone over their dates, under "history"."""
-        pairs = zip(self.loops, self.figures, strict=True)
-        return {"loops": [loop_entry(loop, figures) for loop, figures in pairs], "history": dict(self.history)}
+        return {"loops": [loop_entry(figures) for figures in self.figures], "history": to_dict(self.history)}
 
     def to_frame(self) -> pd.DataFrame:
         """One row a loop."""
@@ -117,12 +119,12 @@ class Reduction(Result):
         return str(self.view.reduction_text(self))
 
     def _short(self) -> str:
-        return f"{self.title}, {len(self.loops)} loop{'s' * (len(self.loops) != 1)}"
+        return f"{self.title}, {len(self.figures)} loop{'s' * (len(self.figures) != 1)}"
 
     def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
         """The measurement file; beside it the picture of the loops, and of dated struts that over their dates."""
         pictures: Mapping[Path, Content] = self.view.reduction_pictures(self, Path(file)) if plots else {}
-        return {Path(file): measurement_csv(self.loops, self.figures, self.history), **pictures}
+        return {Path(file): measurement_csv(self.figures, self.history), **pictures}
 
     def save(self, file: str | Path, *, plots: bool = True) -> list[Path]:
         """Write the measurement file and, beside it, the picture of the loops."""
@@ -162,26 +164,23 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
     """
     if not raw:
         raise InputError("no raw records", expected="a file or several")
-    loops: list[Loop] = []
     figures: list[LoopFigures] = []
     notes: list[str] = []
     read_as: list[str] = []
     for file in (file for name in raw for file in _files(str(name))):
         table = _table(file, columns)
         if is_table(table):
-            records, known = read_stiffnesses(table)
-            figures += [replace(NO_FIGURES, stiffness=stiffness, force=force) for stiffness, force in known]
+            struts, remarked = read_stiffnesses(table)
+            reduced = [LoopFigures(*strut) for strut in struts]
         else:
-            records = read_raw(table)
-            if compression_positive:
-                records = records._replace(loops=[in_tension(loop) for loop in records.loops])
-            figures += reduce_loops(records.loops)
-        loops += records.loops
-        notes += [*table.notes, *records.notes]
-        read_as.append(_read_as(table, len(records.loops)))
-    changes = struts_over_dates(loops, figures)
-    notes += [*standstills(loops, figures), *_replaced(loops), *remarks(loops, figures, changes)]
-    return Reduction(tuple(map(str, raw)), tuple(loops), tuple(figures), notes, tuple(read_as), changes)
+            loops, remarked = read_raw(table)
+            reduced = reduce_loops([in_tension(loop) for loop in loops] if compression_positive else loops)
+        figures += reduced
+        notes += [*table.notes, *remarked]
+        read_as.append(_read_as(table, len(reduced)))
+    over_time = struts_over_dates(figures)
+    notes += remarks(figures, over_time)
+    return Reduction(tuple(map(str, raw)), tuple(figures), notes, tuple(read_as), over_time)
 
 
 def _files(name: str) -> list[str]:
@@ -208,18 +207,3 @@ def _read_as(table: Table, loops: int) -> str:
     known = [name for name in table.heading if name in (*COLUMNS.numbers, *COLUMNS.texts)]
     kind = "stiffnesses of struts" if is_table(table) else f"records of {loops} loop{'s' * (loops != 1)}"
     return f"{table.file}: {kind} from {', '.join(known)}, heading in line {table.heading_line}"
-
-
-def _replaced(loops: Sequence[Loop]) -> list[str]:
-    """Notes where a strut's serial number changes."""
-    notes = []
-    for strut in sorted({loop.place["loop"] for loop in loops if loop.serial}):
-        dates = [(loop.place.get(DATE, ""), loop.serial) for loop in loops if loop.place.get("loop") == strut]
-        dated = sorted((day_of(date), date, serial) for date, serial in dates if serial)
-        for (_, last, before), (_, first, after) in pairwise(dated):
-            if before != after:
-                notes.append(
-                    f"{strut}: serial number {before} until {last or '?'}, {after} from {first or '?'}: another part, "
-                    "so that a change between these dates is its replacement"
-                )
-    return notes

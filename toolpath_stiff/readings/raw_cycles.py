@@ -8,7 +8,6 @@ weighing A B A (OIML R 111-1:2004, C.4), and the shape of the loop is that of it
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -24,27 +23,19 @@ FEWEST_STILL = 3  # records, and share of the range of the force, over which an 
 STILL = 0.05
 
 
-@dataclass(frozen=True)
-class Ends:
-    """Force in N and deflection in m between the extremes, of which the secant is taken."""
-
-    force: float
-    deflection: float
-
-
 def turns_of(drive: FloatArray) -> list[int]:
     """Records at which the drive turns, high and low alternately; the first of equal ones."""
     high, low, near = float(drive.max()), float(drive.min()), NEAR_TURN * float(np.ptp(drive))
-    found: list[int] = []
+    turns: list[int] = []
     last = 0.0
     for i in np.flatnonzero((drive >= high - near) | (drive <= low + near)):
         side = 1.0 if drive[i] >= high - near else -1.0
         if side != last:
-            found.append(int(i))
-        elif side * drive[i] > side * drive[found[-1]]:
-            found[-1] = int(i)
+            turns.append(int(i))
+        elif side * drive[i] > side * drive[turns[-1]]:
+            turns[-1] = int(i)
         last = side
-    return found
+    return turns
 
 
 def closed_cycle(turns: list[int]) -> slice:
@@ -59,8 +50,8 @@ def closed_cycles(turns: list[int]) -> slice:
 
 def ends_without_drift(
     drive: FloatArray, force: FloatArray, deflection: FloatArray, turns: list[int], same: float
-) -> Ends:
-    """What lies between the extremes of three turns or more, a steady drift taken out.
+) -> tuple[float, float]:
+    """Force (N) and deflection (m) between the extremes of three turns or more, a steady drift taken out.
 
     Parameters
     ----------
@@ -71,16 +62,15 @@ def ends_without_drift(
     same
         Records whose drive is this close to that of their turn are averaged.
     """
-    middles = [(one + other) // 2 for one, other in pairwise(turns)]
-    bounds = [0, *(at + 1 for at in middles), len(drive)]
+    bounds = [0, *((start + end) // 2 + 1 for start, end in pairwise(turns)), len(drive)]
     means = []
     for turn, start, stop in zip(turns, bounds[:-1], bounds[1:], strict=True):
         at = start + np.flatnonzero(np.abs(drive[start:stop] - drive[turn]) <= same)
         means.append((force[at].mean(), deflection[at].mean()))
     second = np.diff(np.array(means), 2, axis=0)
     signs = np.where(drive[turns[1:-1]] < drive[turns[0:-2]], 1.0, -1.0)
-    found = 0.5 * (signs[:, None] * second).mean(axis=0)
-    return Ends(float(found[0]), float(found[1]))
+    force_between, deflection_between = (0.5 * (signs[:, None] * second).mean(axis=0)).tolist()
+    return force_between, deflection_between
 
 
 def stands_still(force: FloatArray, displacement: FloatArray, turns: list[int]) -> tuple[float, float, float] | None:

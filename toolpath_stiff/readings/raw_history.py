@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from toolpath_stiff.readings.dates import day_of, short_dates
-from toolpath_stiff.readings.history import SURE, HistoryDocument, Readings, history
-from toolpath_stiff.readings.loop_figures import LoopFigures, side_of, stuck_at
-from toolpath_stiff.readings.mapping import DATE
-from toolpath_stiff.readings.raw_records import Loop
+from toolpath_stiff.readings.history import StrutHistory, history
+from toolpath_stiff.readings.loop_figures import LoopFigures
+from toolpath_stiff.readings.strut_series import SURE, StrutReadings
 from toolpath_stiff.units import um_from_m
 
 OTHER_SIDE = 1.05  # ratio of two slopes of a loop from which one side counts as softer; assumed, twice the scatter
@@ -22,124 +23,130 @@ SECANT, IN_TENSION, IN_COMPRESSION = "secant", "slope in tension", "slope in com
 OF_ONE_SIDE = ", which its lost motion blurs in records of one side alone"
 
 
-def struts_over_dates(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDocument:
+def struts_over_dates(figures: Sequence[LoopFigures]) -> StrutHistory:
     """Struts measured alone over their dates; those of several lengths by length, as a strut's stiffness varies."""
-    rows = [(loop, one) for loop, one in zip(loops, figures, strict=True) if loop.jog is None]
+    alone = [one for one in figures if one.loop.jog is None]
     lengths: dict[str, set[str]] = {}
-    for loop, _ in rows:
-        lengths.setdefault(loop.place["loop"], set()).add(loop.place.get("length_mm", ""))
+    for one in alone:
+        lengths.setdefault(one.loop.strut, set()).add(one.loop.place.get("length_mm", ""))
 
-    def readings(chosen: list[tuple[Loop, float, float]]) -> Readings:
-        names = [loop.place["loop"] for loop, _, _ in chosen]
-        some = [loop.place.get("length_mm", "") for loop, _, _ in chosen]
-        shown = [f"{n}, {mm} mm" if len(lengths[n]) > 1 and mm else n for n, mm in zip(names, some, strict=True)]
-        return Readings(
-            np.array(shown, dtype=str),
-            np.array([day_of(loop.place.get(DATE, "")) for loop, _, _ in chosen]),
-            np.log([stiffness for _, stiffness, _ in chosen]),
-            np.array([side for _, _, side in chosen]),
-            short_dates(loop.place.get(DATE, "") for loop, _, _ in chosen),
+    def name(one: LoopFigures) -> str:
+        length = one.loop.place.get("length_mm")
+        return f"{one.loop.strut}, {length} mm" if len(lengths[one.loop.strut]) > 1 and length else one.loop.strut
+
+    def readings(rows: list[tuple[LoopFigures, float, float]]) -> StrutReadings:
+        return StrutReadings(
+            np.array([name(one) for one, _, _ in rows], dtype=str),
+            np.array([day_of(one.loop.date) for one, _, _ in rows]),
+            np.log([stiffness for _, stiffness, _ in rows]),
+            np.array([side for _, _, side in rows]),
+            short_dates(one.loop.date for one, _, _ in rows),
         )
 
-    rows = [(loop, one) for loop, one in rows if not stuck_at(loop, one)]
-    judged = {name: _judged(name, rows) for name in lengths}
-    seen = [(loop, *_seen(loop, one, judged[loop.place["loop"]])) for loop, one in rows]
-    slopes = [(loop, k, s) for loop, one in rows for k, s in ((one.tension, 1.0), (one.compression, -1.0))]
-    slopes = [one for one in slopes if math.isfinite(one[1])]
-    found = history(readings(seen), readings(slopes or seen))
-    for strut in found["struts"]:
-        strut["judged_on"] = judged[strut["strut"].split(" alone")[0] + " alone"]
-        if strut["judged_on"] not in ("", SECANT):
-            strut["text"] = "; ".join(filter(None, [strut["text"], f"judged on the {strut['judged_on']}"]))
-    return found
+    alone = [one for one in alone if not one.standstill]
+    judged = {strut: _judged([one for one in alone if one.loop.strut == strut]) for strut in lengths}
+    compared = [(one, *_compared(one, judged[one.loop.strut])) for one in alone]
+    slopes = [(one, k, side) for one in alone for k, side in ((one.tension, 1.0), (one.compression, -1.0))]
+    slopes = [row for row in slopes if math.isfinite(row[1])]
+    over_time, struts = history(readings(compared), readings(slopes or compared)), []
+    for strut in over_time.struts:
+        figure = judged[strut.strut.split(" alone")[0] + " alone"]
+        judged_text = "" if figure in ("", SECANT) else f"judged on the {figure}"
+        text = "; ".join(filter(None, [strut.text, judged_text]))
+        struts.append(replace(strut, judged_on=figure, text=text))
+    return replace(over_time, struts=struts)
 
 
-def _judged(name: str, rows: Sequence[tuple[Loop, LoopFigures]]) -> str:
+def _judged(figures: Sequence[LoopFigures]) -> str:
     """What all records of a strut can be compared by."""
-    own = [(loop, one) for loop, one in rows if loop.place["loop"] == name]
-    recorded = [(loop, one) for loop, one in own if len(loop.force)]
+    recorded = [one for one in figures if len(one.loop.force)]
     if not recorded:
         return ""
-    both = [one for loop, one in recorded if not side_of(loop)]
+    both = [one for one in recorded if not one.side]
     play = any(one.plays for one in both)
-    if len(recorded) == len(own):
-        if side := _shared_side({side_of(loop) for loop, _ in recorded}, both):
-            return side + (OF_ONE_SIDE if play else "")
-        if play and all(math.isfinite(one.beyond) for _, one in own):
+    if len(recorded) == len(figures):
+        # The side that every record has, where some have no other.
+        sides = {one.side for one in recorded}
+        if len(sides) == 2 and 0.0 in sides and all(math.isfinite(one.tension) for one in both):
+            return (IN_TENSION if 1.0 in sides else IN_COMPRESSION) + (OF_ONE_SIDE if play else "")
+        if play and all(math.isfinite(one.beyond) for one in figures):
             return BEYOND
     return BLURRED if play else SECANT
 
 
-def _shared_side(sides: set[float], both: Sequence[LoopFigures]) -> str:
-    """The side that every record has, where some have no other (`both`: those with either); else nothing."""
-    if len(sides) != 2 or 0.0 not in sides or not all(math.isfinite(one.tension) for one in both):
-        return ""
-    return IN_TENSION if 1.0 in sides else IN_COMPRESSION
-
-
-def _seen(loop: Loop, one: LoopFigures, judged: str) -> tuple[float, float]:
+def _compared(one: LoopFigures, judged: str) -> tuple[float, float]:
     """Stiffness in N/m by which a record is compared with others, and the side on which that is."""
-    side = side_of(loop) if len(loop.force) else one.side
     if judged == BEYOND:
-        return one.beyond, side
-    if judged.startswith(IN_TENSION) and not side:
+        return one.beyond, one.side
+    if judged.startswith(IN_TENSION) and not one.side:
         return one.tension, 1.0
-    if judged.startswith(IN_COMPRESSION) and not side:
+    if judged.startswith(IN_COMPRESSION) and not one.side:
         return one.compression, -1.0
-    return one.stiffness, side
+    return one.stiffness, one.side
 
 
-def remarks(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> Iterator[str]:
-    """What stands in the measurement file in place of a secant, and which of its rows are of a strut as it was."""
-    own = {one["strut"] for one in history["struts"] if one["judged_on"] == BEYOND}
-    pairs = zip(loops, figures, strict=True)
-    playing = [(loop.title, one) for loop, one in pairs if one.plays and loop.place["loop"] in own]
+def remarks(figures: Sequence[LoopFigures], history: StrutHistory) -> Iterator[str]:
+    """What is doubtful, what stands in a measurement file in place of a secant, which of its rows are outdated."""
+    yield from _standstills(figures)
+    yield from _replaced(figures)
+    beyond = {strut.strut for strut in history.struts if strut.judged_on == BEYOND}
+    playing = [one for one in figures if one.plays and one.loop.strut in beyond]
     if playing:
-        title, one = max(playing, key=lambda pair: pair[1].elastic / pair[1].stiffness)
+        most = max(playing, key=lambda one: one.elastic / one.stiffness)
         yield (
             f"{len(playing)} loops show lost motion; the rows of their struts hold the slope beyond it, their own "
-            f"stiffness. The secant is at most {100.0 * (1.0 - one.stiffness / one.elastic):.2g} % less: {title}"
+            f"stiffness. The secant is at most {100.0 * (1.0 - most.stiffness / most.elastic):.2g} % less: "
+            f"{most.loop.title}"
         )
-    both = sorted(sided(loops, figures, history))
+    both = sorted(sided(figures, history))
     if both:
         yield f"tension and compression differ: a row of each side for {', '.join(both)}"
-    for strut, (pulled, pushed) in _changing_places(loops, figures).items():
-        yield (
-            f"{strut}: softer in tension on {pulled}, in compression on {pushed}: does a file count compression "
-            "positive? Its head may say so (compression positive)"
-        )
-    changed = {one["strut"]: one["changes"][-1]["before"] for one in history["struts"] if one["changes"]}
-    for strut, since in changed.items():
-        yield f"{strut} changed: leave out its rows before {since} for diagnose and update, which take all dates as one"
-
-
-def _changing_places(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> dict[str, tuple[str, str]]:
-    """Struts that are softer in tension on one date and in compression on another: which dates."""
-    softer: dict[str, dict[bool, str]] = {}
-    for loop, one in zip(loops, figures, strict=True):
+    softer: dict[str, dict[bool, str]] = {}  # strut -> in tension or not -> where first
+    for one in figures:
         if max(one.tension, one.compression) > OTHER_SIDE * min(one.tension, one.compression):
-            found = softer.setdefault(loop.place["loop"], {})
-            found.setdefault(one.tension < one.compression, loop.place.get(DATE, "") or f"line {loop.line}")
-    return {name: (found[True], found[False]) for name, found in softer.items() if len(found) > 1}
+            where = softer.setdefault(one.loop.strut, {})
+            where.setdefault(one.tension < one.compression, one.loop.date or f"line {one.loop.line}")
+    for strut, where in softer.items():
+        if len(where) > 1:
+            yield (
+                f"{strut}: softer in tension on {where[True]}, in compression on {where[False]}: does a file count "
+                "compression positive? Its head may say so (compression positive)"
+            )
+    for changed in history.struts:
+        if changed.changes:
+            yield (
+                f"{changed.strut} changed: leave out its rows before {changed.changes[-1].before} for diagnose and "
+                "update, which take all dates as one"
+            )
 
 
-def standstills(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> list[str]:
+def _standstills(figures: Sequence[LoopFigures]) -> Iterator[str]:
     """A note where indicators stood still while the force went on."""
-    tried = [(loop.title, stuck_at(loop, one)) for loop, one in zip(loops, figures, strict=True)]
-    found = [(title, still) for title, still in tried if still]
-    if not found:
-        return []
-    title, (displacement, start, end) = found[0]
-    others = f"; so in {len(found) - 1} further loops" if len(found) > 1 else ""
-    return [
-        f"{title}: the indicator stands still at {um_from_m(displacement):g} um while the force goes on from "
-        f"{start:.4g} to {end:.4g} N: at the end of its range? The stiffness is too high then, and does not count in "
-        f"the history; leave out its row{others}"
-    ]
+    stood = [(one.loop.title, still) for one in figures if (still := one.standstill)]
+    if stood:
+        title, (displacement, start, end) = stood[0]
+        others = f"; so in {len(stood) - 1} further loops" if len(stood) > 1 else ""
+        yield (
+            f"{title}: the indicator stands still at {um_from_m(displacement):g} um while the force goes on from "
+            f"{start:.4g} to {end:.4g} N: at the end of its range? The stiffness is too high then, and does not count "
+            f"in the history; leave out its row{others}"
+        )
 
 
-def sided(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> set[str]:
+def _replaced(figures: Sequence[LoopFigures]) -> Iterator[str]:
+    """Notes where a strut's serial number changes."""
+    loops = [one.loop for one in figures if one.loop.serial]
+    for strut in sorted({loop.strut for loop in loops}):
+        dated = sorted((day_of(loop.date), loop.date, loop.serial) for loop in loops if loop.strut == strut)
+        for (_, last, before), (_, first, after) in pairwise(dated):
+            if before != after:
+                yield (
+                    f"{strut}: serial number {before} until {last or '?'}, {after} from {first or '?'}: another part, "
+                    "so that a change between these dates is its replacement"
+                )
+
+
+def sided(figures: Sequence[LoopFigures], history: StrutHistory) -> set[str]:
     """Struts that differ in tension and compression and whose loops all say so: rows of both would not be alike."""
-    lacking = {loop.place.get("loop") for loop, one in zip(loops, figures, strict=True) if math.isnan(one.tension)}
-    struts = (one for one in history["struts"] if one["sides"] is not None and one["sides"]["p"] < SURE)
-    return {one["strut"] for one in struts} - lacking
+    lacking = {one.loop.strut for one in figures if math.isnan(one.tension)}
+    return {one.strut for one in history.struts if one.sides is not None and one.sides.p < SURE} - lacking

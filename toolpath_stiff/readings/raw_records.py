@@ -11,7 +11,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_names import heading_key, same_quantity, unit_of
-from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
+from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import loop_of
 from toolpath_stiff.readings.mapping import DATE, check_heading
@@ -25,13 +25,11 @@ from toolpath_stiff.readings.rows import (
     direction_of,
     number,
     optional_number,
+    parsed_rows,
 )
 from toolpath_stiff.stiffness.measuring_loop import TIP, MeasuringLoop, measuring_loop
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_um, n_per_m_from_n_per_mm
-
-Record = tuple[int, dict[str, str], list[float]]  # line, cells, readings and conditions
-
 
 READINGS = ("jog_um", "force_N", "displacement_um")
 
@@ -76,6 +74,9 @@ BENCH = "strut,date,force_N,displacement_um of a strut on a bench"
 
 
 SIGNED = {"force_N": 1e7, "displacement_um": 1e6, "jog_um": 1e6}  # largest magnitude, either sign
+
+
+ONE_SIDE = 0.05  # of the range: a force set on a bench that goes less far to the other side is of one side
 
 
 NEAR_END = 0.02  # of the range of a force set on a bench: records this close are at its extreme, and averaged
@@ -133,6 +134,24 @@ class Loop:
         return NEAR_END * float(np.ptp(self.force)) if self.jog is None else SAME_JOG
 
     @property
+    def strut(self) -> str:
+        """The strut that was measured alone, as "strut 3 alone"."""
+        return self.place.get("loop", "")
+
+    @property
+    def date(self) -> str:
+        """As in the file; "" without one."""
+        return self.place.get(DATE, "")
+
+    @property
+    def side(self) -> float:
+        """1 of a bench record under tension alone, -1 under compression alone, 0 of any other loop."""
+        if self.jog is not None or not len(self.force):
+            return 0.0
+        least = ONE_SIDE * float(np.ptp(self.force))
+        return 1.0 if self.force.min() >= -least else -1.0 if self.force.max() <= least else 0.0
+
+    @property
     def resolution(self) -> float:
         """m, the smallest step between two different readings of the indicator."""
         steps = np.diff(np.unique(self.displacement))
@@ -147,23 +166,23 @@ class Loop:
     def title(self) -> str:
         """Point or position, direction, set-up, repeat: whatever is there."""
         rest = [f"{name} {self.place[name]}" for name in ("setup", "clamp", "repeat") if self.place.get(name)]
-        rest = [self.place[DATE], *rest] if self.place.get(DATE) else rest
-        if self.jog is None:
-            return ", ".join([*filter(None, [self.place["loop"], self.place.get("point")]), *rest])
-        where = self.place.get("point") or ", ".join(self.place[name] for name in POSITION) + " mm"
-        way = self.place.get("direction") or "(" + ", ".join(self.place[name] for name in VECTOR) + ")"
-        return ", ".join([where, way, *rest])
+        where, way = self.strut, self.place.get("point", "")
+        if self.jog is not None:
+            where = way or ", ".join(self.place[name] for name in POSITION) + " mm"
+            way = self.place.get("direction") or "(" + ", ".join(self.place[name] for name in VECTOR) + ")"
+        return ", ".join(filter(None, [where, way, self.date, *rest]))
 
 
-class RawRecords(NamedTuple):
-    """Loops in the order of their first record, and what reading them left to be said."""
+class RawRecord(NamedTuple):
+    """One record: its line, its cells, and jog, force, displacement and conditions."""
 
-    loops: list[Loop]
-    notes: list[str]
+    line: int
+    cells: dict[str, str]
+    values: list[float]
 
 
-def read_raw(table: Table) -> RawRecords:
-    """Loops of a file of raw records (`tables.read_table` with `COLUMNS`).
+def read_raw(table: Table) -> tuple[list[Loop], list[str]]:
+    """Loops of a file of raw records (`tables.read_table` with `COLUMNS`), by their first record; and remarks.
 
     Raises
     ------
@@ -172,39 +191,28 @@ def read_raw(table: Table) -> RawRecords:
     InputErrors
         Bad records, all of them.
     """
-    file = table.file
-    layouts = f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}"
-    check_heading(table, KNOWN, _needed(table.heading), layouts)
-    unused = [name for name in table.heading if name and name not in KNOWN]
-    notes = [f"{file}: column {name} is not used" for name in unused]
+    file, heading, line = table.file, table.heading, table.heading_line
+    check_heading(table, KNOWN, _needed(heading), f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}")
+    notes = [f"{file}: column {name} is not used" for name in heading if name and name not in KNOWN]
     if not table.rows:
-        raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
-    groups: dict[tuple[str, ...], list[Record]] = {}
-    names = [name for name in PLACE if name != DATE and (name in table.heading or name == "loop")]
-    errors, lost = [], []
-    for line, cells in table.rows:
-        try:
-            record = table.record(cells)
-            if _is_lost(record):
-                lost.append(line)
-                continue
-            values = _values(record)
-        except InputError as error:
-            errors.append(error.in_line(file, line))
-            continue
-        if DATE in record and not record[DATE]:
-            errors.append(MeasurementError("no date", expected="one in every record", file=file, line=line))
-        key = (*(record.get(name, "") for name in names), record.get(DATE, "")[:DAY])
-        groups.setdefault(key, []).append((line, record, values))
+        raise MeasurementError("no records below the heading", file=file, line=line)
+    parsed, errors = parsed_rows(table, _record)
     if errors:
         raise InputErrors(errors)
+    records = [record for record in parsed if record.values]
+    lost = [record.line for record in parsed if not record.values]
+    if not records:
+        raise MeasurementError("no record has both a force and a displacement", file=file, line=lost[0])
     if lost:
-        if not groups:
-            raise MeasurementError("no record has both a force and a displacement", file=file, line=lost[0])
         many = f"{len(lost)} records" if len(lost) > 1 else "a record"
         notes.append(f"{file}: {many} without force or displacement passed over, from line {lost[0]}")
-    found = [_loop(one, file) for records in groups.values() for one in _by_time(records)]
-    return RawRecords(sorted(found, key=lambda loop: loop.line), notes)
+    groups: dict[tuple[str, ...], list[RawRecord]] = {}
+    names = [name for name in PLACE if name != DATE and (name in heading or name == "loop")]
+    for record in records:
+        key = (*(record.cells.get(name, "") for name in names), record.cells.get(DATE, "")[:DAY])
+        groups.setdefault(key, []).append(record)
+    loops = [_loop(part, file) for group in groups.values() for part in _by_time(group)]
+    return sorted(loops, key=lambda loop: loop.line), notes
 
 
 def is_table(table: Table) -> bool:
@@ -213,8 +221,16 @@ def is_table(table: Table) -> bool:
     return STIFFNESS[0] in stated and "displacement_um" not in stated
 
 
-def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]]]:
-    """Struts alone of a table of stiffnesses: loops without records, and of each N/m and N (nan where not given).
+class KnownStiffness(NamedTuple):
+    """A strut alone without records, N/m, and N (nan where not given)."""
+
+    loop: Loop
+    stiffness: float
+    force: float
+
+
+def read_stiffnesses(table: Table) -> tuple[list[KnownStiffness], list[str]]:
+    """Struts alone of a table of stiffnesses; and remarks.
 
     A few rows with a stiffness near zero are failed tests: they are left out, with a note.
 
@@ -223,51 +239,43 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
     InputError, InputErrors
         Rows that are not of a strut alone, have no stiffness or none that could be; all of them.
     """
-    heading, errors = table.heading, []
+    heading, file = table.heading, table.file
     known = ("strut", SERIAL, *LABELS, DATE, "length_mm", *STIFFNESS)
     layouts = "strut,date,stiffness_N_per_mm of struts alone (readings of the tip need no reduction), or raw records"
     check_heading(table, known, (STIFFNESS[0],) if "loop" in heading else ("strut", STIFFNESS[0]), layouts)
-    notes = [f"{table.file}: column {name} is not used" for name in heading if name not in known]
-    loops, figures, failed = [], [], []
-    for line, cells in table.rows:
-        try:
-            record = table.record(cells)
-            if _loop_named(record).kind != "alone":
-                raise MeasurementError("a row of no strut", expected="strut 1 to 6")
-            day_of(record.get(DATE, ""))
-            optional_number(record, "length_mm")
-            if abs(number(record, STIFFNESS[0], (-STIFFEST, STIFFEST))) < SOFTEST:
-                failed.append((line, record[STIFFNESS[0]]))
-                continue
-            own = n_per_m_from_n_per_mm(number(record, STIFFNESS[0])), optional_number(record, STIFFNESS[1])
-        except InputError as error:
-            errors.append(error.in_line(table.file, line))
-            continue
-        none = np.empty(0)
-        place = {name: record[name] for name in PLACE if record.get(name)}
-        loops.append(Loop(place, {}, None, none, none, line, table.file, record.get(SERIAL, "")))
-        figures.append(own)
+    notes = [f"{file}: column {name} is not used" for name in heading if name not in known]
+
+    def strut(line: int, record: dict[str, str]) -> KnownStiffness:
+        if _loop_named(record).kind != "alone":
+            raise MeasurementError("a row of no strut", expected="strut 1 to 6")
+        day_of(record.get(DATE, ""))
+        optional_number(record, "length_mm")
+        failed = abs(number(record, STIFFNESS[0], (-STIFFEST, STIFFEST))) < SOFTEST
+        stiffness = math.nan if failed else n_per_m_from_n_per_mm(number(record, STIFFNESS[0]))
+        place, none = {name: record[name] for name in PLACE if record.get(name)}, np.empty(0)
+        loop = Loop(place, {}, None, none, none, line, file, record.get(SERIAL, ""))
+        return KnownStiffness(loop, stiffness, math.nan if failed else optional_number(record, STIFFNESS[1]))
+
+    struts, errors = parsed_rows(table, strut)
+    failed = [one.loop.line for one in struts if math.isnan(one.stiffness)]
     many = f"{len(failed)} of {len(table.rows)} rows with a stiffness within {SOFTEST:g} N/mm of zero"
     if len(failed) > FAILED * len(table.rows):
-        line, cell = failed[0]
+        first = next(table.record(cells) for line, cells in table.rows if line == failed[0])[STIFFNESS[0]]
         hint = f"is the unit right? At most {100 * FAILED:g} % are left out as failed tests"
-        errors.append(MeasurementError(f"{many}, the first {cell}", hint=hint, file=table.file, line=line))
+        errors.append(MeasurementError(f"{many}, the first {first}", hint=hint, file=file, line=failed[0]))
     elif failed:
-        notes.append(f"{table.file}: {many} are left out as failed tests, from line {failed[0][0]}")
+        notes.append(f"{file}: {many} are left out as failed tests, from line {failed[0]}")
     if errors:
         raise InputErrors(errors)
-    if not loops:
-        raise MeasurementError("no rows below the heading", file=table.file, line=table.heading_line)
-    return RawRecords(loops, notes), figures
+    if len(failed) == len(struts):
+        raise MeasurementError("no rows below the heading", file=file, line=table.heading_line)
+    return [one for one in struts if not math.isnan(one.stiffness)], notes
 
 
-def _is_lost(record: Mapping[str, str]) -> bool:
-    """Whether a record of a bench has lost its force or displacement."""
-    return not record.get("jog_um") and any(record.get(name, "").lower() in MISSING for name in READINGS[1:])
-
-
-def _values(record: dict[str, str]) -> list[float]:
-    """Jog (nan on a bench), force, displacement, conditions of a record; names its strut. Raises `InputError`."""
+def _record(line: int, record: dict[str, str]) -> RawRecord:
+    """A record with jog (nan on a bench), force, displacement and conditions; without values if it has lost them."""
+    if not record.get("jog_um") and any(record.get(name, "").lower() in MISSING for name in READINGS[1:]):
+        return RawRecord(line, record, [])
     loop = _loop_named(record)
     day_of(record.get(DATE, ""))
     optional_number(record, "tool_extension_mm")
@@ -280,29 +288,32 @@ def _values(record: dict[str, str]) -> list[float]:
     if not on_bench:
         direction_of(record)
     values = [math.nan if on_bench and name == "jog_um" else _signed(record, name) for name in READINGS]
-    return values + [optional_number(record, name) for name in CONDITIONS]
+    values += [optional_number(record, name) for name in CONDITIONS]
+    if DATE in record and not record[DATE]:
+        raise MeasurementError("no date", expected="one in every record")
+    return RawRecord(line, record, values)
 
 
 def _loop_named(record: dict[str, str]) -> MeasuringLoop:
     """The loop of a record; `strut` 3 is the loop "strut 3 alone", and the record says so afterwards."""
     loop = loop_of(record.get("loop", ""))
     if record.get("strut"):
-        own = measuring_loop(f"strut {record['strut'].lower().removeprefix('strut')} alone")
-        if own is None:
+        strut = measuring_loop(f"strut {record['strut'].lower().removeprefix('strut')} alone")
+        if strut is None:
             raise MeasurementError(f"strut {record['strut']!r}", expected="1 to 6")
-        if loop not in (TIP, own):
+        if loop not in (TIP, strut):
             raise MeasurementError(f"strut {record['strut']} and loop {loop}", expected="one of them")
-        loop = own
+        loop = strut
     if loop.kind == "alone":
         record["loop"] = str(loop)
     return loop
 
 
-def _by_time(records: list[Record]) -> list[list[Record]]:
+def _by_time(records: list[RawRecord]) -> list[list[RawRecord]]:
     """Records of one day by their date-times, if these are of whole loops; a logger's clock that runs on is not."""
-    times: dict[str, list[Record]] = {}
-    for one in records:
-        times.setdefault(one[1].get(DATE, ""), []).append(one)
+    times: dict[str, list[RawRecord]] = {}
+    for record in records:
+        times.setdefault(record.cells.get(DATE, ""), []).append(record)
     return list(times.values()) if min(map(len, times.values())) >= SHARED else [records]
 
 
@@ -332,16 +343,16 @@ def _signed(record: Mapping[str, str], name: str) -> float:
     return value
 
 
-def _loop(records: list[Record], file: str) -> Loop:
-    line, record, _ = records[0]
-    jog, force, displacement, *conditions = np.array([values for _, _, values in records]).T
+def _loop(records: list[RawRecord], file: str) -> Loop:
+    line, cells, _ = records[0]
+    jog, force, displacement, *conditions = np.array([record.values for record in records]).T
     return Loop(
-        place={name: record[name] for name in PLACE if name in record},
+        place={name: cells[name] for name in PLACE if name in cells},
         conditions={n: float(v.mean()) for n, v in zip(CONDITIONS, conditions, strict=True) if not np.isnan(v).any()},
         jog=None if np.isnan(jog).any() else m_from_um(jog),
         force=force,
         displacement=m_from_um(displacement),
         line=line,
         file=file,
-        serial=record.get(SERIAL, ""),
+        serial=cells.get(SERIAL, ""),
     )

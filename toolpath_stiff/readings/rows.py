@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
-from toolpath_stiff.readings.loops import LARGEST_UM, loop_of, loop_reading
+from toolpath_stiff.readings.loops import loop_of
 from toolpath_stiff.readings.mapping import DATE, check_heading
 from toolpath_stiff.stiffness.measuring_loop import TIP, MeasuringLoop
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
 
-if TYPE_CHECKING:
-    from toolpath_stiff.readings.loops import LoopReading
+Parsed = TypeVar("Parsed")
 
 
 LOOP_COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # of a measurement file, for loops beside the tip alone
@@ -86,7 +85,13 @@ BOUNDS = {
 
 
 # Of a loop beside the tip, which may read nothing, or backwards.
-LOOP_BOUNDS = {"stiffness_N_per_mm": (-1e12, 1e12), "displacement_um": (-LARGEST_UM, LARGEST_UM)}
+LOOP_BOUNDS = {"stiffness_N_per_mm": (-1e12, 1e12), "displacement_um": (-1e6, 1e6)}
+
+
+LEAST_FORCE = 1e-3  # N, of either sign
+
+
+SOFTEST_ALONE, STIFFEST_ALONE = 1e5, 1e10  # N/mm; beyond, the unit of a strut measured alone is wrong
 
 
 LIKE_DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
@@ -105,39 +110,50 @@ class Row:
         m; roll, pitch, yaw in rad.
     direction
         Unit vector of force and displacement.
-    stiffness, sd
-        N/m.
     force
         N, nan if not given.
+    sd
+        N/m; of a loop beside the tip m/N.
     time, temperature, tool_extension
         s, degrees C, m.
     labels
         `LABELS` -> text; `loop` by its own name, "" for the tip's.
-    beside
-        What an indicator beside the tip read; `stiffness` is nan then. None for readings of the tip.
-    extra
-        Further numeric columns, as they stand.
     file, line
         Where it was read.
+    extra
+        Further numeric columns, as they stand.
     date
         As in the file; a date of ISO 8601.
+    stiffness
+        N/m, of a reading of the tip.
+    compliance
+        m/N per load, of a loop beside the tip.
+    length, side
+        m of a strut measured alone; 1, or -1 under compression.
     """
 
     position: tuple[float, ...]
     angles: tuple[float, ...]
     direction: tuple[float, ...]
-    stiffness: float
-    sd: float
     force: float
+    sd: float
     time: float
     temperature: float
     tool_extension: float
     labels: Mapping[str, str]
     file: str
     line: int
-    extra: Mapping[str, float] = field(default_factory=dict)
-    beside: LoopReading | None = None
-    date: str = ""
+    extra: Mapping[str, float]
+    date: str
+    stiffness: float = math.nan
+    compliance: float = math.nan
+    length: float = math.nan
+    side: float = 1.0
+
+    @property
+    def of_tip(self) -> bool:
+        """Whether the indicator read between tool and work."""
+        return not self.labels["loop"]
 
 
 @dataclass(frozen=True)
@@ -167,43 +183,40 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
         Bad rows, all of them.
     """
     file, heading, line = table.file, list(table.heading), table.heading_line
-    place = {"file": file, "line": line}
     if "" in heading:
-        raise MeasurementError("a column without a name", **place)  # type: ignore[arg-type]
-    if not {*WIDE}.isdisjoint(heading) and not {
-        "direction",
-        *VECTOR,
-        "stiffness_N_per_mm",
-        "displacement_um",
-    }.isdisjoint(heading):
+        raise MeasurementError("a column without a name", file=file, line=line)
+    long = {"direction", *VECTOR, "stiffness_N_per_mm", "displacement_um"}
+    if {*WIDE} & {*heading} and long & {*heading}:
         fault = "columns of the wide layout beside those of the long one"
-        raise MeasurementError(fault, hint="use one of the two", **place)  # type: ignore[arg-type]
-    check_heading(table, (*KNOWN, *WIDE, *WIDE_MODEL), _needed(heading, planned))
+        raise MeasurementError(fault, hint="use one of the two", file=file, line=line)
+    known = (*KNOWN, *WIDE, *WIDE_MODEL)
+    check_heading(table, known, _needed(heading, planned))
     if not table.rows:
-        raise MeasurementError(
-            "no rows below the heading", expected="one row a measured stiffness", file=file, line=line
-        )
-    known = {*KNOWN, *WIDE, *WIDE_MODEL}
-    more = [name for name in heading if name not in known and _all_numbers(table, heading.index(name))]
-    notes = [*table.notes] + [
-        f"{file}: column {name} holds text and is not used"
-        for name in heading
-        if name not in known and name not in more
-    ]
+        expected = "one row a measured stiffness"
+        raise MeasurementError("no rows below the heading", expected=expected, file=file, line=line)
+    further = [name for name in heading if name not in known and _all_numbers(table, heading.index(name))]
+    notes = [*table.notes]
+    notes += [f"{file}: column {name} holds text and is not used" for name in heading if name not in (*known, *further)]
     if any(name in WIDE_MODEL for name in heading):
         notes.append(f"{file}: the printed model values (modeled_x_N_per_mm and so on) are not used")
-    rows: list[Row] = []
-    errors: list[InputError] = []
-    for line, cells in table.rows:
-        try:
-            rows += _rows_of(table.record(cells), more, file, line, planned)
-        except InputError as error:
-            errors.append(error.in_line(file, line))
+    parsed, errors = parsed_rows(table, lambda line, record: _rows_of(record, further, file, line, planned))
+    rows = [row for rows in parsed for row in rows]
     errors += duplicates(rows)
     if errors:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
-    columns = {name for name in heading if name in KNOWN}
-    return RowFile(tuple(rows), frozenset(columns), tuple(notes))
+    return RowFile(tuple(rows), frozenset(name for name in heading if name in KNOWN), tuple(notes))
+
+
+def parsed_rows(table: Table, parse: Callable[[int, dict[str, str]], Parsed]) -> tuple[list[Parsed], list[InputError]]:
+    """What `parse` makes of each row's line and record, and the errors of the others."""
+    parsed: list[Parsed] = []
+    errors: list[InputError] = []
+    for line, cells in table.rows:
+        try:
+            parsed.append(parse(line, table.record(cells)))
+        except InputError as error:
+            errors.append(error.in_line(table.file, line))
+    return parsed, errors
 
 
 def _needed(heading: list[str], planned: bool) -> tuple[str, ...]:
@@ -228,71 +241,89 @@ def _all_numbers(table: Table, column: int) -> bool:
         return False
 
 
-def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, planned: bool) -> list[Row]:
+def _rows_of(record: Mapping[str, str], further: list[str], file: str, line: int, planned: bool) -> list[Row]:
     """The one reading of a long row, the three of a wide one."""
     loop = loop_of(record.get("loop", ""))
-    labels = {name: record.get(name, "") for name in LABELS} | {"loop": "" if loop == TIP else str(loop)}
-    on_bench = loop.kind == "alone" and (
-        bool(record.get("length_mm")) or not any(record.get(name) for name in (*POSITION, *ANGLES))
+    date = record.get(DATE, "")
+    day_of(date)  # refuses what is no date
+    # A strut on a bench has no pose.
+    poseless = loop.kind == "alone" and not any(record.get(name) for name in (*POSITION, *ANGLES))
+    row = Row(
+        position=(math.nan,) * 3 if poseless else tuple(m_from_mm(number(record, name)) for name in POSITION),
+        angles=(math.nan,) * 3 if poseless else tuple(_angle(record, name) for name in ANGLES),
+        direction=(),
+        force=optional_number(record, "force_N"),
+        sd=n_per_m_from_n_per_mm(optional_number(record, "sd_N_per_mm")),
+        time=60.0 * optional_number(record, "time_min"),
+        temperature=optional_number(record, "temperature_C"),
+        tool_extension=m_from_mm(optional_number(record, "tool_extension_mm")),
+        labels={name: record.get(name, "") for name in LABELS} | {"loop": "" if loop == TIP else str(loop)},
+        file=file,
+        line=line,
+        extra={name: float(record[name]) for name in further},
+        date=date,
     )
-    day_of(record.get(DATE, ""))  # refuses what is no date
-    position, angles = _pose(record, on_bench)
-    force, beside = optional_number(record, "force_N"), None
-    if loop == TIP:
-        readings = _readings(record, force, planned)
-    else:
-        beside = _beside(record, loop, planned)
-        force = beside.force
+    if loop != TIP:
+        on_bench = poseless or (loop.kind == "alone" and bool(record.get("length_mm")))
         absent = on_bench and not record.get("direction", "Z" if VECTOR[0] in record else "")
-        readings = [(AXES["Z"] if absent else direction_of(record), math.nan)]
-    rows = []
-    for direction, stiffness in readings:
-        rows.append(
-            Row(
-                position=position,
-                angles=angles,
-                direction=direction,
-                stiffness=n_per_m_from_n_per_mm(stiffness),
-                sd=n_per_m_from_n_per_mm(optional_number(record, "sd_N_per_mm")),
-                force=force,
-                time=60.0 * optional_number(record, "time_min"),
-                temperature=optional_number(record, "temperature_C"),
-                tool_extension=m_from_mm(optional_number(record, "tool_extension_mm")),
-                labels=labels,
-                file=file,
-                line=line,
-                extra={name: float(record[name]) for name in more},
-                beside=beside,
-                date=record.get(DATE, ""),
-            )
-        )
-    return rows
+        return [
+            replace(_beside_tip(row, record, loop, planned), direction=AXES["Z"] if absent else direction_of(record))
+        ]
+    if WIDE[0] in record:
+        values = [number(record, name) for name in WIDE]
+        stiffnesses: list[tuple[tuple[float, ...], float]] = list(zip(AXES.values(), values, strict=True))
+    else:
+        stiffnesses = [(direction_of(record), _stiffness(record, row.force, planned))]
+    return [replace(row, direction=axis, stiffness=n_per_m_from_n_per_mm(value)) for axis, value in stiffnesses]
 
 
-def _pose(record: Mapping[str, str], on_bench: bool) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Position and angles; of a strut on a bench, which has no pose, nan."""
-    if on_bench and not any(record.get(name) for name in (*POSITION, *ANGLES)):
-        return (math.nan,) * 3, (math.nan,) * 3
-    position = tuple(m_from_mm(number(record, name)) for name in POSITION)
-    return position, tuple(rad_from_deg(number(record, name)) if name in record else 0.0 for name in ANGLES)
+def _angle(record: Mapping[str, str], name: str) -> float:
+    return rad_from_deg(number(record, name)) if name in record else 0.0
 
 
-def _beside(record: Mapping[str, str], loop: MeasuringLoop, planned: bool) -> LoopReading:
-    """What an indicator beside the tip read."""
+def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planned: bool) -> Row:
+    """A row with what an indicator beside the tip read.
+
+    Raises
+    ------
+    InputError
+        There is no reading, or two that disagree, or one that cannot be.
+    """
     if record.get("sd_N_per_mm"):
         raise MeasurementError(f"sd_N_per_mm in a row of loop {loop}", expected="sd_um, of displacement_um")
-    numbers = {name: optional_number(record, name) for name in ("force_N", *LOOP_COLUMNS)}
-    for name, bounds in LOOP_BOUNDS.items():
-        numbers[name] = number(record, name, bounds) if record.get(name) else math.nan
-    if numbers["stiffness_N_per_mm"] == 0.0:
+    sd, own_force, length = (optional_number(record, name) for name in LOOP_COLUMNS)
+    stiffness, moved = (
+        number(record, name, bounds) if record.get(name) else math.nan for name, bounds in LOOP_BOUNDS.items()
+    )
+    if stiffness == 0.0:
         raise MeasurementError("stiffness_N_per_mm = 0", expected="displacement_um, where a loop reads it")
-    return loop_reading(record, numbers, loop, planned)
+    alone = loop.kind == "alone"
+    if not alone and not (math.isnan(own_force) and math.isnan(length)):
+        raise MeasurementError(f"strut_force_N or length_mm in a row of loop {loop}", expected="loop strut 1 alone")
+    force = own_force if alone and not math.isnan(own_force) else row.force
+    if abs(force) < LEAST_FORCE:
+        raise MeasurementError(f"strut_force_N = {force:g}", expected="a force: tension positive, compression negative")
+    if math.isnan(moved) == math.isnan(stiffness) and not (planned and math.isnan(moved)):
+        both = "neither displacement_um nor" if math.isnan(moved) else "displacement_um and"
+        raise MeasurementError(f"loop {loop}: {both} stiffness_N_per_mm", expected="one of them")
+    if not math.isnan(moved) and math.isnan(force):
+        raise MeasurementError(f"loop {loop}: displacement_um without its load", expected="force_N")
+    compliance = m_from_um(moved) / force if math.isnan(stiffness) else 1e-3 / stiffness
+    # A sign of the direction turns what does not read along the load.
+    if record.get("direction", "").startswith("-") and not (loop.along_load or alone):
+        compliance = -compliance
+    if alone and not (planned or 1.0 / STIFFEST_ALONE <= compliance <= 1.0 / SOFTEST_ALONE):
+        raise MeasurementError(
+            f"loop {loop}: {1e9 * compliance:.4g} nm/N",
+            expected=f"{1e9 / STIFFEST_ALONE:g} to {1e9 / SOFTEST_ALONE:g} nm/N; longer under tension is positive",
+        )
+    size, side = abs(force), math.copysign(1.0, force)
+    sd = m_from_um(sd) / size
+    return replace(row, force=size, sd=sd, compliance=compliance, length=m_from_mm(length), side=side)
 
 
-def _readings(record: Mapping[str, str], force: float, planned: bool) -> list[tuple[tuple[float, ...], float]]:
-    """Directions and stiffnesses in N/mm."""
-    if WIDE[0] in record:
-        return [(axis, number(record, name)) for axis, name in zip(AXES.values(), WIDE, strict=True)]
+def _stiffness(record: Mapping[str, str], force: float, planned: bool) -> float:
+    """N/mm of a reading of the tip; nan of a plan's."""
     printed = optional_number(record, "stiffness_N_per_mm")
     displacement = optional_number(record, "displacement_um")
     quotient = force / (displacement / 1e3)  # N/mm
@@ -305,10 +336,10 @@ def _readings(record: Mapping[str, str], force: float, planned: bool) -> list[tu
         )
     if not math.isnan(quotient) and not SOFTEST <= quotient <= STIFFEST:
         raise MeasurementError(
-            f"{force:g} N over {m_from_um(displacement) * 1e6:g} um is {quotient:.4g} N/mm",
+            f"{force:g} N over {displacement:g} um is {quotient:.4g} N/mm",
             expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm; is the unit right?",
         )
-    return [(direction_of(record), quotient if math.isnan(printed) else printed)]
+    return quotient if math.isnan(printed) else printed
 
 
 def direction_of(record: Mapping[str, str]) -> tuple[float, ...]:
@@ -357,15 +388,15 @@ def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:
     errors: list[InputError] = []
     for row in rows:
         # repr: nan differs from itself, its text does not.
-        at = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels, row.beside,
-              row.date)  # fmt: skip
+        cells = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels, row.date,
+                 row.compliance, row.length, row.side, None if row.of_tip else row.sd)  # fmt: skip
         numbered = bool(row.labels["repeat"]) and not across_files
-        key = tuple(repr(part) for part in (at if numbered else (*at, row.stiffness)))
-        seen = first.setdefault(key, row)
-        if seen is not row:
+        earlier = first.setdefault(tuple(map(repr, cells if numbered else (*cells, row.stiffness))), row)
+        if earlier is not row:
+            place = f" of {earlier.file}" if earlier.file != row.file else ""
             errors.append(
                 MeasurementError(
-                    f"row repeats line {seen.line}" + (f" of {seen.file}" if seen.file != row.file else ""),
+                    f"row repeats line {earlier.line}{place}",
                     hint="number repeated readings in a column repeat, or remove it",
                     line=row.line,
                     file=row.file,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,17 +9,9 @@ import numpy as np
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.placement.case_study import HIGH_MM, LOW_MM, REGION_COLUMNS, CaseStudy
-from toolpath_stiff.report.figure import (
-    BLUE,
-    COLOUR_MAP,
-    INK,
-    MUTED,
-    SECOND_ORANGE,
-    house_style,
-    new_figure,
-    picture,
-)
+from toolpath_stiff.placement.case_study import FIGURES, HIGH_MM, LOW_MM, REGION_COLUMNS, CaseStudy
+from toolpath_stiff.report.axes import colour_scale, heading, in_thousands
+from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, new_figure, picture
 from toolpath_stiff.stiffness.model import machine_words
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
@@ -35,7 +26,7 @@ ABOVE, LEAST_ASPECT = 0.2, 0.6  # of a path of one's own: room for words above i
 BESIDE = 1.3  # inches
 HOLDS = {True: "yes", False: "NO", None: "not tested"}
 # As in the paper's Figure 10, mean and range first.
-COLUMNS = ("region", *REGION_COLUMNS, "mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")
+COLUMNS = ("region", *REGION_COLUMNS, *FIGURES)
 NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
 
@@ -49,42 +40,37 @@ def regions_picture(study: CaseStudy) -> Figure:
         n_per_mm_from_n_per_m(a.at.stiffness[rows]) for a, rows in zip(study.regions.values(), shown, strict=True)
     ]
     low, high = min(float(s.min()) for s in stiffness), max(float(s.max()) for s in stiffness)
-    with house_style():
-        (left, right), (bottom, top) = _frame(study)
-        panel = 5.9  # inches wide; as high as its scale asks for
-        right_of = BESIDE if study.is_own else 1.0  # inches for the scale of colours
-        width = 13.2 + right_of + (panel + 0.35) * (len(heights) - 2)
-        tall = panel * (top - bottom) / (right - left)
-        above = tall + 1.65
-        figure = new_figure(width, above)
-        drawn = None
-        for column, height in enumerate(heights):
-            place = ((0.75 + (panel + 0.35) * column) / width, 0.6 / above, panel / width, tall / above)
-            axes = figure.add_axes(place)
-            for row in study.summary["regions"]:
-                if row["z_mm"] == height:
-                    drawn = _path(axes, study, row, low, high)
-            axes.set_title(f"z = {height:g} mm")
-            axes.set_xlim(left, right)
-            axes.set_ylim(bottom, top)
-            axes.set_xlabel("X mm")
-            axes.set_ylabel("" if column else "Y mm")
-            axes.tick_params(labelleft=not column)
-            axes.plot(0, 0, "+", color=MUTED, ms=10)
-        if drawn is not None:
-            bar = figure.add_axes((1.0 - right_of / width, 0.6 / above, 0.18 / width, tall / above))
-            figure.colorbar(drawn, cax=bar, label="tangential stiffness, N/mm")
-            bar.yaxis.set_major_formatter(lambda value, _: number(value))
-            bar.grid(visible=False)
-        x = 0.25 / width
-        count = len(study.regions)
-        regions = f"{NUMBERS.get(count, count)} region{'s' if count > 1 else ''}"
-        title = f"One path in {regions}: mean (range) of stiffness, N/mm"
-        figure.text(x, 1.0 - 0.4 / above, title, fontsize=14, weight="bold")
-        text = f"{study.summary['program']} on {study.summary['machine']}"
-        text += _left_out(study, heights) if study.is_own else "; path and regions are ours, as Figure 10"
-        figure.text(x, 1.0 - 0.68 / above, text, fontsize=10, color=MUTED)
-        return figure
+    (left, right), (bottom, top) = _frame(study)
+    panel = 5.9  # inches wide; as high as its scale asks for
+    right_of = BESIDE if study.is_own else 1.0  # inches for the scale of colours
+    width = 13.2 + right_of + (panel + 0.35) * (len(heights) - 2)
+    tall = panel * (top - bottom) / (right - left)
+    above = tall + 1.65
+    figure = new_figure(width, above)
+    drawn = None
+    for column, height in enumerate(heights):
+        place = ((0.75 + (panel + 0.35) * column) / width, 0.6 / above, panel / width, tall / above)
+        axes = figure.add_axes(place)
+        for row in study.summary["regions"]:
+            if row["z_mm"] == height:
+                drawn = _path(axes, study, row, low, high)
+        axes.set_title(f"z = {height:g} mm")
+        axes.set_xlim(left, right)
+        axes.set_ylim(bottom, top)
+        axes.set_xlabel("X mm")
+        axes.set_ylabel("" if column else "Y mm")
+        axes.tick_params(labelleft=not column)
+        axes.plot(0, 0, "+", color=MUTED, ms=10)
+    if drawn is not None:
+        box = (1.0 - right_of / width, 0.6 / above, 0.18 / width, tall / above)
+        colour_scale(figure, drawn, box, "tangential stiffness, N/mm")
+    count = len(study.regions)
+    regions = f"{NUMBERS.get(count, count)} region{'s' if count > 1 else ''}"
+    title = f"One path in {regions}: mean (range) of stiffness, N/mm"
+    text = f"{study.summary['program']} on {study.summary['machine']}"
+    text += _left_out(study, heights) if study.is_own else "; path and regions are ours, as Figure 10"
+    heading(figure, 0.25 / width, 1.0 - 0.4 / above, title, 0.28 / above, text)
+    return figure
 
 
 def _drawn_heights(study: CaseStudy) -> list[float]:
@@ -142,48 +128,46 @@ def heights_picture(study: CaseStudy) -> Figure:
     rows = study.summary["heights"]
     z = [row["z_mm"] for row in rows]
     turns = study.summary["limits_of_the_conclusions"]
-    with house_style():
-        figure = new_figure(10.0, 5.6)
-        axes = figure.add_axes((0.09, 0.12, 0.82, 0.68))
-        mean = [row["mean_N_per_mm"] for row in rows]
-        axes.fill_between(
-            z, [row["min_N_per_mm"] for row in rows], [row["max_N_per_mm"] for row in rows], color=BLUE, alpha=0.12,
-            label="from weakest to stiffest sample", lw=0,
+    figure = new_figure(10.0, 5.6)
+    axes = figure.add_axes((0.09, 0.12, 0.82, 0.68))
+    mean = [row["mean_N_per_mm"] for row in rows]
+    axes.fill_between(
+        z, [row["min_N_per_mm"] for row in rows], [row["max_N_per_mm"] for row in rows], color=BLUE, alpha=0.12,
+        label="from weakest to stiffest sample", lw=0,
+    )  # fmt: skip
+    axes.plot(z, mean, color=BLUE, lw=2.2, label="mean")
+    axes.set_xlabel("z of the path, mm")
+    axes.set_ylabel("stiffness, N/mm", color=BLUE)
+    other = axes.twinx()
+    other.grid(visible=False)
+    spread = [row["range_N_per_mm"] for row in rows]
+    other.plot(z, spread, color=SECOND_ORANGE, lw=2.2, label="range (right scale)")
+    other.set_ylabel("range, N/mm", color=SECOND_ORANGE)
+    other.set_ylim(0, 1.25 * max(spread))
+    in_thousands(axes.yaxis, other.yaxis)
+    for panel, key, values in ((axes, "largest_mean_at_z_mm", mean), (other, "largest_range_at_z_mm", spread)):
+        panel.plot(turns[key], max(values), "o", mfc="white", mec=INK, mew=1.6, ms=9)
+        panel.annotate(
+            f"z = {turns[key]:g} mm", (turns[key], max(values)), xytext=(0, 12), textcoords="offset points",
+            ha="center", color=INK,
         )  # fmt: skip
-        axes.plot(z, mean, color=BLUE, lw=2.2, label="mean")
-        axes.set_xlabel("z of the path, mm")
-        axes.set_ylabel("stiffness, N/mm", color=BLUE)
-        axes.yaxis.set_major_formatter(lambda value, _: number(value))
-        other = axes.twinx()
-        other.grid(visible=False)
-        spread = [row["range_N_per_mm"] for row in rows]
-        other.plot(z, spread, color=SECOND_ORANGE, lw=2.2, label="range (right scale)")
-        other.set_ylabel("range, N/mm", color=SECOND_ORANGE)
-        other.set_ylim(0, 1.25 * max(spread))
-        other.yaxis.set_major_formatter(lambda value, _: number(value))
-        for panel, key, values in ((axes, "largest_mean_at_z_mm", mean), (other, "largest_range_at_z_mm", spread)):
-            panel.plot(turns[key], max(values), "o", mfc="white", mec=INK, mew=1.6, ms=9)
-            panel.annotate(
-                f"z = {turns[key]:g} mm", (turns[key], max(values)), xytext=(0, 12), textcoords="offset points",
-                ha="center", color=INK,
-            )  # fmt: skip
-        handles = [*axes.get_legend_handles_labels()[0], *other.get_legend_handles_labels()[0]]
-        figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.08, 0.89), ncol=3, frameon=False)
-        title = "Mean and range over z" if study.is_own else "Mean and range rise with z, until they turn over"
-        figure.text(0.09, 0.92, title, fontsize=14, weight="bold")
-        return figure
+    handles = [*axes.get_legend_handles_labels()[0], *other.get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.08, 0.89), ncol=3, frameon=False)
+    title = "Mean and range over z" if study.is_own else "Mean and range rise with z, until they turn over"
+    heading(figure, 0.09, 0.92, title)
+    return figure
 
 
 def text(study: CaseStudy) -> str:
     """The case study in words and numbers, Markdown."""
     summary = study.summary
     count = len(summary["regions"])
-    asked = [
+    opening = [
         f"One path ({summary['program']}, {summary['note']}) in four regions, as the paper's Figure 10: mean stiffness",
         "under a load along the motion, and in parentheses its range, N/mm.",
     ]
     if study.is_own:
-        asked = [
+        opening = [
             f"{summary['program']} in {count} region{'s' if count > 1 else ''}: mean stiffness under a load along the",
             "motion, and in parentheses its range, N/mm.",
         ]
@@ -191,7 +175,7 @@ def text(study: CaseStudy) -> str:
         f"# Case study on {machine_words(summary)}",
         "",
         *(line for warning in summary["warnings"] for line in (f"Warning: {warning}.", "")),
-        *asked,
+        *opening,
         "",
         "| region | program zero, mm | turned | mean (range), N/mm |",
         "| --- | --- | --- | --- |",
@@ -203,8 +187,8 @@ def text(study: CaseStudy) -> str:
             f"{number(row['mean_N_per_mm'])} ({number(row['range_N_per_mm'])}) |"
         )
     lines += ["", "## The paper's conclusions", ""]
-    for row_number, found in enumerate(summary["conclusions"], 1):
-        lines.append(f"{row_number}. {found['statement']}: {HOLDS[found['holds']]}. {found['numbers']}.")
+    for row_number, conclusion in enumerate(summary["conclusions"], 1):
+        lines.append(f"{row_number}. {conclusion['statement']}: {HOLDS[conclusion['holds']]}. {conclusion['numbers']}.")
     lines += ["", "## Where they stop holding", "", *_limits_words(summary, study.is_own)]
     if study.is_own:
         return "\n".join([*lines, ""])
@@ -224,19 +208,19 @@ def text(study: CaseStudy) -> str:
     return "\n".join([*lines, ""])
 
 
-def _limits_words(summary: Mapping[str, Any], own: bool) -> list[str]:
-    limits, heights, at = summary["limits_of_the_conclusions"], summary["heights"], summary["regions"][0]
-    turned = f", turned {at['rotation_deg']:g} deg," if at["rotation_deg"] else ","
-    moved = f"Moved up and down at ({at['x_mm']:g}, {at['y_mm']:g}) mm{turned}"
+def _limits_words(summary: Mapping[str, Any], custom: bool) -> list[str]:
+    limits, heights, first = summary["limits_of_the_conclusions"], summary["heights"], summary["regions"][0]
+    turned = f", turned {first['rotation_deg']:g} deg," if first["rotation_deg"] else ","
+    moved = f"Moved up and down at ({first['x_mm']:g}, {first['y_mm']:g}) mm{turned}"
     mean, widest = (f"{limits[f'largest_{what}_at_z_mm']:g}" for what in ("mean", "range"))
-    if not own:
+    if not custom:
         return [
             f"{moved} the same path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm: "
             "beyond, both fall again."
         ]
     return [
-        f"{moved} as region {at['region']}, from z = {heights[0]['z_mm']:g} to {heights[-1]['z_mm']:g} mm (where it is "
-        f"within reach), the path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm."
+        f"{moved} as region {first['region']}, from z = {heights[0]['z_mm']:g} to {heights[-1]['z_mm']:g} mm (where it "
+        f"is within reach), the path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm."
     ]
 
 
@@ -250,7 +234,7 @@ def files(study: CaseStudy, *, plots: bool = True) -> dict[str, Content]:
     """Table, summary and text of the study, and with `plots` its two pictures."""
     contents: dict[str, Content] = {
         "case_study.csv": csv_text(COLUMNS, ([str(row[key]) for key in COLUMNS] for row in study.summary["regions"])),
-        "case_study.json": json.dumps(study.summary, indent=2) + "\n",
+        "case_study.json": study.to_json(),
         "case_study.md": text(study),
     }
     if plots:

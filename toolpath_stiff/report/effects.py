@@ -19,35 +19,25 @@ def trials_text(check: EffectCheck) -> str:
     for trial in check.trials:
         lines.append(f"{trial.effect.name}, on machine {check.machine}: {'good' if trial.passed else 'FAILS'}")
         width = max(len(outcome.name) for outcome in trial.outcomes)
-        lines += [f"  {TRIAL_WORDS[one.passed]:<5}  {one.name:<{width}}  {one.found}" for one in trial.outcomes]
+        for outcome in trial.outcomes:
+            lines.append(f"  {TRIAL_WORDS[outcome.passed]:<5}  {outcome.name:<{width}}  {outcome.found}")
     return "\n".join(lines)
 
 
 def describe_effect(effect: Effect) -> dict[str, object]:
     """What the effect declares, in its own units; JSON has no infinity, so that "inf" stands for it."""
+    of_parameter = ("name", "key", "unit", "bounds", "typical", "neutral", "kind", "meaning", "source")
     return {
-        "name": effect.name,
-        "title": effect.title,
-        "link": effect.link,
-        "equation": effect.equation,
-        "source": effect.source,
-        "load_dependent": effect.load_dependent,
+        **{name: getattr(effect, name) for name in ("name", "title", "link", "equation", "source", "load_dependent")},
         "needs": list(effect.needs),
-        "parameters": [
-            {
-                "name": p.name,
-                "key": p.key,
-                "unit": p.unit,
-                "bounds": [_json_number(value) for value in p.bounds],
-                "typical": [_json_number(value) for value in p.typical],
-                "neutral": _json_number(p.neutral),
-                "kind": p.kind,
-                "meaning": p.meaning,
-                "source": p.source,
-            }
-            for p in effect.parameters
-        ],
+        "parameters": [{name: _plain(getattr(p, name)) for name in of_parameter} for p in effect.parameters],
     }
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def text(catalogue: EffectCatalogue) -> str:
@@ -66,12 +56,8 @@ def text(catalogue: EffectCatalogue) -> str:
 
 def effect_details(effect: Effect) -> str:
     """The whole effect, for people, with the lines for a machine file."""
-    lines = [
-        f"{effect.name}: {effect.title}",
-        f"  link       {effect.link}",
-        f"  equation   {effect.equation}",
-        f"  source     {effect.source}",
-    ]
+    lines = [f"{effect.name}: {effect.title}"]
+    lines += [f"  {name:<10} {getattr(effect, name)}" for name in ("link", "equation", "source")]
     if effect.load_dependent:
         lines.append("  load       depends on the size of the load (--force, force_N): the stiffness is the secant one")
     if effect.needs:
@@ -95,7 +81,3 @@ def effect_details(effect: Effect) -> str:
 
 def _range(values: tuple[float, float], parameter: Parameter) -> str:
     return f"{values[0]:g} to {values[1]:g} {parameter.unit}".rstrip()
-
-
-def _json_number(value: float) -> float | str:
-    return value if math.isfinite(value) else str(value)

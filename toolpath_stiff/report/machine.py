@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from toolpath_stiff.units import (
     mm_per_min_from_m_per_s,
     n_per_mm_from_n_per_m,
     n_per_um_from_n_per_m,
+    pose_in_mm,
 )
 
 if TYPE_CHECKING:
@@ -53,16 +54,10 @@ def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> Figur
 
 def heading(figure: Figure, machine: Machine, pose: FloatArray) -> None:
     """Name of the machine, and the pose (6,) in m and rad, above everything."""
-    x, y, z = (mm_from_m(float(v)) for v in pose[:3])
-    a, b, c = (deg_from_rad(float(v)) for v in pose[3:])
+    x, y, z, a, b, c = pose_in_mm(pose.tolist())
+    where = f"tool tip at X{x:g} Y{y:g} Z{z:g} mm, roll {a:g}, pitch {b:g}, yaw {c:g} degrees   ·   lengths in mm"
     figure.text(0.02, 0.95, machine.title, fontsize=15, weight="bold")
-    figure.text(
-        0.02,
-        0.91,
-        f"tool tip at X{x:g} Y{y:g} Z{z:g} mm, roll {a:g}, pitch {b:g}, yaw {c:g} degrees   ·   lengths in mm",
-        fontsize=11,
-        color="#4b5563",
-    )
+    figure.text(0.02, 0.91, where, fontsize=11, color="#4b5563")
 
 
 def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArray, struts: Struts) -> None:
@@ -76,9 +71,9 @@ def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArr
     for i in range(6):
         axes.plot(*np.array([frame[i], joints[i]]).T, color=STRUT, lw=2.2)
         # The two struts of a vertex run close together: their labels sit at different heights.
-        at = frame[i] + (0.3 if i % 2 else 0.55) * (joints[i] - frame[i])
+        place = frame[i] + (0.3 if i % 2 else 0.55) * (joints[i] - frame[i])
         label = f"{i + 1}: {mm_from_m(struts.lengths[0, i]):.0f} mm, {stiffness[i] / 1e3:.1f} kN/mm"
-        axes.text(*at, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=LABEL)
+        axes.text(*place, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=LABEL)
     _truss(axes, machine, nodes, lw=1.2)
     axes.scatter(*nodes[TIP], color=TOOL, s=30, depthshade=False)
     axes.set_title("whole machine: struts with length and stiffness", fontsize=10, color="#374151", y=0.85 - BELOW)
@@ -124,8 +119,8 @@ def _box(axes: Any, zoom: float | None = None) -> FloatArray:
 def _reach(axes: Any) -> FloatArray:
     """(2, 2) pixels by which a view's figures and what its axes are called reach beyond its box, as it is drawn."""
     box = _box(axes)
-    found = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
-    ends = np.concatenate([box, *(one.get_points() for one in found if one is not None)])
+    boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    ends = np.concatenate([box, *(box_of_axis.get_points() for box_of_axis in boxes if box_of_axis is not None)])
     return np.array([ends.min(axis=0), ends.max(axis=0)]) - box
 
 
@@ -183,53 +178,47 @@ def _law_figures(law: StrutLaw) -> tuple[str, str]:
 
 def machine_figures(machine: Machine) -> list[tuple[str, str, str, str, str]]:
     """Quantity, value, unit, origin, remark of a machine's figures, in the shop's units."""
-    limits, law = machine.limits, machine.strut_law
+    limits = machine.limits
 
-    def row(quantity: str, value: str, unit: str, section: str) -> tuple[str, str, str, str, str]:
-        return quantity, value, unit, machine.origins.get(section, "assumed"), machine.remarks.get(section, "")
+    def numbers(values: Iterable[float]) -> str:
+        return ", ".join(f"{round(float(v), 3) + 0.0:g}" if abs(v) < 1e5 else f"{v:g}" for v in values)
 
-    def numbers(values: Any, decimals: int = 3) -> str:
-        return ", ".join(f"{round(float(v), decimals) + 0.0:g}" if abs(v) < 1e5 else f"{v:g}" for v in values)
+    def joints(section: str, unit: str) -> list[tuple[str, str, str, str]]:
+        name = section.removesuffix("s").replace("_", " ")
+        rows = enumerate(mm_from_m(getattr(machine, section)), 1)
+        return [(section, f"{name} {i}", numbers(joint), unit) for i, joint in rows]
 
-    rows = [
-        row(f"frame joint {i + 1}", numbers(mm_from_m(joint), 3), "mm", "frame_joints")
-        for i, joint in enumerate(machine.frame_joints)
-    ]
-    rows += [
-        row(f"platform joint {i + 1}", numbers(mm_from_m(joint), 3), "mm from the tool tip", "platform_joints")
-        for i, joint in enumerate(machine.platform_joints)
-    ]
-    pose = [*(mm_from_m(v) for v in limits.neutral_pose[:3]), *(deg_from_rad(v) for v in limits.neutral_pose[3:])]
-    origin = [
-        *(mm_from_m(v) for v in machine.default_origin[:3]),
-        *(deg_from_rad(v) for v in machine.default_origin[3:]),
-    ]
+    frame_angle, platform_angle = (
+        f"{deg_from_rad(angle):g}" for angle in (limits.frame_joint_angle, limits.platform_joint_angle)
+    )
     low, high = mm_from_m(limits.workspace)
+    rows = [
+        *joints("frame_joints", "mm"),
+        *joints("platform_joints", "mm from the tool tip"),
+        ("reference_tool", "reference tool length", f"{mm_from_m(machine.reference_tool_length):g}", "mm"),
+        ("strut_law", "strut stiffness", *_law_figures(machine.strut_law)),
+        ("platform", "platform bar stiffness", f"{machine.platform_bar_stiffness:g}", "N/m"),
+        ("limits.strut_length", "strut length", numbers(map(mm_from_m, limits.strut_length)), "mm"),
+        ("limits.joint_angle", "frame joint angle up to", frame_angle, "deg"),
+        ("limits.joint_angle", "platform joint angle up to", platform_angle, "deg"),
+        ("limits.joint_angle", "neutral pose of the joints", numbers(pose_in_mm(limits.neutral_pose)), "mm, deg"),
+        ("limits.workspace", "workspace from", numbers(low), "mm"),
+        ("limits.workspace", "workspace to", numbers(high), "mm"),
+        ("limits.singularity", "singularity index at least", f"{limits.singularity:g}", ""),
+        ("setup", "default origin (program zero)", numbers(pose_in_mm(machine.default_origin)), "mm, deg"),
+        ("setup", "rapid feed", f"{mm_per_min_from_m_per_s(machine.rapid_feed):g}", "mm/min"),
+    ]
+    origins, remarks = machine.origins, machine.remarks
     return [
-        *rows,
-        row("reference tool length", f"{mm_from_m(machine.reference_tool_length):g}", "mm", "reference_tool"),
-        row("strut stiffness", *_law_figures(law), "strut_law"),
-        row("platform bar stiffness", f"{machine.platform_bar_stiffness:g}", "N/m", "platform"),
-        row("strut length", numbers([mm_from_m(v) for v in limits.strut_length]), "mm", "limits.strut_length"),
-        row("frame joint angle up to", f"{deg_from_rad(limits.frame_joint_angle):g}", "deg", "limits.joint_angle"),
-        row(
-            "platform joint angle up to", f"{deg_from_rad(limits.platform_joint_angle):g}", "deg", "limits.joint_angle"
-        ),
-        row("neutral pose of the joints", numbers(pose), "mm, deg", "limits.joint_angle"),
-        row("workspace from", numbers(low), "mm", "limits.workspace"),
-        row("workspace to", numbers(high), "mm", "limits.workspace"),
-        row("singularity index at least", f"{limits.singularity:g}", "", "limits.singularity"),
-        row("default origin (program zero)", numbers(origin), "mm, deg", "setup"),
-        row("rapid feed", f"{mm_per_min_from_m_per_s(machine.rapid_feed):g}", "mm/min", "setup"),
+        (quantity, value, unit, origins.get(section, "assumed"), remarks.get(section, ""))
+        for section, quantity, value, unit in rows
     ]
 
 
 def figure_entries(machine: Machine) -> list[dict[str, str]]:
     """`machine_figures` for JSON."""
-    return [
-        dict(zip(("quantity", "value", "unit", "origin", "remark"), row, strict=True))
-        for row in machine_figures(machine)
-    ]
+    names = ("quantity", "value", "unit", "origin", "remark")
+    return [dict(zip(names, row, strict=True)) for row in machine_figures(machine)]
 
 
 def text(machine: Machine, stand: Reach) -> str:
@@ -241,5 +230,5 @@ def text(machine: Machine, stand: Reach) -> str:
         f"  {quantity:<{width}}  {value} {unit}".rstrip() + f"  [{origin}]" for quantity, value, unit, origin, _ in rows
     ]
     remarks = {row[4] for row in rows if row[4]}
-    said = "".join(f"\n  {name}: {remark}" for name, remark in machine.remarks.items() if remark in remarks)
-    return "\n".join([*lines, f"{said}\n\n  at the pose drawn: {stand.describe(0)}"])
+    remarked = "".join(f"\n  {name}: {remark}" for name, remark in machine.remarks.items() if remark in remarks)
+    return "\n".join([*lines, f"{remarked}\n\n  at the pose drawn: {stand.describe(0)}"])

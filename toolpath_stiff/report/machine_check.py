@@ -22,26 +22,26 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def text(found: MachineCheck) -> str:
+def text(check: MachineCheck) -> str:
     """What is wrong or doubtful in a machine file, what acts, how stiff it is."""
-    model, machine = found.model, found.model.machine
-    verdict = "the file is good" if found.good else f"{len(found.wrong)} things cannot be right"
-    if len(found.wrong) == 1:
+    model, machine = check.model, check.model.machine
+    verdict = "the file is good" if check.good else f"{len(check.wrong)} things cannot be right"
+    if len(check.wrong) == 1:
         verdict = "one thing cannot be right"
-    if found.good and found.doubtful:
+    if check.good and check.doubtful:
         verdict = "the file can be used; look at what is doubtful"
-    lines = [f"{found.file}: {machine.title}: {verdict}"]
-    for word, texts in (("WRONG", found.wrong), ("doubtful", found.doubtful), ("warning", condition_warnings(model))):
+    lines = [f"{check.file}: {machine.title}: {verdict}"]
+    for word, texts in (("WRONG", check.wrong), ("doubtful", check.doubtful), ("warning", condition_warnings(model))):
         lines += [f"  {word}: {text}" for text in texts]
     effects = ", ".join([*acting_names(model), *(active.effect.name for active in model.instruments)]) or "none"
-    lines += [f"  effects: {effects}", f"  {symmetry_words(found.symmetry)}"]
-    if found.neutral.reach.reachable[0]:
-        lines.append(f"  {neutral_words(machine, found.neutral)}")
-    if found.origin.reach.reachable[0]:
-        kx, ky, kz = n_per_mm_from_n_per_m(found.origin.along_axes[0])
+    lines += [f"  effects: {effects}", f"  {symmetry_words(check.symmetry)}"]
+    if check.neutral.reach.reachable[0]:
+        lines.append(f"  {neutral_words(machine, check.neutral)}")
+    if check.origin.reach.reachable[0]:
+        kx, ky, kz = n_per_mm_from_n_per_m(check.origin.along_axes[0])
         lines.append(
             f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; "
-            f"{found.origin.reach.describe(0)}"
+            f"{check.origin.reach.describe(0)}"
         )
     return "\n".join(lines)
 
@@ -91,8 +91,8 @@ def machine_views(check: MachineCheck) -> Figure:
             axes = figure.add_axes((0.06 + 0.49 * k, 0.09, 0.42, 0.74))
             _draw_view(axes, frame, joints, tip, [first, second])
             for body, i in marked:
-                at = (frame if body == "frame" else joints)[i]
-                axes.plot(at[first], at[second], "o", ms=18, mfc="none", mec=TOOL, mew=2.0)
+                place = (frame if body == "frame" else joints)[i]
+                axes.plot(place[first], place[second], "o", ms=18, mfc="none", mec=TOOL, mew=2.0)
             axes.set_title(title, fontsize=11, color="#374151")
             axes.set_xlabel(f"{'XYZ'[first]} mm")
             axes.set_ylabel(f"{'XYZ'[second]} mm")
@@ -109,11 +109,11 @@ def _draw_view(axes: Any, frame: FloatArray, joints: FloatArray, tip: FloatArray
         order = np.argsort(np.arctan2(beside[:, 1], beside[:, 0]), kind="stable")
         axes.plot(*body[[*order, order[0]]][:, seen].T, color=colour, lw=1.6)
         axes.plot(*body[:, seen].T, "o", color=colour, ms=6)
-    for i, (one, other) in enumerate(zip(frame[:, seen], joints[:, seen], strict=True)):
-        axes.plot(*np.array([one, other]).T, color=STRUT, lw=1.8)
+    for i, (start, end) in enumerate(zip(frame[:, seen], joints[:, seen], strict=True)):
+        axes.plot(*np.array([start, end]).T, color=STRUT, lw=1.8)
         # Struts of a vertex, and those behind each other, have their numbers at different places.
-        at = one + (0.25 + 0.1 * i) * (other - one)
-        axes.text(*at, f"{i + 1}", fontsize=10, weight="bold", color=STRUT, ha="center", va="center", bbox=LABEL)
+        place = start + (0.25 + 0.1 * i) * (end - start)
+        axes.text(*place, f"{i + 1}", fontsize=10, weight="bold", color=STRUT, ha="center", va="center", bbox=LABEL)
     axes.plot(*tip[seen], "o", color=TOOL, ms=8)
     axes.annotate("tool tip", tip[seen], xytext=(8, -4), textcoords="offset points", fontsize=9, color=TOOL)
     axes.set_aspect("equal", adjustable="datalim")

@@ -11,6 +11,7 @@ import numpy as np
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
+from toolpath_stiff.readings.raw_rows import loop_entry
 from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.report.history import dated, history_png, history_text
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.readings.loop_figures import LoopFigures
     from toolpath_stiff.readings.raw import Reduction
-    from toolpath_stiff.readings.raw_records import Loop
 
 
 COLUMNS = 4
@@ -28,7 +28,7 @@ MOST = 60  # loops in one picture; further ones are counted in its heading
 
 
 @picture
-def loops_png(loops: Sequence[tuple[Loop, LoopFigures]], title: str) -> Figure:
+def loops_png(loops: Sequence[LoopFigures], title: str) -> Figure:
     """One small diagram a loop, in the order of the file, as PNG."""
     shown = min(len(loops), MOST)
     columns = min(COLUMNS, shown)
@@ -38,7 +38,8 @@ def loops_png(loops: Sequence[tuple[Loop, LoopFigures]], title: str) -> Figure:
         more = f"; the first {MOST} of {len(loops)} loops" if len(loops) > MOST else ""
         figure.suptitle(f"{title}: force over deflection{more}", x=0.02, ha="left", weight="bold", color=INK)
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, (loop, one) in zip(axes, loops, strict=False):
+        for ax, figures in zip(axes, loops, strict=False):
+            loop = figures.loop
             deflection = um_from_m(loop.deflection)
             ends = [int(np.argmin(loop.drive)), int(np.argmax(loop.drive))]
             ax.plot(deflection[ends], loop.force[ends], color=SECOND_ORANGE, linewidth=1.6, label="secant")
@@ -47,7 +48,7 @@ def loops_png(loops: Sequence[tuple[Loop, LoopFigures]], title: str) -> Figure:
             ax.text(
                 0.04,
                 0.95,
-                f"{n_per_mm_from_n_per_m(one.stiffness):,.0f} N/mm",
+                f"{n_per_mm_from_n_per_m(figures.stiffness):,.0f} N/mm",
                 transform=ax.transAxes,
                 va="top",
                 fontsize=9,
@@ -84,8 +85,7 @@ def reduction_pictures(reduction: Reduction, out: Path) -> dict[Path, Content]:
 
 def reduction_text(reduction: Reduction) -> str:
     """The figures of the loops and the struts' histories; rows of a table of stiffnesses say nothing themselves."""
-    pairs = zip(reduction.to_dict()["loops"], reduction.loops, strict=True)
-    recorded = [entry for entry, loop in pairs if len(loop.force)]
+    recorded = [loop_entry(figures) for figures in reduction.recorded]
     history = history_text(reduction.history, undated=not recorded)
     return "\n".join([loops_text(recorded), *history]) if recorded else "\n".join(history).lstrip("\n")
 
@@ -94,15 +94,17 @@ def loops_text(entries: Sequence[Mapping[str, Any]]) -> str:
     """The figures for people: a line a loop."""
     heading = ("loop", "N/mm", "force N", "deflection um", "lost motion um", "width um", "linearity %", "closure um")
     rows: list[tuple[str, ...]] = [heading]
-    for one in entries:
-        force = "-" if one["force_N"] is None else f"{one['force_N']:.0f}"
-        cells = [one["loop"], f"{one['stiffness_N_per_mm']:.0f}", force]
+    for entry in entries:
+        force = "-" if entry["force_N"] is None else f"{entry['force_N']:.0f}"
+        cells = [entry["loop"], f"{entry['stiffness_N_per_mm']:.0f}", force]
         for name in ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um"):
-            cells.append("-" if one[name] is None else f"{one[name] + 0.0:.1f}")
+            cells.append("-" if entry[name] is None else f"{entry[name] + 0.0:.1f}")
         rows.append(tuple(cells))
     widths = [max(len(row[i]) for row in rows) for i in range(len(heading))]
     lines = [
         "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
         for row in rows
     ]
-    return "\n".join([*lines, *(f"{one['loop']}: {one['shape']['text']}" for one in entries if one["shape"]["text"])])
+    return "\n".join(
+        [*lines, *(f"{entry['loop']}: {entry['shape']['text']}" for entry in entries if entry["shape"]["text"])]
+    )

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.files import Content
 from toolpath_stiff.planning.gap_map import GapMap, gap_map, group_of, height_groups
-from toolpath_stiff.planning.next_visit import TABLES, tables_of
 from toolpath_stiff.planning.plan import RivalPlan
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.rows import plan_csv
+from toolpath_stiff.planning.tables import TABLES, tables_of
 from toolpath_stiff.planning.visits import Visits
-from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, picture
+from toolpath_stiff.report.axes import colour_scale, heading
+from toolpath_stiff.report.figure import COLOUR_MAP, INK, new_figure, picture
 from toolpath_stiff.report.words import plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
@@ -69,78 +70,60 @@ def plan_picture(
     panel_of = group_of(poses[:, 2], groups)
     tilted = poses[:, 3:5].any(axis=1)
     kinds_of_panel = ("",) if gap is None else (", vertical", f", tilted {deg_from_rad(gap.max_tilt):.3g}°")
-    across = _across(len(groups))
+    across = -(-len(groups) // -(-len(groups) // MOST_ACROSS))  # as many as fit, the rows filled evenly
     rows = -(-len(groups) // across) * len(kinds_of_panel)
     right = 0.35 if gap is None else 1.2
     width = max(across * PANEL + 0.75 + right, NARROWEST)
     height = rows * (PANEL + 0.35) + 1.9
     farthest = max(mm_from_m(float(np.abs(poses[:, :2]).max())), mm_from_m(gap.x[-1]) if gap is not None else 1.0)
     numbers = _numbers(visits, chosen)
-    with house_style():
-        figure = new_figure(width, height)
-        grid = figure.add_gridspec(
-            rows, across, left=0.75 / width, right=1 - right / width, bottom=1.05 / height,
-            top=1 - 1.15 / height, wspace=0.12, hspace=0.2,
-        )  # fmt: skip
-        highest = 0.0 if gap is None else float(np.nanmax([_top(gap.vertical), _top(gap.tilted), 1e-6]))
-        drawn: Any = None
-        for which, group in enumerate(groups):
-            for leaning, words in enumerate(kinds_of_panel):
-                row, column = which // across * len(kinds_of_panel) + leaning, which % across
-                axes = figure.add_subplot(grid[row, column])
-                if gap is not None:
-                    drawn = _map(axes, gap, (gap.vertical, gap.tilted)[leaning][which], highest)
-                own = (panel_of == which) & ((tilted == bool(leaning)) | (gap is None))
-                _marks(axes, poses, kinds, numbers, np.flatnonzero(own), ROOM * farthest)
-                axes.set_title(f"{_height_text(group)}{words}", fontsize=10)
-                below = which + across >= len(groups) and leaning == len(kinds_of_panel) - 1
-                axes.set_xlabel("X mm" if below else "")
-                axes.set_ylabel("Y mm" if column == 0 else "")
-                axes.tick_params(labelleft=column == 0, labelbottom=below)
-        if drawn is not None:
-            bar = figure.add_axes((1 - 0.95 / width, 1.05 / height, 0.18 / width, 1 - 2.2 / height))
-            figure.colorbar(drawn, cax=bar, label="gap at one pose, standard deviations")
-            bar.grid(visible=False)
-        _legend(figure, kinds)
-        figure.text(0.75 / width, 1 - 0.42 / height, shortened(plain(title), 90), fontsize=14, weight="bold")
-        figure.text(0.75 / width, 1 - 0.72 / height, shortened(plain(subtitle), 130), fontsize=10, color=MUTED)
-        return figure
-
-
-def _across(panels: int) -> int:
-    """Panels in a row: as many as fit, the rows filled evenly."""
-    return -(-panels // -(-panels // MOST_ACROSS))
-
-
-def _height_text(group: FloatArray) -> str:
-    """A panel's height, or the heights put together in it."""
-    low, high = (f"{mm_from_m(float(group[end])):.5g}" for end in (0, -1))
-    return f"z = {low} mm" if low == high else f"z = {low} to {high} mm"
-
-
-def _top(values: FloatArray) -> float:
-    return float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
-
-
-def _map(axes: Axes, gap: GapMap, values: FloatArray, highest: float) -> Any:
-    x, y = mm_from_m(gap.x), mm_from_m(gap.y)
-    axes.set_facecolor("#eceff3")
-    return axes.pcolormesh(x, y, values, cmap=COLOUR_MAP, vmin=0.0, vmax=highest, shading="nearest", rasterized=True)
+    figure = new_figure(width, height)
+    grid = figure.add_gridspec(
+        rows, across, left=0.75 / width, right=1 - right / width, bottom=1.05 / height,
+        top=1 - 1.15 / height, wspace=0.12, hspace=0.2,
+    )  # fmt: skip
+    gaps = [] if gap is None else [gap.vertical.ravel(), gap.tilted.ravel()]
+    highest = float(np.nanmax(np.concatenate([[1e-6], *gaps])))
+    drawn: Any = None
+    for (which, group), (leaning, words) in product(enumerate(groups), enumerate(kinds_of_panel)):
+        row, column = which // across * len(kinds_of_panel) + leaning, which % across
+        axes = figure.add_subplot(grid[row, column])
+        if gap is not None:
+            axes.set_facecolor("#eceff3")
+            drawn = axes.pcolormesh(
+                mm_from_m(gap.x), mm_from_m(gap.y), (gap.vertical, gap.tilted)[leaning][which], cmap=COLOUR_MAP,
+                vmin=0.0, vmax=highest, shading="nearest", rasterized=True,
+            )  # fmt: skip
+        here = (panel_of == which) & ((tilted == bool(leaning)) | (gap is None))
+        _marks(axes, poses, kinds, numbers, np.flatnonzero(here), ROOM * farthest)
+        low, high = (f"{mm_from_m(float(group[end])):.5g}" for end in (0, -1))
+        axes.set_title(f"z = {low}{'' if low == high else f' to {high}'} mm{words}", fontsize=10)
+        below = which + across >= len(groups) and leaning == len(kinds_of_panel) - 1
+        axes.set_xlabel("X mm" if below else "")
+        axes.set_ylabel("Y mm" if column == 0 else "")
+        axes.tick_params(labelleft=column == 0, labelbottom=below)
+    if drawn is not None:
+        box = (1 - 0.95 / width, 1.05 / height, 0.18 / width, 1 - 2.2 / height)
+        colour_scale(figure, drawn, box, "gap at one pose, standard deviations", thousands=False)
+    _legend(figure, kinds)
+    left, top = 0.75 / width, 1 - 0.42 / height
+    heading(figure, left, top, shortened(plain(title), 90), 0.3 / height, shortened(plain(subtitle), 130))
+    return figure
 
 
 def _numbers(visits: Visits, chosen: Sequence[int]) -> list[str]:
-    """Where each visit stands in measuring order; visits to one pose share a label."""
+    """Labels of the visits, their numbers in measuring order; visits to one pose share a label."""
     poses = [visits.pose[v].tobytes() for v in chosen]
     return [", ".join(str(k + 1) for k, other in enumerate(poses) if other == pose) for pose in poses]
 
 
 def _marks(
-    axes: Axes, poses: FloatArray, kinds: Sequence[str], numbers: Sequence[str], own: NDArray[np.int64], half: float
+    axes: Axes, poses: FloatArray, kinds: Sequence[str], numbers: Sequence[str], here: IntArray, half: float
 ) -> None:
     """Poses by kind, the tilt of the spindle as a line toward where it leans, numbered in measuring order."""
     names = list(dict.fromkeys(kinds))
     labelled: set[str] = set()
-    for k in own:
+    for k in here:
         x, y = (float(v) for v in mm_from_m(poses[k, :2]))
         # The spindle's axis R z leans toward (sin b cos a, -sin a) for small yaw.
         lean = np.array([np.sin(poses[k, 4]) * np.cos(poses[k, 3]), -np.sin(poses[k, 3])])
@@ -153,22 +136,15 @@ def _marks(
         if numbers[k] not in labelled:
             box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.8}
             # Towards the middle, so that labels stay in their panel; each elsewhere where marks crowd.
-            near = [j for j in own if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
+            near = [j for j in here if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
             place = list(dict.fromkeys(numbers[j] for j in near)).index(numbers[k]) % 4
             left, above = (x > 0.25 * half) != (place >= 2), place % 2 == 0
             if lean.any() and place == 0 and len(numbers[k]) < SHORT:  # not upon the line
                 left, above = bool(lean[0] > 0.0), bool(lean[1] <= 0.0)
             axes.annotate(
-                numbers[k],
-                (x, y),
-                xytext=(-7 if left else 7, 6 if above else -6),
-                textcoords="offset points",
-                ha="right" if left else "left",
-                va="bottom" if above else "top",
-                fontsize=7.5,
-                zorder=7,
-                bbox=box,
-            )
+                numbers[k], (x, y), xytext=(-7 if left else 7, 6 if above else -6), textcoords="offset points",
+                ha="right" if left else "left", va="bottom" if above else "top", fontsize=7.5, zorder=7, bbox=box,
+            )  # fmt: skip
             labelled.add(numbers[k])
     axes.set_xlim(-half, half)
     axes.set_ylim(-half, half)
@@ -180,22 +156,12 @@ def _legend(figure: Any, kinds: Sequence[str]) -> None:
     from matplotlib.lines import Line2D
 
     names = list(dict.fromkeys(kinds))
-    handles = [
-        Line2D([], [], marker=MARKS[k % len(MARKS)][0], ls="none", ms=8, mfc=MARKS[k % len(MARKS)][1], mec=INK)
-        for k in range(len(names))
-    ]
-    left = 0.75 / figure.get_size_inches()[0]
+    marks = [MARKS[k % len(MARKS)] for k in range(len(names))]
     figure.legend(
-        handles,
-        names,
-        loc="lower left",
-        bbox_to_anchor=(left, 0.0),
-        handletextpad=0.2,
-        ncol=min(len(names), 6),
-        frameon=False,
-        fontsize=9,
-        borderaxespad=0.6,
-    )
+        [Line2D([], [], marker=shape, ls="none", ms=8, mfc=colour, mec=INK) for shape, colour in marks],
+        names, loc="lower left", bbox_to_anchor=(0.75 / figure.get_size_inches()[0], 0.0), handletextpad=0.2,
+        ncol=min(len(names), 6), frameon=False, fontsize=9, borderaxespad=0.6,
+    )  # fmt: skip
 
 
 def figure(plan: Plan) -> Figure:
@@ -206,13 +172,13 @@ def figure(plan: Plan) -> Figure:
 def _picture_arguments(plan: Plan) -> tuple[Any, ...]:
     choice, name = plan.choice, plan.machine.name
     if isinstance(choice, RivalPlan):
-        gap = gap_map(plan.machine, choice, plan.menu, plan.effect_files)
+        gap = gap_map(plan.machine, choice, plan.effect_files)
         title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
         text = f"machine {name}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
         return choice.visits, choice.chosen, choice.kinds, gap, title, text
     clampings, readings = len(choice.visits), len(choice.visits.readings)
     text = f"machine {name}   ·   {clampings} clampings, {readings} readings; lines: where spindles lean"
-    return choice.visits, range(clampings), choice.purposes, None, "A first campaign", text
+    return choice.visits, choice.chosen, choice.kinds, None, "A first campaign", text
 
 
 def names(plots: bool = True) -> tuple[str, ...]:
@@ -224,7 +190,7 @@ def files(plan: Plan, *, plots: bool = True) -> dict[str, Content]:
     """The measurement file to fill in, the document as JSON, and with `plots` the picture."""
     contents: dict[str, Content] = {"plan.csv": plan_csv(plan.rows), "plan.json": plan.to_json()}
     if isinstance(plan.choice, RivalPlan):
-        contents[TABLES] = tables_of(plan)
+        contents[TABLES] = tables_of(plan.choice)
     return contents | ({"plan.png": plan_picture(*_picture_arguments(plan))} if plots else {})
 
 

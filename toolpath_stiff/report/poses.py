@@ -7,9 +7,9 @@ from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
 
 
-def text(found: PoseStiffness) -> str:
+def text(poses: PoseStiffness) -> str:
     """A single pose: stiffnesses, struts, the nearest limit."""
-    model, values = found.model, {name: column[0] for name, column in found.columns.items()}
+    model, values = poses.model, {name: column[0] for name, column in poses.columns.items()}
     x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
     named = machine_text({"machine": model.machine.title, **effects_stated(model)})
     lines = [f"{named}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n"]
@@ -22,7 +22,7 @@ def text(found: PoseStiffness) -> str:
         )
     lengths = "  ".join(f"{values[f'strut{i}_mm']:.3f}" for i in range(1, 7))
     lines.append(f"  struts 1 to 6        {lengths} mm")
-    lines.append(f"  nearest limit        {found.reach.describe(0)} (margin {values['margin']:.3f} of its span)")
+    lines.append(f"  nearest limit        {poses.reach.describe(0)} (margin {values['margin']:.3f} of its span)")
     if values["extrapolated"]:
         lines.append("  the strut law is extrapolated at this pose")
     for warning in condition_warnings(model):

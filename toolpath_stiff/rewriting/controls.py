@@ -23,18 +23,12 @@ from toolpath_stiff.units import MM_PER_INCH
 
 if TYPE_CHECKING:
     from toolpath_stiff.rewriting.turn import Turn
-
-
 SAME = 1e-9  # mm, inch or degrees: a word whose number changes by less keeps its text
-
-
 FEED_DECIMALS = 6
 
 
 # Added words go behind the last word present of those that come before them here.
 ORDER = ("G", "X", "Y", "Z", "A", "B", "C", "I", "J", "K", "R", "Q", "P", "L", "F")
-
-
 NUMBERS = frozenset("XYZABCIJKR")
 
 
@@ -67,8 +61,12 @@ class LineEdit:
 
     def write(self, letter: str, value: float, decimals: int | None = None) -> None:
         """Give a word another number, or add the word."""
+        # Fixed digits without idle zeros; a whole number keeps its point where the block writes points: a control that
+        # counts `X9` in its least increment reads `X9.` right.
+        text = f"{value:.{self.decimals if decimals is None else decimals}f}"
+        text = (text.rstrip("0") if "." in text else text) if text.strip("-0.") else "0."
+        text = text if self._points else text.removesuffix(".")
         word = self.word(letter)
-        text = self._number(value, self.decimals if decimals is None else decimals)
         if word is None:
             self._add(letter, (letter.lower() if self._lower else letter) + text)
         elif abs(value - word.value) > SAME:
@@ -83,23 +81,18 @@ class LineEdit:
         self._add("G", code.lower() if self._lower else code)
 
     def remove(self, letters: Iterable[str]) -> None:
-        """Take out the words of these letters."""
+        """Take out the words of these letters, and the blanks beside them that are then one too many."""
         for letter in letters:
             word = self.word(letter)
             if word is not None:
-                self.cut(word)
-
-    def cut(self, word: Word) -> None:
-        """Take out a word, and the blanks beside it that are then one too many."""
-        at = self._words.index(word)
-        del self._words[at], self._texts[at]
-        before, after = self._gaps[at], self._gaps.pop(at + 1)
-        if not before.strip() and at > 0:
-            self._gaps[at] = after
-        elif not after.strip():
-            self._gaps[at] = before
-        else:
-            self._gaps[at] = before + after
+                index = self._words.index(word)
+                del self._words[index], self._texts[index]
+                before, after = self._gaps[index], self._gaps.pop(index + 1)
+                if not before.strip() and index > 0:
+                    before = ""
+                elif not after.strip():
+                    after = ""
+                self._gaps[index] = before + after
 
     def render(self) -> str:
         """The line as edited."""
@@ -117,41 +110,21 @@ class LineEdit:
         return any(word.letter in AXES for word in self._words)
 
     def _add(self, letter: str, text: str) -> None:
-        rank = ORDER.index(letter)
-        added = Word(letter, 0.0, 0, text)
-        ranked = [(ORDER.index(w.letter), i) for i, w in enumerate(self._words) if w.letter in NUMBERS]
-        before, after = [i for r, i in ranked if r < rank], [i for r, i in ranked if r > rank]
-        codes = [i for i, w in enumerate(self._words) if w.letter == "G"]
-        if letter == "G":
-            at = 0
-        elif before:
-            at = before[-1] + 1
-        elif after:
-            at = after[0]
-        else:
-            at = codes[-1] + 1 if codes else len(self._words)
-        self._words.insert(at, added)
-        self._texts.insert(at, text)
-        if at == 0:  # what stands before the first word stays there
+        rank, index = ORDER.index(letter), 0
+        if letter != "G":
+            ranks = [(ORDER.index(w.letter), i) for i, w in enumerate(self._words) if w.letter in NUMBERS]
+            before, after = [i for r, i in ranks if r < rank], [i for r, i in ranks if r > rank]
+            codes = [i for i, w in enumerate(self._words) if w.letter == "G"] or [len(self._words) - 1]
+            index = before[-1] + 1 if before else after[0] if after else codes[-1] + 1
+        self._words.insert(index, Word(letter, 0.0, 0, text))
+        self._texts.insert(index, text)
+        if index:
+            self._gaps.insert(index, self._between)
+        else:  # what stands before the first word stays there
             self._gaps.insert(1, self._between if len(self._words) > 1 else "")
-        else:
-            self._gaps.insert(at, self._between)
-
-    def _number(self, value: float, decimals: int) -> str:
-        """Fixed digits without idle zeros; a whole number keeps its point where the block writes points.
-
-        A control that counts `X9` in its least increment reads `X9.` right, so the block's own style is kept.
-        """
-        text = f"{value:.{decimals}f}"
-        text = text.rstrip("0") if "." in text else text
-        if not text.strip("-0."):
-            text = "0."
-        return text if self._points else text.removesuffix(".")
 
 
 DECIMALS_MM, DECIMALS_INCH = 4, 5
-
-
 # Of the last decimal: an axis that its block does not name gets a word where it is off by more than rounding.
 OFF = 0.75
 
@@ -163,8 +136,10 @@ class Controls:
     ----------
     known
         Axes that the program has put somewhere; of the others only the control knows where they stand.
-    block
-        The current one.
+    block, edit, axes
+        The current one, its line as it will be, the letters of the axes that it names.
+    current
+        The words of the block by what they do; None for a further line in its place.
     trace
         The moves of that block as the untouched program makes them.
     notes
@@ -176,7 +151,9 @@ class Controls:
         self.decimals, self.linearise = decimals, linearise
         self.known = [False, False, False, True, True, True]
         self.notes: list[str] = []
-        self.block = Block(0, ())
+        self.block, self.edit = Block(0, ()), LineEdit("", Block(0, ()), 0)
+        self.current: CurrentBlock | None = None
+        self.axes: list[str] = []
         self.trace: list[Segment] = []
         source.trace = self.trace
         self._coarsest = 0.0  # mm, the last decimal of any block so far: inches round coarser than mm
@@ -189,8 +166,6 @@ class Controls:
     def refusal(self, found: str, hint: str = "") -> InputError:
         """Why the current block cannot be rewritten."""
         return ProgramError(found, hint=hint, file=self.source.name, line=self.block.line)
-
-    # -- units and axes --------------------------------------------------------------------------------------------
 
     @property
     def digits(self) -> int:
@@ -221,32 +196,25 @@ class Controls:
                 return name, float(column[normal])
         return None
 
-    def _know(self, letters: Sequence[str]) -> None:
-        for letter in letters:
-            if letter in AXES:
-                self.known[AXES.index(letter)] = True
-
-    # -- words -----------------------------------------------------------------------------------------------------
-
-    def plane_word(self, current: CurrentBlock | None, edit: LineEdit, before: str) -> str:
+    def plane_word(self, before: str) -> str:
         """Turn the plane word of the block, if it has one; the plane that will be in force."""
-        given = None if current is None else current.code("plane")
+        given = self.current.code("plane") if self.current else None
         if given is None:
             return before
         image = self.image(given[0])
         plane = image[0] if image else given[0]
         if plane != given[0]:
-            edit.replace(given[1], given[1].text[0] + plane[1:])
+            self.edit.replace(given[1], given[1].text[0] + plane[1:])
         return plane
 
-    def motion_word(self, current: CurrentBlock | None, edit: LineEdit, wanted: str) -> None:
+    def motion_word(self, wanted: str) -> None:
         """Make sure that the block is executed in the motion mode wanted."""
-        given = None if current is None else current.code("motion")
+        given = self.current.code("motion") if self.current else None
         if given is None:
             if self.out.motion != wanted:
-                edit.add_code(wanted)
+                self.edit.add_code(wanted)
         elif given[0] != wanted:
-            edit.replace(given[1], given[1].text[0] + wanted[1:])
+            self.edit.replace(given[1], given[1].text[0] + wanted[1:])
 
     def target(self, control: Sequence[float]) -> list[float]:
         """Control coordinates of `out` for a point of `source` in its control coordinates."""
@@ -258,9 +226,7 @@ class Controls:
         point = [p + r for p, r in zip(self.turn.point(setup[:3]), reference, strict=True)]
         return [*point, *self.turn.angles(setup[3:], self.out.frames.position[3:])]
 
-    def go(
-        self, edit: LineEdit, target: list[float], axes: Sequence[str], only: Sequence[int] = range(6), parts: int = 1
-    ) -> None:
+    def go(self, target: list[float], axes: Sequence[str], only: Sequence[int] = range(6), parts: int = 1) -> None:
         """Words of the axes `only`, so that `out` goes to a point in control coordinates, in `parts` equal steps.
 
         `axes` are those that the untouched block names; another one gets a word only where it has to move too.
@@ -277,13 +243,11 @@ class Controls:
                 if not off or not (self.known[axis] or coupled):
                     continue
             goal = there[axis] if out.absolute else (there[axis] - here[axis]) / parts
-            edit.write(letter, goal / scale)
+            self.edit.write(letter, goal / scale)
 
-    # -- execute and check -----------------------------------------------------------------------------------------
-
-    def emit(self, edit: LineEdit) -> str:
+    def emit(self) -> str:
         """Have `out` execute the edited line; its text."""
-        text = edit.render()
+        text = self.edit.render()
         try:
             block = read_block(text, self.block.line, self.source.name)
             execute(self.out, block)
@@ -291,30 +255,28 @@ class Controls:
             raise self.refusal(
                 f"the block, rewritten as {text.strip()!r}, would be refused: {error.found}", "give more --decimals"
             ) from None
-        if self.trace:
-            self._know([word.letter for word in block.words])
+        for word in block.words:
+            if self.trace and word.letter in AXES:
+                self.known[AXES.index(word.letter)] = True
         return text
 
     def check(self, first: int, first_out: int, pieces: bool) -> None:
         """Every cutting move of the block must be the placed one to within the rounding; of `pieces` the two ends."""
         self._coarsest = unit = max(self._coarsest, self.unit)
         wanted = cutting_rows(self.source.recorder, first)
-        found = cutting_rows(self.out.recorder, first_out)
-        if pieces and wanted and found:
+        written = cutting_rows(self.out.recorder, first_out)
+        if pieces and wanted and written:
             wanted = [wanted[0]._replace(end=wanted[-1].end, arc=None)]
-            found = [found[0]._replace(end=found[-1].end)]
+            written = [written[0]._replace(end=written[-1].end)]
         # The steps of a cycle with L in G91 repeat one rounding.
         repeats = next((word.value for word in self.block.words if word.letter == "L"), 1.0)
-        difference = differences(self.turn, wanted, found, unit * max(repeats, 1.0))
-        if difference is not None:
-            raise self.refusal(
-                f"the block cannot be rewritten: its cutting move {difference.words}", self._remedy(difference.kind)
-            )
-
-    def _remedy(self, kind: str) -> str:
+        difference = differences(self.turn, wanted, written, unit * max(repeats, 1.0))
+        if difference is None:
+            return
         unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
+        hint = "" if difference.kind == END else "give more --decimals"
         if unknown:
-            return f"position {unknown} in rapid before the first cutting move"
-        if kind in (START, AXIS):
-            return "position X, Y, Z and the rotary axes in rapid before it"
-        return "" if kind == END else "give more --decimals"
+            hint = f"position {unknown} in rapid before the first cutting move"
+        elif difference.kind in (START, AXIS):
+            hint = "position X, Y, Z and the rotary axes in rapid before it"
+        raise self.refusal(f"the block cannot be rewritten: its cutting move {difference.words}", hint)

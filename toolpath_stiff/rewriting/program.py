@@ -1,13 +1,9 @@
-"""A program written for another placement, or its placement as offsets to key in at the control.
+"""A program written for another placement.
 
 `rewrite_program` returns the text that, analyzed at the original origin, takes the tool along the placed path. Every
 motion word has new numbers; everything else stays byte for byte: comments, line numbers, order, blank lines, tape
 marks, line ends, upper and lower case. The rapid with which the tool comes from where the control was switched on is
 the one move that cannot match.
-
-`offset_blocks` returns LinuxCNC's `G10 L2` and, for Fanuc-style controls, G54 with G68. Both turn X and Y alone, about
-the vertical. So they express a placement of vertical tools in an untilted set-up, and nothing else; for the rest the
-program itself has to be rewritten.
 """
 
 from __future__ import annotations
@@ -16,59 +12,83 @@ import copy
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
 
-import numpy as np
-
-from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, Offsets, ToolEntry
+from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.nc.words import CORNERS, Block, read_block, read_text, split_lines
+from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
 from toolpath_stiff.rewriting.turn import Turn
-from toolpath_stiff.units import Pose, ShopPose, deg_from_rad, mm_from_m, pose_in_mm
+from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm
 
 LINE_END = re.compile("\r\n|\n|\r")
-
-
 FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # coarser than 0.01 mm is not machining; beyond nine a double has no more digits
-
-
 PLAIN_DIALECTS = ("generic", "linuxcnc")
-
-
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
 
-@dataclass(frozen=True)
-class Rewritten:
-    """A rewritten program.
+@dataclass(frozen=True, repr=False)
+class RewrittenProgram(Result):
+    r"""A program written for another placement.
 
     Attributes
     ----------
-    text, encoding
-        The program with its line ends, and how the original was encoded.
+    name, text, encoding
+        The program's name, its text with line ends, and how the original was encoded.
     notes
         What the user should know, one sentence each.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> moved = tps.rewrite(slot, to_mm_deg=(10, 0, 0))
+    >>> moved.content.splitlines()[3], moved.to_dict()["notes"]
+    (b'G1 X50', [])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     moved.save(pathlib.Path(folder, "moved.nc")).name
+    'moved.nc'
     """
 
+    command: ClassVar[str] = "place"
+
+    name: str
     text: str
     encoding: str
-    notes: tuple[str, ...]
+    notes: list[str]
 
     @property
     def content(self) -> bytes:
         """The file's bytes."""
         return self.text.encode(self.encoding)
 
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return {"program": self.name, "text": self.text, "notes": self.notes}
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _short(self) -> str:
+        return f"{self.name}, {len(self.text.splitlines())} lines"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the program, whole or not at all."""
+        return write_atomically(file, self.content)
+
 
 def rewrite_program(
-    program: Program,
+    program: ReadProgram,
     placement_origin: Pose,
     original_origin: Pose,
     *,
@@ -77,7 +97,7 @@ def rewrite_program(
     offsets: Offsets | None = None,
     tools: dict[int, ToolEntry] | None = None,
     block_delete: Switches = False,
-) -> Rewritten:
+) -> RewrittenProgram:
     r"""Write a program so that at the original origin it does what it does, untouched, at a placement.
 
     Parameters
@@ -105,7 +125,7 @@ def rewrite_program(
     >>> from toolpath_stiff.nc.reader import parse_program
     >>> program = parse_program("G21 G90 F600 (slot)\nG0 X0 Y0 Z5\nG1 Z-1\nX40\nM30\n", "slot.nc")
     >>> rewritten = rewrite_program(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
-    >>> print(rewritten.text, end="")
+    >>> print(rewritten, end="")
     G21 G90 F600 (slot)
     G0 X100 Y0 Z5
     G1 Z-1
@@ -114,22 +134,6 @@ def rewrite_program(
     """
     check_decimals(decimals)
     check_rewritable(program)
-    _check_plain(program)
-    text, encoding = _text_of(program)
-    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
-    source, out = (_state(program.name, origin, offsets, tools) for origin in (placement, original))
-    tolerance = None if linearise is None else mm_from_m(linearise)
-    controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
-    pieces = list(_rewritten_lines(controls, text, program.name, switches_on(block_delete, UNKNOWN_CONTROL)))
-    return Rewritten("".join(pieces), encoding, tuple(controls.notes))
-
-
-def _state(name: str, origin: ShopPose, offsets: Offsets | None, tools: dict[int, ToolEntry] | None) -> State:
-    """A control at its start, with the work at an origin, and offsets and tools of its own."""
-    return State(name, Frames(copy.deepcopy(offsets or Offsets()), origin, origin), copy.deepcopy(tools))
-
-
-def _check_plain(program: Program) -> None:
     if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
         raise ProgramError(
             "a program is rewritten by the words of the built-in interpreter in the dialects "
@@ -137,29 +141,35 @@ def _check_plain(program: Program) -> None:
             hint="place it without --write",
             file=program.name,
         )
+    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    source, out = (
+        State(program.name, Frames(copy.deepcopy(offsets or Offsets()), origin, origin), copy.deepcopy(tools))
+        for origin in (placement, original)
+    )
+    tolerance = None if linearise is None else mm_from_m(linearise)
+    controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
+    text, encoding = read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
+    lines = list(_rewritten_lines(controls, text, program.name, switches_on(block_delete, UNKNOWN_CONTROL)))
+    return RewrittenProgram(program.name, "".join(lines), encoding, controls.notes)
 
 
-def check_rewritable(program: Program) -> None:
+def check_rewritable(program: ReadProgram) -> None:
     """Raise `InputError` for a file that is not a program of a control, or is one of another machine's."""
     if program.kinematics:
-        raise ProgramError(
+        problem = (
             f"a program posted for another kinematics ({program.kinematics}) is not rewritten: its words are those of "
-            "that machine's axes",
-            hint="place it without --write, set the work so in the CAM system, and post it for this machine",
-            file=program.name,
+            "that machine's axes"
         )
-    if program.parametric:
-        raise ProgramError(
-            "a program with variables cannot be rewritten: its numbers are worked out as it runs",
-            hint="place it without --write, and set the work offset that is printed (G10)",
-            file=program.name,
-        )
-    if program.dialect == CUTTER_LOCATION:
-        raise ProgramError(
-            "a cutter-location file is not rewritten: it is not a program that a control runs",
-            hint="place it without --write, set the work so in the CAM system, or place the posted program",
-            file=program.name,
-        )
+        hint = "place it without --write, set the work so in the CAM system, and post it for this machine"
+    elif program.parametric:
+        problem = "a program with variables cannot be rewritten: its numbers are worked out as it runs"
+        hint = "place it without --write, and set the work offset that is printed (G10)"
+    elif program.dialect == CUTTER_LOCATION:
+        problem = "a cutter-location file is not rewritten: it is not a program that a control runs"
+        hint = "place it without --write, set the work so in the CAM system, or place the posted program"
+    else:
+        return
+    raise ProgramError(problem, hint=hint, file=program.name)
 
 
 def check_decimals(decimals: int | None) -> None:
@@ -181,173 +191,41 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
     """Lines with their ends; what follows the program's end stays as it is."""
     lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), LINE_END.findall(text)
     ends += [""] * (len(lines) - len(ends))
-    between = ends[0] or "\n"
     running, started = True, False
     for number, (line, raw, end) in enumerate(zip(lines, raw_lines, ends, strict=False), 1):
         if not running:
             yield raw + end
             continue
         block = read_block(line, number, name)
-        _refuse_parts(block, number, name)
+        left_out = block.optional and block.switch in switches
         written = [line]
+        _check_block(block, left_out, name)
         if block.percent:
             running, started = not started, True
-        elif block.optional and block.switch in switches:
-            _refuse_left_out(bool(block.words), number, name)
-        else:
+        elif not left_out:
             started = started or bool(block.words)
             written, running = rewrite_block(controls, block, line)
-            if block.optional and written != [line] and SLASHED not in controls.notes:
-                controls.notes.append(SLASHED)
-        yield raw + end if written == [line] else (end or between).join(written) + end
+            if block.optional and written != [line]:
+                controls.note(SLASHED)
+        yield raw + end if written == [line] else (end or ends[0] or "\n").join(written) + end
 
 
-def _refuse_parts(block: Block, number: int, name: str) -> None:
-    """A slash in the middle of a block, and corners that a block makes of the next one."""
-    corner = next((word for word in block.words if word.letter in CORNERS), None)
-    if block.rest is not None or corner is not None:
-        raise Place(name, number).fail(
-            "a block with a slash in its middle cannot be rewritten"
-            if corner is None
-            else f"{corner.text} makes a corner with the next block, which cannot be rewritten",
-            hint="put what follows the slash into a block of its own" if corner is None else "post the corner's moves",
-        )
+def _check_block(block: Block, left_out: bool, name: str) -> None:
+    """Raise `InputError` for a block that cannot be written on its own.
 
-
-def _refuse_left_out(words: bool, number: int, name: str) -> None:
-    """A block that --block-delete leaves out would stay as it was, and be wrong once the switch is off."""
-    if words:
-        raise Place(name, number).fail(
-            "a block that --block-delete leaves out cannot be rewritten",
-            hint="take it out of the program, or do without --block-delete",
-        )
-
-
-def _text_of(program: Program) -> tuple[str, str]:
-    """The program's text with its line ends, and its encoding."""
-    if not program.path:
-        return "\n".join([*program.source, ""]), "utf-8"
-    return read_text(program.path)
-
-
-OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
-
-
-# What can hold a work offset or G10 once comments and blanks are out: tells the lines that are worth reading again.
-MAY_BE_OFFSET, COMMENTS = re.compile(r"[Gg]\+?0*[15]\d"), re.compile(r"\([^)]*\)")
-
-
-VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
-
-
-NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
-
-
-USE_WRITE = "use --write, which transforms the program itself"
-
-
-@dataclass(frozen=True)
-class OffsetBlocks:
-    """What to key in, "" where the control cannot express the placement; the reason is then beside it."""
-
-    linuxcnc: str
-    fanuc: str
-    linuxcnc_reason: str = ""
-    fanuc_reason: str = ""
-
-
-def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> OffsetBlocks:
-    r"""Offset blocks that put a program at a placement.
-
-    Parameters
-    ----------
-    program
-        The program; its own G10 and its work offsets decide whether a G54 of the operator's suffices.
-    placement
-        x, y, z in m, A, B, C in rad: where program zero shall sit, as `--origin` takes it.
-    decimals
-        Of the numbers, in mm and degrees.
-
-    Notes
-    -----
-    `G10 L2 P1 R` turns X and Y about G54's zero (LinuxCNC manual, "G10 L2"); it goes before the first motion. `G68 X0
-    Y0 R` turns the G17 plane about program zero (Fanuc's manuals, "Coordinate system rotation"); it goes after G54 and
-    G17, and holds until G69. The numbers of G54 are millimetres.
-
-    Examples
-    --------
-    >>> from math import pi
-    >>> from toolpath_stiff.nc.reader import parse_program
-    >>> program = parse_program("G21 G90 F600\nG1 X40\nM30\n", "slot.nc")
-    >>> blocks = offset_blocks(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2))
-    >>> blocks.linuxcnc
-    'G21 G10 L2 P1 X100 Y0 Z800 R90'
-    >>> print(blocks.fanuc)
-    G54: X100 Y0 Z800
-    G17 G54 G68 X0 Y0 R90
+    It has a slash in its middle or makes a corner of the next one; or --block-delete leaves it out: it would stay as
+    it was, and be wrong once the switch is off.
     """
-    reason = _not_here(program) or _not_about_z(program, placement) or _not_g54_alone(program)
-    if reason:
-        return OffsetBlocks("", "", reason, reason)
-    x, y, z = (_number(mm_from_m(v), decimals) for v in placement[:3])
-    turn = _number(deg_from_rad(placement[5]), decimals)
-    linuxcnc = f"G21 G10 L2 P1 X{x} Y{y} Z{z} R{turn}"
-    if turn == "0":
-        return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}")
-    upright = np.abs(program.moves.arc_normal[:, :2]).max(initial=0.0) < VERTICAL
-    if not upright:
-        return OffsetBlocks(linuxcnc, "", "", f"G68 does not turn arcs of G18 and G19: {USE_WRITE}")
-    return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}\nG17 G54 G68 X0 Y0 R{turn}")
-
-
-def _not_here(program: Program) -> str:
-    """Why the program has no G54 of this machine's control, or ""."""
-    if program.dialect == CUTTER_LOCATION:
-        return NOT_POSTED
-    if not program.kinematics:
-        return ""
-    return (
-        f"the program is posted for another kinematics ({program.kinematics}), whose control its G54 belongs to: "
-        "post it for this machine"
-    )
-
-
-def _not_about_z(program: Program, placement: Pose) -> str:
-    """Why a turn of X and Y cannot express the placement, or ""."""
-    if max(abs(placement[3]), abs(placement[4])) > VERTICAL:
-        return f"the set-up is tilted, and work offsets turn X and Y alone: {USE_WRITE}"
-    moves = program.moves
-    tilted = np.flatnonzero(np.abs(np.concatenate([moves.start, moves.end], axis=1)[:, [3, 4, 5, 9, 10, 11]]).max(1))
-    if placement[5] and len(tilted):
-        line = moves.line[tilted[0]]
-        return f"the tool is tilted (line {line}), and work offsets turn X and Y, not its axis: {USE_WRITE}"
-    return ""
-
-
-def _not_g54_alone(program: Program) -> str:
-    """Why setting G54 would not move the whole program, or ""."""
-    for number, text in enumerate(program.source, 1):
-        if not MAY_BE_OFFSET.search("".join(COMMENTS.sub("", text).split())):
-            continue
-        for code in _codes(text, number, program):
-            if code in OTHER_OFFSETS:
-                return f"the program uses {code} beside G54 (line {number}), which would stay where it is: {USE_WRITE}"
-            if code == "G10":
-                return f"the program sets offsets itself (G10, line {number}): {USE_WRITE}"
-    return ""
-
-
-def _codes(text: str, number: int, program: Program) -> list[str]:
-    """G codes of a line, and its other words; what LinuxCNC's interpreter read holds words that ours does not know."""
-    try:
-        words = read_block(text, number, program.name).words
-    except InputError:
-        if program.interpreter == "builtin" and not program.parametric:
-            raise
-        return [code_name("G", float(digits)) for digits in re.findall(r"[Gg]\s*(\d+(?:\.\d)?)", text)]
-    return [code_name(word.letter, word.value) for word in words]
-
-
-def _number(value: float, decimals: int) -> str:
-    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}"
-    return "0" if text in ("-0", "") else text
+    corner = next((word for word in block.words if word.letter in CORNERS), None)
+    if corner is not None:
+        problem = f"{corner.text} makes a corner with the next block, which cannot be rewritten"
+        hint = "post the corner's moves"
+    elif block.rest is not None:
+        problem = "a block with a slash in its middle cannot be rewritten"
+        hint = "put what follows the slash into a block of its own"
+    elif left_out and block.words and not block.percent:
+        problem = "a block that --block-delete leaves out cannot be rewritten"
+        hint = "take it out of the program, or do without --block-delete"
+    else:
+        return
+    raise Place(name, block.line).fail(problem, hint=hint)

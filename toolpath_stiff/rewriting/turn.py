@@ -18,27 +18,18 @@ from typing import NamedTuple
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.nc.geometry import frame_of, point_on_arc
 from toolpath_stiff.nc.moves import RAPID, Arc, Recorder
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.units import ShopPose
 
 NOISE = 1e-12  # of a direction cosine: what is left of 0 or 1 after cosines and products
-
-
 UPRIGHT = 1e-9  # degrees; smaller tilts are rounding
-
-
 LARGEST_CHORD = math.pi / 2.0  # of a circle, whatever the tolerance
-
-
 # A control interpolates A, B and C; between its ends a turned move leans a little otherwise. So little changes a
 # stiffness by parts in ten thousand at most, as a radian changes it by about itself.
 LEAN = 0.01
-
-
 LEVER = 100.0  # mm along the tool at which a tolerance in mm is one in degrees
-
-
 BETWEEN = np.array([0.25, 0.5, 0.75])
 
 
@@ -104,41 +95,21 @@ def _clean(matrix: FloatArray) -> FloatArray:
 
 def chords(arc: Arc, start: Sequence[float], end: Sequence[float], tolerance: float) -> int:
     """Number of chords that stay within `tolerance` (mm) of an arc: r (1 - cos(step / 2)) <= tolerance."""
-    radius = max(math.dist(start[:3], arc.center), _radius_at_end(arc, end))
+    frame = frame_of(arc, start, end)
+    radius = max(float(frame.radius_start[0]), float(frame.radius_end[0]))
     step = 2.0 * math.acos(max(1.0 - tolerance / radius, -1.0))
     return math.ceil(abs(arc.sweep) / min(step, LARGEST_CHORD) - 1e-9)
 
 
-def _radius_at_end(arc: Arc, end: Sequence[float]) -> float:
-    out = np.array(end[:3]) - np.array(arc.center)
-    normal = np.array(arc.normal)
-    return float(np.linalg.norm(out - (out @ normal) * normal))
-
-
 def points_between(start: Sequence[float], end: Sequence[float], arc: Arc | None, count: int) -> list[list[float]]:
     """Ends (6) of `count` equal pieces of a move; the last one is its end to the last digit."""
-    first, last = np.array(start), np.array(end)
-    points = [list(map(float, first + i / count * (last - first))) for i in range(1, count)]
-    if arc is not None:
-        for i, point in enumerate(points, 1):
-            point[:3] = _on_arc(arc, first[:3], last[:3], i / count)
+    points = []
+    for share in (i / count for i in range(1, count)):
+        point = [first + share * (last - first) for first, last in zip(start, end, strict=True)]
+        if arc is not None:
+            point[:3] = point_on_arc(arc, start, end, share)
+        points.append(point)
     return [*points, list(end)]
-
-
-def _on_arc(arc: Arc, start: FloatArray, end: FloatArray, u: float) -> list[float]:
-    """Point at the share u of an arc, helix or spiral: radius and height change evenly, as in `path`."""
-    center, normal = np.array(arc.center), np.array(arc.normal)
-    outward = start - center
-    climb = float((end - start) @ normal)
-    lift = float(outward @ normal)
-    outward = outward - lift * normal
-    radius = float(np.linalg.norm(outward))
-    growth = _radius_at_end(arc, list(end)) - radius
-    e1 = outward / radius
-    e2 = np.cross(normal, e1)
-    angle = u * arc.sweep
-    point = center + (radius + u * growth) * (math.cos(angle) * e1 + math.sin(angle) * e2) + (lift + u * climb) * normal
-    return [float(v) for v in point]
 
 
 def lean(turn: Turn, programmed: Sequence[Sequence[float]], written: Sequence[Sequence[float]]) -> float:
@@ -148,8 +119,8 @@ def lean(turn: Turn, programmed: Sequence[Sequence[float]], written: Sequence[Se
     """
     (a0, a1), (w0, w1) = np.array(programmed, dtype=float), np.array(written, dtype=float)
     wanted = turn.rotations(a0 + BETWEEN[:, None] * (a1 - a0))
-    found = rotation_matrices(np.radians(w0 + BETWEEN[:, None] * (w1 - w0)))
-    return max(angle_between(one, other) for one, other in zip(wanted, found, strict=True))
+    leaning = rotation_matrices(np.radians(w0 + BETWEEN[:, None] * (w1 - w0)))
+    return max(map(angle_between, wanted, leaning))
 
 
 def angle_between(first: FloatArray, second: FloatArray) -> float:
@@ -161,11 +132,7 @@ def angle_between(first: FloatArray, second: FloatArray) -> float:
 # In units of the last decimal written. Ends: half a unit per axis, three axes, and the same of the start; a centre
 # given by I, J, K adds that of its own words, one given by R what `blocks.NEAR` allows.
 END_UNITS, CENTER_UNITS = 2.0, 6.0
-
-
 SHORTEST_UNITS = 4.0
-
-
 START, END, AXIS, SHAPE = "start", "end", "tool axis", "shape"
 
 
@@ -176,14 +143,16 @@ class Row(NamedTuple):
     end: list[float]
     arc: Arc | None
 
+    def short(self, unit: float) -> bool:
+        """Whether rounding to `unit` may make it vanish."""
+        moved = max(abs(e - s) for s, e in zip(self.start, self.end, strict=True))
+        return self.arc is None and moved < SHORTEST_UNITS * unit
+
 
 def cutting_rows(recorder: Recorder, first: int) -> list[Row]:
     """Cutting moves recorded from `first` on."""
-    return [
-        Row(recorder.start[i], recorder.end[i], recorder.arc[i])
-        for i in range(first, len(recorder.line))
-        if recorder.motion[i] != RAPID
-    ]
+    rows = zip(recorder.start[first:], recorder.end[first:], recorder.arc[first:], recorder.motion[first:], strict=True)
+    return [Row(start, end, arc) for start, end, arc, motion in rows if motion != RAPID]
 
 
 class Difference(NamedTuple):
@@ -193,66 +162,55 @@ class Difference(NamedTuple):
     words: str
 
 
-def differences(turn: Turn, wanted: list[Row], found: list[Row], unit: float) -> Difference | None:
+def differences(turn: Turn, wanted: list[Row], written: list[Row], unit: float) -> Difference | None:
     """How the written cutting moves of a block differ from the placed ones beyond the rounding to `unit` mm.
 
     Straight moves of a few units may vanish by rounding, or come to be.
     """
-    left, right = list(wanted), list(found)
+    left, right = list(wanted), list(written)
     while left and right:
         what = difference(turn, left[0], right[0], unit)
         if what is None:
             del left[0], right[0]
-        elif _short(left[0], unit):
+        elif left[0].short(unit):
             del left[0]
-        elif _short(right[0], unit):
+        elif right[0].short(unit):
             del right[0]
         else:
             return what
-    if all(_short(row, unit) for row in (*left, *right)):
+    if all(row.short(unit) for row in (*left, *right)):
         return None
-    return Difference(SHAPE, f"would be {len(found)} moves and not {len(wanted)}")
+    return Difference(SHAPE, f"would be {len(written)} moves and not {len(wanted)}")
 
 
-def _short(row: Row, unit: float) -> bool:
-    return row.arc is None and max(abs(e - s) for s, e in zip(row.start, row.end, strict=True)) < SHORTEST_UNITS * unit
-
-
-def difference(turn: Turn, wanted: Row, found: Row, unit: float) -> Difference | None:
+def difference(turn: Turn, wanted: Row, written: Row, unit: float) -> Difference | None:
     """How a written cutting move differs from the placed one beyond the rounding to `unit` mm.
 
     For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them.
     """
-    ends = ((wanted.start, found.start, START), (wanted.end, found.end, END))
-    for placed, written, kind in ends:
-        target, point = turn.point(placed[:3]), written[:3]
-        apart = math.dist(target, point)
+    ends = ((wanted.start, written.start, START), (wanted.end, written.end, END))
+    for placed, point, kind in ends:
+        apart = math.dist(turn.point(placed[:3]), point[:3])
         if apart > END_UNITS * unit:
             return Difference(kind, f"{kind}s {apart:.4g} mm off")
-    for placed, written, _ in ends:
-        if placed[3:] == written[3:] and turn.keeps(placed[3:]):
-            continue
-        goal = turn.rotations(np.array([placed[3:]]))[0]
-        angle = angle_between(goal, rotation_matrices(np.radians(written[3:])))
-        if angle > END_UNITS * unit:
-            return Difference(AXIS, f"has its tool axis {angle:.4g} degrees off")
-    if wanted.arc is None or found.arc is None:
-        return None if wanted.arc is found.arc else Difference(SHAPE, "is another kind of move")
-    return _arc_difference(turn, wanted.arc, found, unit)
-
-
-def _arc_difference(turn: Turn, arc: Arc, found: Row, unit: float) -> Difference | None:
-    assert found.arc is not None
+    for placed, point, _ in ends:
+        if placed[3:] != point[3:] or not turn.keeps(placed[3:]):
+            goal = turn.rotations(np.array([placed[3:]]))[0]
+            angle = angle_between(goal, rotation_matrices(np.radians(point[3:])))
+            if angle > END_UNITS * unit:
+                return Difference(AXIS, f"has its tool axis {angle:.4g} degrees off")
+    arc, other = wanted.arc, written.arc
+    if arc is None or other is None:
+        return None if arc is other else Difference(SHAPE, "is another kind of move")
     normal = turn.turn @ np.array(arc.normal)
-    sense = float(normal @ np.array(found.arc.normal))
+    sense = float(normal @ np.array(other.normal))
     if abs(abs(sense) - 1.0) > 1e-9:
         return Difference(SHAPE, "lies in another plane")
-    apart = np.array(turn.point(arc.center)) - np.array(found.arc.center)
-    off = float(np.linalg.norm(apart - (apart @ normal) * normal))
+    between = np.array(turn.point(arc.center)) - np.array(other.center)
+    off = float(np.linalg.norm(between - (between @ normal) * normal))
     if off > CENTER_UNITS * unit:
         return Difference(SHAPE, f"has its centre {off:.4g} mm off")
-    radius = math.dist(found.start[:3], found.arc.center)
-    swept = abs(arc.sweep - math.copysign(1.0, sense) * found.arc.sweep)
-    if swept * radius > 4.0 * CENTER_UNITS * unit:
+    swept = abs(arc.sweep - math.copysign(1.0, sense) * other.sweep)
+    if swept * math.dist(written.start[:3], other.center) > 4.0 * CENTER_UNITS * unit:
         return Difference(SHAPE, f"has its sweep {math.degrees(swept):.4g} degrees off")
     return None

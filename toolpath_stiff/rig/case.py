@@ -1,8 +1,5 @@
 """A case: a campaign on a machine that hides something, drawn from a seed, with the truth beside it.
 
-A campaign says which poses, loads, tools and set-ups are measured in which order. A `Table` maps column names of
-measurement files to arrays or lists of one length, in shop units.
-
 Each purpose has its own stream of random numbers, so that a case and its control (`hidden="none"`) differ by the
 effect alone.
 """
@@ -20,7 +17,8 @@ from numpy.random import Generator
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.rig.effects import CATALOGUE, scale_of, with_effect
+from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
+from toolpath_stiff.rig.effects import CATALOGUE, with_effect
 from toolpath_stiff.rig.hidden import (
     ODDITIES,
     OUTSIDE,
@@ -32,130 +30,17 @@ from toolpath_stiff.rig.hidden import (
     readings,
 )
 from toolpath_stiff.rig.loops import with_loops
-from toolpath_stiff.rig.nominal import Nominal, load_nominal, reachable
+from toolpath_stiff.rig.nominal import Nominal, load_nominal
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
+from toolpath_stiff.rig.sizes import scale_of
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
-
-Table = dict[str, Any]
-
-LAYOUTS = ("paper", "tilted", "campaign")
-POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
-AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-DEFAULT_SETUP = "table"
-
-# Clinton, Zhang, Wavering (1997), Table 1: x, y in mm, measured at both heights; published.
-PAPER_POINTS = ((0, 0), (-150, 0), (-300, 0), (-130, 75), (-260, 150), (-75, 130), (-150, 260))
-PAPER_HEIGHTS = ((1268.225, "riser"), (353.225, "table"))  # the upper plane stood on a riser (Figure 6)
-
-# The tilted campaign; every figure is a choice (assumed), with the machine's limits respected.
-TILTED_POSES = 24
-TILTED_LOADS = (500.0, 4000.0)  # N
-TILTED_REPEATS = 2
-TILTED_HEIGHTS = (400.0, 600.0, 800.0, 1000.0, 1200.0)  # mm
-TILTED_RADIUS = 300.0  # mm
-LONG_TOOL = 150.0  # mm longer, at four poses
-RISER_EVERY = 3  # each third pose is taken on a riser
 
 # How often a blind draw hides what, where nothing is said (assumed).
 BLIND = {"none": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
 
 # One stream of random numbers for each purpose, so that a change in one leaves the others as they were.
 _STREAMS = ("kind", "campaign", "machine", "noise")
-
-
-def paper_campaign() -> Table:
-    """The paper's 14 points along X, Y, Z: 42 rows in the order of its Table 1."""
-    poses = [(x, y, z, setup) for z, setup in PAPER_HEIGHTS for x, y in PAPER_POINTS]
-    rows = [(*pose, number, axis) for number, pose in enumerate(poses, 1) for axis in AXES]
-    x, y, z, setup, point, direction = zip(*rows, strict=True)
-    zeros = np.zeros(len(rows))
-    return {
-        "x_mm": np.array(x, dtype=float),
-        "y_mm": np.array(y, dtype=float),
-        "z_mm": np.array(z),
-        "a_deg": zeros,
-        "b_deg": zeros,
-        "c_deg": zeros,
-        "direction": list(direction),
-        "setup": list(setup),
-        "point": np.array(point),
-    }
-
-
-def tilted_campaign(nominal: Nominal, rng: Generator) -> Table:
-    """24 tilted poses, X, Y, Z, two loads, two repeats: 288 rows; poses in random order, each repeat clamped anew."""
-    poses = _tilted_poses(nominal, rng)
-    visits = [(pose, repeat) for repeat in range(1, TILTED_REPEATS + 1) for pose in rng.permutation(TILTED_POSES)]
-    columns: dict[str, list[Any]] = {name: [] for name in (*POSE, *_TILTED_COLUMNS)}
-    for clamp, (pose, repeat) in enumerate(visits, 1):
-        jobs = [(axis, load) for axis in AXES for load in TILTED_LOADS]
-        minutes = 0.0
-        for job in rng.permutation(len(jobs)):
-            # A reading takes half a minute to a minute and a half after the indicator was zeroed.
-            minutes = round(minutes + float(rng.uniform(0.5, 1.5)), 1)
-            axis, load = jobs[job]
-            for name, value in zip(POSE, poses[pose], strict=True):
-                columns[name].append(value)
-            own = (
-                axis,
-                load,
-                "riser" if pose % RISER_EVERY == 0 else DEFAULT_SETUP,
-                clamp,
-                repeat,
-                int(pose) + 1,
-                minutes,
-                _extension(int(pose)),
-                round(20.0 + 1.5 * np.sin(np.pi * clamp / len(visits)), 1),  # a shop that warms up over the day
-            )
-            for name, value in zip(_TILTED_COLUMNS, own, strict=True):
-                columns[name].append(value)
-    return {name: values if name in ("direction", "setup") else np.array(values) for name, values in columns.items()}
-
-
-_TILTED_COLUMNS = (
-    "direction",
-    "force_N",
-    "setup",
-    "clamp",
-    "repeat",
-    "point",
-    "time_min",
-    "tool_extension_mm",
-    "temperature_C",
-)
-
-
-def _extension(pose: int) -> float:
-    """Mm by which the tool at a pose is longer: poses 0, 7, 14, 21, two of them on the riser."""
-    return LONG_TOOL if pose % 6 == pose // 6 else 0.0
-
-
-def _tilted_poses(nominal: Nominal, rng: Generator) -> FloatArray:
-    """(24, 6) mm and degrees, reachable, drawn until each height has its share; tilts of 5 to 25 degrees."""
-    found: list[FloatArray] = []
-    for _ in range(20_000):
-        pose = len(found)
-        if pose == TILTED_POSES:
-            return np.array(found)
-        radius, azimuth = TILTED_RADIUS * np.sqrt(rng.random()), rng.uniform(0.0, 2.0 * np.pi)
-        tilt, about = rng.uniform(5.0, 25.0), rng.uniform(0.0, 2.0 * np.pi)
-        height = TILTED_HEIGHTS[pose % len(TILTED_HEIGHTS)]
-        trial = np.round(
-            [
-                radius * np.cos(azimuth),
-                radius * np.sin(azimuth),
-                height,
-                tilt * np.cos(about),
-                tilt * np.sin(about),
-                rng.uniform(-10.0, 10.0),
-            ],
-            1,
-        )
-        extension = np.array([m_from_mm(_extension(pose))])
-        if reachable(nominal, m_from_mm(trial[None, :3]), rad_from_deg(trial[None, 3:]), extension)[0]:
-            found.append(trial)
-    raise LookupError("too few reachable tilted poses within 300 mm of the axis")
 
 
 def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows:
@@ -205,7 +90,7 @@ class Case:
         Measurement table in shop units, in measuring order.
     truth
         What was hidden: `hidden` (names; empty if nothing), `kind`, `effects` with parameters in shop units,
-        their `size` (rms change of ln stiffness) and `detectability` (see `effects.DETECTABLE`); of an unknown also
+        their `size` (rms change of ln stiffness) and `detectability` (see `sizes.DETECTABLE`); of an unknown also
         `links` and `variables`, what a description may name.
     nominal, machine, nuisances
         To measure the same machine again.
@@ -224,7 +109,13 @@ def effects_of_layout(layout: str) -> tuple[str, ...]:
     return tuple(name for name in CATALOGUE if name not in lacking)
 
 
-def make_case(
+def make_case(seed: int, *args: Any, **named: Any) -> tuple[Table, dict[str, Any]]:
+    """Rows and truth of the same as `draw_case`."""
+    case = draw_case(seed, *args, **named)
+    return case.rows, case.truth
+
+
+def draw_case(
     seed: int,
     layout: str = "tilted",
     hidden: str | Sequence[str] | None = None,
@@ -233,8 +124,8 @@ def make_case(
     plan: Mapping[str, Any] | None = None,
     size: float | Sequence[float] | None = None,
     nuisances: Nuisances | None = None,
-) -> tuple[Table, dict[str, Any]]:
-    """Rows of a blind campaign and their truth; the same arguments give the same rows.
+) -> Case:
+    """A blind campaign on a machine that hides something; the same arguments give the same rows.
 
     Parameters
     ----------
@@ -262,21 +153,6 @@ def make_case(
     InputError
         Unknown layout, effect or machine; an effect that the layout cannot show.
     """
-    case = draw_case(seed, layout, hidden, noise, machine, plan, size, nuisances)
-    return case.rows, case.truth
-
-
-def draw_case(
-    seed: int,
-    layout: str = "tilted",
-    hidden: str | Sequence[str] | None = None,
-    noise: float = 0.02,
-    machine: str | Nominal = defaults.MACHINE,
-    plan: Mapping[str, Any] | None = None,
-    size: float | Sequence[float] | None = None,
-    nuisances: Nuisances | None = None,
-) -> Case:
-    """As `make_case`, with the machine itself."""
     if seed < 0:
         raise InputError(f"seed {seed}", expected="0 or more")
     if nuisances is None:
@@ -285,7 +161,7 @@ def draw_case(
         nuisances = Nuisances(repeat=noise)
     nominal = load_nominal(machine) if isinstance(machine, str) else machine
     streams = {name: np.random.default_rng([seed, i]) for i, name in enumerate(_STREAMS)}
-    table = _campaign(layout, nominal, plan, streams["campaign"])
+    table = campaign(layout, nominal, plan, streams["campaign"])
     names = _names(hidden, layout, table, streams["kind"])
     rows = rows_of(table)
     true, effects = HiddenMachine(), []
@@ -294,9 +170,9 @@ def draw_case(
         for name, wanted in zip(names, _sizes(size, len(names)), strict=True):
             # A stream of its own for each effect: sizes of different effects of one seed have nothing in common.
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
-            parameters, found = scale.draw(name, wanted, rng)
+            parameters, strength = scale.draw(name, wanted, rng)
             true = with_effect(true, name, parameters)
-            effects.append({"effect": name, "parameters": parameters, **found, **_looks(name)})
+            effects.append({"effect": name, "parameters": parameters, **strength, **_looks(name)})
     true = disturb_machine(true, nuisances, streams["machine"])
     measured = measure(nominal, true, table, rows, nuisances, streams["noise"], stated_sd=layout == "paper")
     outside = any(name in (*OUTSIDE, *UNKNOWNS) for name in names)
@@ -347,23 +223,6 @@ def again(
     """The same hidden machine measured at a plan: new clamps, new noise; the campaign's clock stands at its end."""
     rows = rows_of(plan, elapsed=np.ones(len(plan["x_mm"])))
     return measure(nominal, machine, plan, rows, nuisances, rng, stated_sd)
-
-
-def _campaign(layout: str, nominal: Nominal, plan: Mapping[str, Any] | None, rng: Generator) -> Table:
-    if layout not in LAYOUTS:
-        raise InputError(f"layout {layout!r}", expected=", ".join(LAYOUTS))
-    if (layout == "campaign") != (plan is not None):
-        raise InputError("layout campaign and a file of poses go together", expected="both, or neither")
-    if plan is not None:
-        return dict(plan)
-    if layout == "paper":
-        return paper_campaign()
-    try:
-        return tilted_campaign(nominal, rng)
-    except LookupError as error:
-        raise InputError(
-            f"machine {nominal.name}: {error}", hint="use layout campaign with poses of your own for this machine"
-        ) from None
 
 
 def _sizes(size: float | Sequence[float] | None, count: int) -> tuple[float | None, ...]:

@@ -27,7 +27,8 @@ from toolpath_stiff import defaults
 from toolpath_stiff.errors import FileError, InputError, InputErrors
 from toolpath_stiff.files import Content, read_bytes, read_text, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
-from toolpath_stiff.rig.case import AXES, DEFAULT_SETUP, POSE, Case, Table, again, clamp_of, draw_case
+from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table
+from toolpath_stiff.rig.case import Case, again, clamp_of, draw_case
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.hidden import LOOP_PATTERN, LOOP_WORDS, OUTSIDE, HiddenMachine, Nuisances, Oddity
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable

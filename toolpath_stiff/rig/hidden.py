@@ -307,11 +307,11 @@ def _struts(nominal: Nominal, hidden: HiddenMachine, rows: Rows, lengths: FloatA
 
 def _law(nominal: Nominal, lengths: FloatArray) -> FloatArray:
     """N/m of struts of any lengths (m) by the nominal law, which its end pieces carry on."""
-    at, stiffness = nominal.law_lengths, nominal.law_stiffnesses
-    if len(at) == 1:
+    points, stiffness = nominal.law_lengths, nominal.law_stiffnesses
+    if len(points) == 1:
         return np.full_like(lengths, stiffness[0])
-    piece = np.clip(np.searchsorted(at, lengths, side="right") - 1, 0, len(at) - 2)
-    share = (lengths - at[piece]) / (at[piece + 1] - at[piece])
+    piece = np.clip(np.searchsorted(points, lengths, side="right") - 1, 0, len(points) - 2)
+    share = (lengths - points[piece]) / (points[piece + 1] - points[piece])
     return np.asarray(stiffness[piece] + (stiffness[piece + 1] - stiffness[piece]) * share)
 
 

@@ -43,23 +43,23 @@ def true_displacements(
     """
     given = np.repeat(np.nan_to_num(lengths)[:, None], 6, axis=1)
     place, links = assembled(nominal, hidden, rows, given)
-    found = solved(place, links, rows.direction, rows.force)
-    return np.array([_read(k, loop, place, links, rows, found) for k, loop in enumerate(loops)])
+    solution = solved(place, links, rows.direction, rows.force)
+    return np.array([_read(k, loop, place, links, rows, solution) for k, loop in enumerate(loops)])
 
 
-def _read(k: int, loop: str, place: Geometry, links: Links, rows: Rows, found: Solved) -> float:
+def _read(k: int, loop: str, place: Geometry, links: Links, rows: Rows, solution: Solved) -> float:
     kind, *rest = loop.split()
-    unknowns, at = found.moved[k], found.platform_dofs
-    vertices = at + 6
+    unknowns, first = solution.moved[k], solution.platform_dofs
+    vertices = first + 6
     spindle = vertices + links.vertices.size
     table, direction = spindle + 3, rows.direction[k]
     nose = float(direction @ place.rotation[k] @ unknowns[spindle:table])
     if kind in TIP:
-        return float(found.compliance[k])
+        return float(solution.compliance[k])
     if kind == "spindle":
         return nose
     if kind == "platform":
-        return float(found.compliance[k]) - nose
+        return float(solution.compliance[k]) - nose
     if kind == "table":
         rocked = np.cross(place.work_point[k], direction)[:2] @ unknowns[table + 3 : table + 5]
         return float(direction @ (unknowns[table : table + 3] + unknowns[table + 5 : table + 8]) + rocked)
@@ -67,9 +67,9 @@ def _read(k: int, loop: str, place: Geometry, links: Links, rows: Rows, found: S
     if kind == "strut" and rest[1:]:
         return float(np.linalg.inv(links.struts[k])[number, number])
     if kind == "strut":
-        return float(found.stretch[k, number] @ unknowns)
+        return float(solution.stretch[k, number] @ unknowns)
     if kind == "joint":  # the rig's joint is one element: each end of the strut gives half
-        return float(unknowns[at + number]) * (0.5 if rest[1:] else 1.0)
+        return float(unknowns[first + number]) * (0.5 if rest[1:] else 1.0)
     return _vertex(k, number, "".join(rest[1:]), place, direction, unknowns[vertices:spindle])
 
 

@@ -77,12 +77,12 @@ class Nominal:
     def vertices(self) -> IntArray:
         """(6,) number of the frame vertex that holds each strut, counted from 0 in the order of the struts."""
         azimuth = np.arctan2(self.frame_joints[:, 1], self.frame_joints[:, 0])
-        found: list[float] = []
+        angles: list[float] = []
         numbers = np.empty(6, dtype=np.int64)
         for strut, angle in enumerate(azimuth):
-            turns = [abs(math.remainder(angle - other, 2.0 * math.pi)) for other in found]
+            turns = [abs(math.remainder(angle - other, 2.0 * math.pi)) for other in angles]
             if not turns or min(turns) > VERTEX_WIDTH:
-                found.append(float(angle))
+                angles.append(float(angle))
                 turns.append(0.0)
             numbers[strut] = int(np.argmin(turns))
         return numbers
@@ -177,8 +177,8 @@ def _numbers(toml: TomlReader, section: str, key: str, count: int) -> FloatArray
     except (TypeError, ValueError):
         values = np.array([math.nan])
     if values.shape != (count,) or not np.isfinite(values).all():
-        found = f"{key} = {'missing' if given is None else repr(given)}"
-        raise toml.error(found, f"{count} number{'s' * (count > 1)}", where=f"{section}.{key}")
+        words = f"{key} = {'missing' if given is None else repr(given)}"
+        raise toml.error(words, f"{count} number{'s' * (count > 1)}", where=f"{section}.{key}")
     return values
 
 
@@ -186,13 +186,13 @@ def _law(toml: TomlReader) -> tuple[FloatArray, FloatArray]:
     """(p,) m and (p,) N/m of the strut law: a stiffness for each of two or more lengths, or one without a length."""
     lengths, stiffnesses = (_section(toml, "strut_law").get(key) for key in ("length_mm", "stiffness_N_per_um"))
     if lengths is None and not isinstance(stiffnesses, list):
-        one = n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", 1))
-        return np.zeros(1), one
+        constant = n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", 1))
+        return np.zeros(1), constant
     count = max(2, len(lengths) if isinstance(lengths, list) else 0)
-    at = m_from_mm(_numbers(toml, "strut_law", "length_mm", count))
-    if count > 2 and not (np.diff(at) > 0.0).all():
+    points = m_from_mm(_numbers(toml, "strut_law", "length_mm", count))
+    if count > 2 and not (np.diff(points) > 0.0).all():
         raise toml.error(f"length_mm = {lengths!r}", "rising lengths", where="strut_law.length_mm")
-    return at, n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", count))
+    return points, n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", count))
 
 
 def _joints(toml: TomlReader, section: str) -> FloatArray:
@@ -253,11 +253,11 @@ def true_poses(
     for _ in range(20):
         arms = np.einsum("nij,kj->nki", orientation, platform)
         strut = position[:, None, :] + arms - frame
-        found = np.linalg.norm(strut, axis=2)
-        gap = lengths - found
+        reached = np.linalg.norm(strut, axis=2)
+        gap = lengths - reached
         if np.abs(gap).max() < 1e-13:
             return position, orientation
-        unit = strut / found[:, :, None]
+        unit = strut / reached[:, :, None]
         step = np.linalg.solve(np.concatenate([unit, np.cross(arms, unit)], axis=2), gap[:, :, None])[:, :, 0]
         position = position + step[:, :3]
         orientation = _turn(step[:, 3:]) @ orientation

@@ -17,10 +17,11 @@ from numpy.random import Generator
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.rig.case import POSE, Case, Table, clamp_of, rows_of
-from toolpath_stiff.rig.effects import scale_of
+from toolpath_stiff.rig.campaigns import POSE, Table
+from toolpath_stiff.rig.case import Case, clamp_of, rows_of
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import Nominal, reachable
+from toolpath_stiff.rig.sizes import scale_of
 from toolpath_stiff.units import MM_PER_INCH
 
 # Kind -> what was done.
@@ -195,14 +196,14 @@ def _mistype(wrong: dict[str, Any], nominal: Nominal, kind: str, rng: Generator)
 
 
 def _reached(table: Mapping[str, Any], nominal: Nominal, rows: IntArray) -> bool:
-    one = rows_of({name: np.asarray(values)[rows] for name, values in table.items()})
-    return bool(reachable(nominal, one.position, one.angles, one.extension).all())
+    slipped = rows_of({name: np.asarray(values)[rows] for name, values in table.items()})
+    return bool(reachable(nominal, slipped.position, slipped.angles, slipped.extension).all())
 
 
 def _length(table: Mapping[str, Any], slipped: Mapping[str, Any], nominal: Nominal, nuisances: Nuisances) -> float:
     """Whitened length of the change of ln measured - ln modelled."""
-    modelled = [np.log(readings(nominal, HiddenMachine(), rows_of(one))) for one in (table, slipped)]
-    measured = [np.log(np.asarray(one["stiffness_N_per_mm"], dtype=float)) for one in (table, slipped)]
+    modelled = [np.log(readings(nominal, HiddenMachine(), rows_of(rows))) for rows in (table, slipped)]
+    measured = [np.log(np.asarray(rows["stiffness_N_per_mm"], dtype=float)) for rows in (table, slipped)]
     change: FloatArray = (measured[1] - measured[0]) - (modelled[1] - modelled[0])
     return scale_of(nominal, rows_of(table), clamp_of(table), nuisances).covariance.length(change)
 

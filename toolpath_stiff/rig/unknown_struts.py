@@ -42,127 +42,127 @@ def _only(strut: int) -> FloatArray:
     return np.where(np.arange(6) == strut, 1.0, 0.0)
 
 
-def _swing(at: State) -> FloatArray:
+def _swing(state: State) -> FloatArray:
     """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
-    pose = at.nominal.neutral_pose
-    rest = strut_directions(at.nominal, pose[None, :3], rotations(pose[None, 3:]), np.zeros(1))[1]
-    now = at.units @ at.place.rotation
+    pose = state.nominal.neutral_pose
+    rest = strut_directions(state.nominal, pose[None, :3], rotations(pose[None, 3:]), np.zeros(1))[1]
+    now = state.units @ state.place.rotation
     return np.asarray(1.0 - np.minimum(np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now) ** 2, 1.0))
 
 
-def joint_swing(links: Links, at: State, u: Unknown) -> Links:
+def joint_swing(links: Links, state: State, u: Unknown) -> Links:
     """The forks of the platform joints bend the more, the further they swing out: c = c0 sin^2."""
-    compliance = u.size * _swing(at) / SWING
+    compliance = u.size * _swing(state) / SWING
     return _with_joints(links, lambda forces: compliance)
 
 
-def cardan_fork(links: Links, at: State, u: Unknown) -> Links:
+def cardan_fork(links: Links, state: State, u: Unknown) -> Links:
     """A cross whose inner pin, radial on the platform, is worn: c = c0 (share of the strut's force along the pin)^2."""
-    joints = at.place.platform_joints - at.place.work_point[:, None, :]
-    axis = at.place.rotation[:, :, 2]
+    joints = state.place.platform_joints - state.place.work_point[:, None, :]
+    axis = state.place.rotation[:, :, 2]
     radial = joints - np.einsum("nki,ni->nk", joints, axis)[:, :, None] * axis[:, None, :]
     pin = radial / np.linalg.norm(radial, axis=2, keepdims=True)
-    compliance = u.size * np.einsum("nki,nki->nk", at.units, pin) ** 2
+    compliance = u.size * np.einsum("nki,nki->nk", state.units, pin) ** 2
     return _with_joints(links, lambda forces: compliance)
 
 
-def joint_binding(links: Links, at: State, u: Unknown) -> Links:
+def joint_binding(links: Links, state: State, u: Unknown) -> Links:
     """Joints that bind near the end of their swing: rotational stiffness m0 sin^2."""
-    return dataclasses.replace(links, moment=links.moment + u.size * _swing(at) / SWING)
+    return dataclasses.replace(links, moment=links.moment + u.size * _swing(state) / SWING)
 
 
-def joint_slip(links: Links, at: State, u: Unknown) -> Links:
+def joint_slip(links: Links, state: State, u: Unknown) -> Links:
     """Sticking joints that slip: rotational secant stiffness m0 F0 / (F0 + F), Masing's element smeared out."""
-    held = SLIP_LOAD / (SLIP_LOAD + at.rows.force)
+    held = SLIP_LOAD / (SLIP_LOAD + state.rows.force)
     return dataclasses.replace(links, moment=links.moment + u.size * held[:, None] * np.ones(6))
 
 
-def strut_backlash(links: Links, at: State, u: Unknown) -> Links:
+def strut_backlash(links: Links, state: State, u: Unknown) -> Links:
     """Lost motion in one strut alone: c = g / |f|."""
     return _with_joints(links, lambda f: u.size / np.maximum(np.abs(f), LEAST_FORCE) * _only(u.shape["strut"]))
 
 
-def nut_preload(links: Links, at: State, u: Unknown) -> Links:
+def nut_preload(links: Links, state: State, u: Unknown) -> Links:
     """Double nuts with too little preload: beyond it one of the two lets go and the struts are softer by c0."""
     return _with_joints(links, lambda f: u.size * beyond(f, u.shape["preload"]))
 
 
-def thrust_bearing(links: Links, at: State, u: Unknown) -> Links:
+def thrust_bearing(links: Links, state: State, u: Unknown) -> Links:
     """The thrust bearing of one screw is worn on one side: softer in tension, or in compression."""
     return _with_joints(links, lambda f: u.size * opened(f * u.shape["side"]) * _only(u.shape["strut"]))
 
 
-def strut_bowing(links: Links, at: State, u: Unknown) -> Links:
+def strut_bowing(links: Links, state: State, u: Unknown) -> Links:
     """Struts not quite straight bow under compression: c grows as length^4 (Timoshenko, an initially bent column)."""
-    compliance = u.size * (at.lengths / at.nominal.strut_range[1]) ** 4
+    compliance = u.size * (state.lengths / state.nominal.strut_range[1]) ** 4
     return _with_joints(links, lambda f: compliance * opened(-f))
 
 
-def drive_spring(links: Links, at: State, u: Unknown) -> Links:
+def drive_spring(links: Links, state: State, u: Unknown) -> Links:
     """One drive loses stiffness in proportion to how far its strut is out, as a column of oil does."""
-    compliance = u.size * np.maximum(at.stretched, 0.0) * _only(u.shape["strut"])
+    compliance = u.size * np.maximum(state.stretched, 0.0) * _only(u.shape["strut"])
     return _with_joints(links, lambda forces: compliance)
 
 
-def other_screw(links: Links, at: State, u: Unknown) -> Links:
+def other_screw(links: Links, state: State, u: Unknown) -> Links:
     """One strut was replaced: its stiffness has another slope over the length, k exp(a (s - 1/2))."""
-    factor = np.where(np.arange(6) == u.shape["strut"], np.exp(u.size * (at.stretched - 0.5)), 1.0)
+    factor = np.where(np.arange(6) == u.shape["strut"], np.exp(u.size * (state.stretched - 0.5)), 1.0)
     root = np.sqrt(factor)
     return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])
 
 
-def screw_lead(links: Links, at: State, u: Unknown) -> Links:
+def screw_lead(links: Links, state: State, u: Unknown) -> Links:
     """One screw was ground with a wavy lead: its nut's stiffness varies periodically with the length."""
-    wave = 1.0 + u.size * np.sin(2.0 * np.pi * at.lengths / u.shape["wavelength"] + u.shape["phase"])
+    wave = 1.0 + u.size * np.sin(2.0 * np.pi * state.lengths / u.shape["wavelength"] + u.shape["phase"])
     root = np.sqrt(np.where(np.arange(6) == u.shape["strut"], wave, 1.0))
     return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])
 
 
-def motor_mount(links: Links, at: State, u: Unknown) -> Links:
+def motor_mount(links: Links, state: State, u: Unknown) -> Links:
     """Two neighbouring struts of different vertices hang on one soft bracket, which both load: c (f1 + f2)^2."""
-    return _coupled(links, np.broadcast_to(_pair(at, u), at.lengths.shape), u.size)
+    return _coupled(links, np.broadcast_to(_pair(state, u), state.lengths.shape), u.size)
 
 
-def _pair(at: State, u: Unknown) -> FloatArray:
+def _pair(state: State, u: Unknown) -> FloatArray:
     first = u.shape["strut"]
-    vertices = at.nominal.vertices
+    vertices = state.nominal.vertices
     other = next(s % 6 for s in range(first + 1, first + 6) if vertices[s % 6] != vertices[first])
     return _only(first) + _only(other)
 
 
-def strut_heating(links: Links, at: State, u: Unknown) -> Links:
+def strut_heating(links: Links, state: State, u: Unknown) -> Links:
     """The motor of one strut holds it and heats its nut while the readings of a clamping are taken."""
-    compliance = u.size * (at.rows.time / 300.0)[:, None] * _only(u.shape["strut"])
+    compliance = u.size * (state.rows.time / 300.0)[:, None] * _only(u.shape["strut"])
     return _with_joints(links, lambda forces: compliance)
 
 
-def warm_up_preload(links: Links, at: State, u: Unknown) -> Links:
+def warm_up_preload(links: Links, state: State, u: Unknown) -> Links:
     """Joints gain their preload as the machine warms up: c = c0 exp(-t / tau) over the campaign."""
-    compliance = u.size * np.exp(-at.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6)
+    compliance = u.size * np.exp(-state.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6)
     return _with_joints(links, lambda forces: compliance)
 
 
-def cracked_bar(links: Links, at: State, u: Unknown) -> Links:
+def cracked_bar(links: Links, state: State, u: Unknown) -> Links:
     """The bar from one joint of the platform to the spindle nose is cracked; the others are stiff, but not rigid."""
     stiffness = np.minimum(np.full(BARS, SOUND_BAR), links.bars)
     stiffness[12 + u.shape["strut"]] *= 1.0 - u.size  # after the rim and the spokes, six each
     return dataclasses.replace(links, bars=stiffness)
 
 
-def frame_oval(links: Links, at: State, u: Unknown) -> Links:
+def frame_oval(links: Links, state: State, u: Unknown) -> Links:
     """The frame's ring goes oval: the radial loads of two posts act against each other, c (R1 - R2)^2."""
-    vertices = at.nominal.vertices
+    vertices = state.nominal.vertices
     side = np.where(vertices == u.shape["vertex"], 1.0, np.where(vertices == (u.shape["vertex"] + 1) % 3, -1.0, 0.0))
-    outward = at.place.frame_joints * np.array([1.0, 1.0, 0.0])
+    outward = state.place.frame_joints * np.array([1.0, 1.0, 0.0])
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)
-    return _coupled(links, np.einsum("nki,nki->nk", at.units, outward) * side, u.size)
+    return _coupled(links, np.einsum("nki,nki->nk", state.units, outward) * side, u.size)
 
 
-def loose_vertex_bolt(links: Links, at: State, u: Unknown) -> Links:
+def loose_vertex_bolt(links: Links, state: State, u: Unknown) -> Links:
     """A bolt of one post is loose: pulled down the post gives, a third as much outwards; pressed it sits."""
     vertex = u.shape["vertex"]
-    mine = at.nominal.vertices == vertex
-    down = at.units[:, :, 2] * mine
+    mine = state.nominal.vertices == vertex
+    down = state.units[:, :, 2] * mine
 
     def loose(forces: FloatArray) -> FloatArray:
         # A strut in tension pulls its vertex towards the platform, along the strut.

@@ -9,7 +9,8 @@ import difflib
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -20,26 +21,24 @@ from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.results import Result
 from toolpath_stiff.stiffness import effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect
-from toolpath_stiff.stiffness.guard import check_declarations, line_in, line_of
+from toolpath_stiff.stiffness.declarations import check_declarations
+from toolpath_stiff.stiffness.effect_source import line_in, line_of
 from toolpath_stiff.stiffness.term_file import effects_of_terms
-
-ENTRY_POINTS = "toolpath_stiff.effects"
 
 if TYPE_CHECKING:
     import pandas as pd
 
-
+ENTRY_POINTS = "toolpath_stiff.effects"
 MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
 
 
 @cache
 def packaged_effects() -> dict[str, Effect]:
     """Name -> effect of the packaged files, one an effect."""
-    names = sorted(module.name for module in pkgutil.iter_modules(effects.__path__))
-    found: dict[str, Effect] = {}
-    for name in names:
-        found |= _effects_in(importlib.import_module(f"toolpath_stiff.stiffness.effects.{name}"), name)
-    return found
+    packaged: dict[str, Effect] = {}
+    for name in sorted(module.name for module in pkgutil.iter_modules(effects.__path__)):
+        packaged |= _effects_in(importlib.import_module(f"toolpath_stiff.stiffness.effects.{name}"), name)
+    return packaged
 
 
 @cache
@@ -47,19 +46,19 @@ def installed_effects() -> tuple[dict[str, Effect], dict[str, str]]:
     """Effects that other packages offer as entry points, and name -> reason of those that fail to load."""
     from importlib.metadata import entry_points
 
-    found: dict[str, Effect] = {}
+    installed: dict[str, Effect] = {}
     broken: dict[str, str] = {}
     for point in entry_points(group=ENTRY_POINTS):
         try:
             loaded = point.load()
             effect = loaded() if isinstance(loaded, type) else loaded
             check_declarations(effect, point.name)
-            if effect.name in packaged_effects() or effect.name in found:
+            if effect.name in packaged_effects() or effect.name in installed:
                 raise EffectError(f"effect {effect.name} exists already")
-            found[effect.name] = effect
+            installed[effect.name] = effect
         except Exception as error:  # a broken plug-in is listed with its reason; the rest still works
             broken[point.name] = f"{type(error).__name__}: {error}"
-    return found, broken
+    return installed, broken
 
 
 def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
@@ -74,10 +73,8 @@ def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
     for file in files:
         for name, effect in effects_from_file(file).items():
             if name in known:
-                line = None if effect.file else line_of(type(effect), "name")
-                raise EffectError(
-                    f"effect {name} exists already", hint="give it another name", file=str(file), line=line
-                )
+                line, hint = None if effect.file else line_of(type(effect), "name"), "give it another name"
+                raise EffectError(f"effect {name} exists already", hint=hint, file=str(file), line=line)
             known[name] = effect
     return dict(sorted(known.items(), key=lambda item: (LINKS.index(item[1].link), item[0])))
 
@@ -92,11 +89,8 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
     if name in broken:
         raise EffectError(f"effect {name} does not load: {broken[name]}", hint="repair or uninstall its package")
     near = difflib.get_close_matches(name, known, n=1)
-    hint = (
-        f"did you mean {near[0]}?"
-        if near
-        else f"`{command_line('effects', 'list', *options(effects=list(files)))}` lists them"
-    )
+    listed = f"`{command_line('effects', 'list', *options(effects=list(files)))}` lists them"
+    hint = f"did you mean {near[0]}?" if near else listed
     raise EffectError(f"unknown effect {name!r}", expected=f"one of {', '.join(known)}", hint=hint)
 
 
@@ -111,13 +105,10 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
         There is no such file, it fails when it is run (with the line), or what it declares is wrong.
     """
     path = Path(file)
-    try:
-        state = path.stat()
-    except OSError:
-        state = None
-    if state is None or not path.is_file():
-        writes = f"`{command_line('effects', 'new', path)}` writes one" if path.suffix == ".py" else ""
-        raise EffectError(f"effects file {str(file)!r} does not exist", hint=writes)
+    if not path.is_file():
+        hint = f"`{command_line('effects', 'new', path)}` writes one" if path.suffix == ".py" else ""
+        raise EffectError(f"effects file {str(file)!r} does not exist", hint=hint)
+    state = path.stat()
     return _loaded(str(file), path.resolve(), state.st_mtime_ns, state.st_size)
 
 
@@ -142,53 +133,44 @@ def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-        found = _effects_in(module, file)
+        effects_there = _effects_in(module, file)
     except InputError:
         raise
     except (Exception, SystemExit) as error:  # whatever a user's file does
         raise _failure(error, file) from None
-    if not found:
-        raise EffectError(
-            "defines no effect", expected="a class derived from toolpath_stiff.stiffness.effects.Effect", file=file
-        )
-    return found
+    if not effects_there:
+        expected = "a class derived from toolpath_stiff.stiffness.effects.Effect"
+        raise EffectError("defines no effect", expected=expected, file=file)
+    return effects_there
 
 
 def _failure(error: BaseException, file: str) -> InputError:
     """Where a file failed when it was run, and of what."""
     if isinstance(error, SyntaxError) and error.filename and Path(error.filename).resolve() == Path(file).resolve():
         return EffectError(f"{type(error).__name__}: {error.msg}", file=file, line=error.lineno, column=error.offset)
-    what = f"{type(error).__name__}: {error}".rstrip(": ")
-    return EffectError(
-        f"{what}, when the file is run", file=file, line=line_in(error, file) or _unreadable(error, file)
-    )
-
-
-def _unreadable(error: BaseException, file: str) -> int | None:
-    """The line of a byte that no Python file has: Python does not say it."""
-    content = Path(file).read_bytes()
-    at = error.start if isinstance(error, UnicodeDecodeError) else content.find(b"\0")
-    return content.count(b"\n", 0, at) + 1 if at >= 0 else None
+    what, line = f"{type(error).__name__}: {error}".rstrip(": "), line_in(error, file)
+    if line is None:  # a byte that no Python file has: Python does not say where
+        content = Path(file).read_bytes()
+        place = error.start if isinstance(error, UnicodeDecodeError) else content.find(b"\0")
+        line = content.count(b"\n", 0, place) + 1 if place >= 0 else None
+    return EffectError(f"{what}, when the file is run", file=file, line=line)
 
 
 def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
     """Effects that a module itself defines."""
-    found: dict[str, Effect] = {}
+    defined: dict[str, Effect] = {}
     for value in vars(module).values():
         if isinstance(value, type) and issubclass(value, Effect) and value.__module__ == module.__name__:
             effect = value()
             check_declarations(effect, where)
-            if effect.name in found and type(found[effect.name]) is not value:
-                raise EffectError(
-                    f"effect {effect.name} is defined twice",
-                    hint="give one another name",
-                    file=where,
-                    line=line_of(value, "name"),
-                )
-            found[effect.name] = effect
-    return found
+            if effect.name in defined and type(defined[effect.name]) is not value:
+                mistake, hint = f"effect {effect.name} is defined twice", "give one another name"
+                raise EffectError(mistake, hint=hint, file=where, line=line_of(value, "name"))
+            defined[effect.name] = effect
+    return defined
 
 
+@dataclass(frozen=True, repr=False, eq=False)
 class EffectCatalogue(Result):
     """Effects, in the order of the load path.
 
@@ -214,8 +196,8 @@ class EffectCatalogue(Result):
     command: ClassVar[str] = "effects"
     shown_by: ClassVar[str] = "effects"
 
-    def __init__(self, effects: Sequence[Effect], broken: Mapping[str, str]) -> None:
-        self.effects, self.broken = list(effects), dict(broken)
+    effects: list[Effect]
+    broken: dict[str, str]
 
     def __getitem__(self, name: str) -> Effect:
         """An effect by its name."""

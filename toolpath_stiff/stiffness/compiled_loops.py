@@ -171,10 +171,10 @@ def directed_columns(n, p, r, d, arms, frame, intercept, slope, out, det, length
             f = forces(t, moments, q, combine(w, load))
             out[i] = over_struts(f, f, c)
         for i in range(first, last):
-            tip, at = (p[0, i], p[1, i], p[2, i]), arms_at(r, arms, i)
-            lengths[0, i] = strut_from(tip, at[0], frame[0])[2]
-            lengths[1, i] = strut_from(tip, at[1], frame[1])[2]
-            lengths[2, i] = strut_from(tip, at[2], frame[2])[2]
-            lengths[3, i] = strut_from(tip, at[3], frame[3])[2]
-            lengths[4, i] = strut_from(tip, at[4], frame[4])[2]
-            lengths[5, i] = strut_from(tip, at[5], frame[5])[2]
+            tip, moved = (p[0, i], p[1, i], p[2, i]), arms_at(r, arms, i)
+            lengths[0, i] = strut_from(tip, moved[0], frame[0])[2]
+            lengths[1, i] = strut_from(tip, moved[1], frame[1])[2]
+            lengths[2, i] = strut_from(tip, moved[2], frame[2])[2]
+            lengths[3, i] = strut_from(tip, moved[3], frame[3])[2]
+            lengths[4, i] = strut_from(tip, moved[4], frame[4])[2]
+            lengths[5, i] = strut_from(tip, moved[5], frame[5])[2]

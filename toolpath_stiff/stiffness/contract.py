@@ -14,7 +14,7 @@ Everything is SI and batched over n poses. A method that an effect does not impl
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.machine.model import EffectEntry, Machine
+from toolpath_stiff.machine.model import Machine
 
 if TYPE_CHECKING:
     from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 Values = Mapping[str, Any]  # name of a parameter -> SI value, or what is chosen: a number, a name
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
 
+
+HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading")
 
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
@@ -110,6 +112,11 @@ def setup_parameter(meaning: str) -> Parameter:
     return Parameter(SETUP, "", 1.0, (0, 0), (0, 0), source=source, meaning=meaning, kind="text")
 
 
+def compliance(name: str, largest: float, typical: tuple[float, float], source: str, meaning: str) -> Parameter:
+    """The parameter of a part that gives way along a line, nm/N, from 0 to the largest."""
+    return Parameter(name, "nm/N", 1e-9, (0.0, largest), typical, source=source, meaning=meaning)
+
+
 def length_error(typical: tuple[float, float], source: str, meaning: str) -> Parameter:
     """The parameter of an effect by which a length of the geometry is off, mm: the true one less the stated one."""
     return Parameter("error", "mm", 1e-3, (-60.0, 60.0), typical, source=source, meaning=meaning)
@@ -159,11 +166,16 @@ class LoadPath:
 
     def take(self, rows: IntArray) -> LoadPath:
         """Some of the poses, by index; repeated as the index says."""
-        struts = Struts(*(getattr(self.struts, one.name)[rows] for one in fields(self.struts)))
-        arrays: dict[str, Any] = {
-            name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)
-        }
+        struts = Struts(*(getattr(self.struts, field.name)[rows] for field in fields(self.struts)))
+        arrays: Any = {name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         return replace(self, struts=struts, **arrays)
+
+
+def at_the_tip(path: LoadPath, compliances: FloatArray) -> FloatArray:
+    """(n, 12, 12) quadratic form of the tip force alone: compliances (n, 3, 3) or (3, 3) m/N, base axes."""
+    form = np.zeros((len(path), 12, 12))
+    form[:, 6:9, 6:9] = compliances
+    return form
 
 
 @dataclass(frozen=True)
@@ -382,64 +394,24 @@ class Effect:
         `p`: parameter name -> value in the units of files, choices as they are.
         """
         sizes = []
-        for one in self.parameters:
-            value = p[one.name] if one.discrete else f"{float(f'{p[one.name]:.3g}'):g} {one.unit}".rstrip()
-            sizes.append(f"{one.name.replace('_', ' ')} {value}")
+        for q in self.parameters:
+            value = p[q.name] if q.discrete else f"{float(f'{p[q.name]:.3g}'):g} {q.unit}".rstrip()
+            sizes.append(f"{q.name.replace('_', ' ')} {value}")
         return f"{self.title}, {', '.join(sizes)}"
+
+    @property
+    def hooks(self) -> list[str]:
+        """Which of `HOOKS` it implements.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.effects()["weak_strut"].hooks
+        ['strut_compliance']
+        """
+        return [hook for hook in HOOKS if getattr(type(self), hook) is not getattr(Effect, hook)]
 
     @property
     def is_instrument(self) -> bool:
         """Whether it changes readings only."""
         return self.link == "instrument"
-
-
-def joined(parts: Sequence[str]) -> str:
-    """Parts as a sentence lists them, "a, b and c"; "nothing" without parts."""
-    if len(parts) < 2:
-        return parts[0] if parts else "nothing"
-    return f"{', '.join(parts[:-1])} and {parts[-1]}"
-
-
-def sizes_in_words(sizes: Sequence[tuple[float, str]]) -> str:
-    """Sizes that are not zero, each before its unit and place: "0.35 nm/N along X and 0.19 nm/N along Y"."""
-    return joined([f"{about(size)} {words}" for size, words in sizes if size])
-
-
-def about(size: float) -> str:
-    """How large it is, to two digits and without sign: "19", "0.054"."""
-    return f"{float(f'{abs(size):.2g}'):g}"
-
-
-def read_parameters(effect: Effect, entry: EffectEntry, where: str) -> dict[str, Any]:
-    """SI values of an effect's parameters from a machine file's keys; choices as they are.
-
-    Raises
-    ------
-    InputError
-        A key is unknown or missing, a value is not a number or out of bounds; at its line of the machine file, or with
-        `where` for an entry that stands in none.
-    """
-    by_key = {parameter.key: parameter for parameter in effect.parameters}
-    for key in entry.parameters:
-        if key not in by_key:
-            known = f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance"
-            raise entry.error(f"effect {effect.name}: unknown key {key}", key, expected=known, where=where)
-    values: dict[str, Any] = {}
-    for key, parameter in by_key.items():
-        if key not in entry.parameters:
-            found = f"effect {effect.name}: {key} is missing"
-            raise entry.error(found, expected=parameter.expected, where=where)
-        value = entry.parameters[key]
-        if not _is_valid(parameter, value):
-            found = f"effect {effect.name}: {key} = {value!r}"
-            raise entry.error(found, key, expected=parameter.expected, where=where)
-        values[parameter.name] = float(value) * parameter.si if parameter.kind == "real" else value
-    return values
-
-
-def _is_valid(parameter: Parameter, value: object) -> bool:
-    if parameter.kind == "text":
-        return isinstance(value, str)
-    numbers = int if parameter.kind == "integer" else int | float
-    low, high = parameter.bounds
-    return isinstance(value, numbers) and not isinstance(value, bool) and low <= value <= high

@@ -15,7 +15,7 @@ one never lies there: the planes part its basins, and climbs begin in different 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -23,9 +23,11 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness import closed_form, exact, guard
-from toolpath_stiff.stiffness.contract import Effect, LoadPath
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, acting_effects, load_path
+from toolpath_stiff.stiffness import closed_form, exact
+from toolpath_stiff.stiffness.active import ADDING
+from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
+from toolpath_stiff.stiffness.possible import is_compliance
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
 CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2 ms a call is not earned back
@@ -33,6 +35,7 @@ CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2
 COMPILED_FROM = 1_500_000
 ROUTES = ("exact", "closed_form", "compiled")
 
+Tools = FloatArray | float  # m, length of the tool: of all poses, or (n,)
 Along = Callable[[FloatArray, IntArray], FloatArray]
 
 DIRECTIONS = 60  # over half a sphere: neighbours some 15 degrees apart
@@ -63,7 +66,7 @@ def tip_compliance(
     model: StiffnessModel,
     position: FloatArray,
     rotation: FloatArray | None = None,
-    tool_length: FloatArray | float = np.nan,
+    tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
     route: str | None = None,
 ) -> FloatArray:
@@ -92,19 +95,15 @@ def tip_compliance(
     if chosen == "exact":
         return _exact(model, position, rotation, tool_length, force)
     lengths = np.asarray(tool_length, dtype=float)
-    if lengths.ndim == 0 or _all_equal(lengths):
-        one = float(lengths.flat[0]) if lengths.size else np.nan
-        return _fast(model, position, rotation, one, force, chosen)
+    if lengths.ndim == 0 or np.isnan(lengths).all() or np.ptp(lengths) == 0.0:
+        length = float(lengths.flat[0]) if lengths.size else np.nan
+        return _fast(model, position, rotation, length, force, chosen)
     compliance = np.empty((len(position), 3, 3))
-    for length in np.unique(lengths):  # nan counts as one value
+    for length in np.unique(lengths).tolist():  # nan counts as one value
         rows = np.isnan(lengths) if np.isnan(length) else lengths == length
         turn = None if rotation is None else rotation[rows]
-        compliance[rows] = _fast(model, position[rows], turn, float(length), force, chosen)
+        compliance[rows] = _fast(model, position[rows], turn, length, force, chosen)
     return compliance
-
-
-def _all_equal(lengths: FloatArray) -> bool:
-    return bool(np.isnan(lengths).all() or np.ptp(lengths) == 0.0)
 
 
 def _fast(
@@ -123,7 +122,7 @@ def _fast(
         compliance, good = compiled.tip_compliance(kernel, position, rotation)
     else:
         compliance, good = closed_form.tip_compliance(kernel, position, rotation)
-    good &= guard.is_compliance(compliance)  # what is none goes the exact route, which says what is wrong
+    good &= is_compliance(compliance)  # what is none goes the exact route, which says what is wrong
     if not good.all():
         bad = ~good
         turn = None if rotation is None else rotation[bad]
@@ -174,11 +173,11 @@ def compliance_with_effects(
     if model.control is not None:
         control = kernel.on_joints_of(model.control, tool_length)
         position, rotation, sure = closed_form.followed_columns(kernel, control, position, rotation)
-    if not any(map(_gives_way, acting_effects(model))):
-        found, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
-        found[~(sure & good)] = np.nan
-        return found
-    found = np.full(n, np.nan)
+    if not any(hook in ADDING for active in acting_effects(model) for hook in active.effect.hooks):
+        compliance, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
+        compliance[~(sure & good)] = np.nan
+        return compliance
+    compliance = np.full(n, np.nan)
     extension = 0.0 if np.isnan(tool_length) else tool_length - model.machine.reference_tool_length
     for start in range(0, n, BLOCK):
         rows = slice(start, start + BLOCK)
@@ -196,39 +195,33 @@ def compliance_with_effects(
         )
         some = np.flatnonzero(good & sure[rows])
         path = path if len(some) == len(forces) else path.take(some)
-        found[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
-    return found
-
-
-def _gives_way(active: ActiveEffect) -> bool:
-    """Whether an effect does more than change the geometry."""
-    kind = type(active.effect)
-    hooks = ("strut_compliance", "load_compliance", "parallel_stiffness")
-    return any(getattr(kind, hook) is not getattr(Effect, hook) for hook in hooks)
+        compliance[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
+    return compliance
 
 
 def _exact(
-    model: StiffnessModel,
-    position: FloatArray,
-    rotation: FloatArray | None,
-    tool_length: FloatArray | float,
-    force: float,
+    model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: Tools, force: float
 ) -> FloatArray:
     compliance = np.empty((len(position), 3, 3))
-    lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(position),))
-    for start in range(0, len(position), BLOCK):
-        rows = slice(start, start + BLOCK)
-        turn = None if rotation is None else rotation[rows]
-        path = _path(model, position[rows], turn, lengths[rows], force)
+    for rows, path in _paths(model, position, rotation, tool_length, force):
         compliance[rows] = exact.tip_compliance(model, path)
     return compliance
 
 
-def _path(
-    model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: FloatArray, force: float
-) -> LoadPath:
-    """What the effects see of n poses of a program, the model's conditions included."""
-    return load_path(model, position, rotation, tool_length, force, **model.conditions.columns(len(position)))
+def _paths(
+    model: StiffnessModel,
+    position: FloatArray,
+    rotation: FloatArray | None,
+    tool_length: Tools,
+    force: float,
+    at_a_time: int = BLOCK,
+) -> Iterator[tuple[slice, LoadPath]]:
+    """Rows of some poses of a program, and what the effects see there, the model's conditions included."""
+    lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(position),))
+    for start in range(0, len(position), at_a_time):
+        rows = slice(start, start + at_a_time)
+        some, turn = position[rows], None if rotation is None else rotation[rows]
+        yield rows, load_path(model, some, turn, lengths[rows], force, **model.conditions.columns(len(some)))
 
 
 def compliance_along(
@@ -236,16 +229,12 @@ def compliance_along(
     direction: FloatArray,
     position: FloatArray,
     rotation: FloatArray | None = None,
-    tool_length: FloatArray | float = np.nan,
+    tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
 ) -> FloatArray:
     """Compliance of the tip along unit vectors (n, 3), load-dependent effects included: (n,) m/N."""
     result = np.empty(len(position))
-    lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(position),))
-    for start in range(0, len(position), BLOCK):
-        rows = slice(start, start + BLOCK)
-        turn = None if rotation is None else rotation[rows]
-        path = _path(model, position[rows], turn, lengths[rows], force)
+    for rows, path in _paths(model, position, rotation, tool_length, force):
         result[rows] = exact.compliance_along(model, path, direction[rows])
     return result
 
@@ -254,7 +243,7 @@ def extreme_directions(
     model: StiffnessModel,
     position: FloatArray,
     rotation: FloatArray | None = None,
-    tool_length: FloatArray | float = np.nan,
+    tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
     softest: bool = True,
     across: FloatArray | None = None,
@@ -265,19 +254,13 @@ def extreme_directions(
     direction: without load-dependent effects the eigenvectors of the compliance say the same.
     """
     result = np.empty((len(position), 3))
-    lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(position),))
-    at_a_time = max(1, BLOCK // DIRECTIONS)
-    for start in range(0, len(position), at_a_time):
-        rows = slice(start, start + at_a_time)
-        turn = None if rotation is None else rotation[rows]
-        path = _path(model, position[rows], turn, lengths[rows], force)
+    for rows, path in _paths(model, position, rotation, tool_length, force, max(1, BLOCK // DIRECTIONS)):
 
         def along(directions: FloatArray, poses: IntArray, path: LoadPath = path) -> FloatArray:
             return exact.compliance_along(model, path.take(poses), directions)
 
-        normals = None if across is None else across[rows]
-        forces = exact.strut_forces(model, path)
-        result[rows] = searched_directions(along, exact.tip_compliance(model, path), forces, softest, normals)
+        tensor, forces = exact.tip_compliance(model, path), exact.strut_forces(model, path)
+        result[rows] = searched_directions(along, tensor, forces, softest, None if across is None else across[rows])
     return result
 
 
@@ -290,11 +273,7 @@ def half_sphere(count: int) -> FloatArray:
 
 
 def searched_directions(
-    along: Along,
-    tensor: FloatArray,
-    forces: FloatArray,
-    softest: bool = True,
-    across: FloatArray | None = None,
+    along: Along, tensor: FloatArray, forces: FloatArray, softest: bool = True, across: FloatArray | None = None
 ) -> FloatArray:
     """Directions in which the tip gives way most, or least.
 
@@ -329,11 +308,11 @@ def searched_directions(
     if idle is not None:
         tried = np.concatenate([tried, _in_planes(idle)], axis=1)
     tried = tried if across is None else _flattened(tried, across)
-    found = value(tried)
-    best = np.argsort(-found, axis=1, kind="stable")
+    values_of_tried = value(tried)
+    best = np.argsort(-values_of_tried, axis=1, kind="stable")
     best = (_best_of_each_cell(best, tried, forces) if softest else best)[:, :CLIMBS]
     directions = np.take_along_axis(tried, best[..., None], axis=1)
-    reached = np.take_along_axis(found, best, axis=1)
+    reached = np.take_along_axis(values_of_tried, best, axis=1)
     step = np.full(reached.shape, FIRST_STEP)
     while (step > LAST_STEP).any():
         around = _around(directions, step)
@@ -360,38 +339,42 @@ def _best_of_each_cell(best: IntArray, tried: FloatArray, forces: FloatArray) ->
     return np.take_along_axis(best, np.argsort(again, axis=1, kind="stable"), axis=1)
 
 
+def _unit(vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def _beside(directions: FloatArray) -> FloatArray:
+    """(..., 3) a unit vector across each direction."""
+    return _unit(np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=-1)]))
+
+
 def _around(directions: FloatArray, step: FloatArray) -> FloatArray:
     """(n, c, AROUND, 3) unit vectors at an angle of `step` (n, c) about each direction (n, c, 3)."""
-    least = np.eye(3)[np.abs(directions).argmin(axis=-1)]
-    one = np.cross(directions, least)
-    one /= np.linalg.norm(one, axis=-1, keepdims=True)
-    two = np.cross(directions, one)
-    angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
-    side = one[..., None, :] * np.cos(angle)[:, None] + two[..., None, :] * np.sin(angle)[:, None]
-    turned = directions[..., None, :] * np.cos(step)[..., None, None] + side * np.sin(step)[..., None, None]
-    return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
+    first = _beside(directions)
+    second = np.cross(directions, first)
+    angle = 2.0 * np.pi * np.arange(AROUND)[:, None] / AROUND
+    side = first[..., None, :] * np.cos(angle) + second[..., None, :] * np.sin(angle)
+    return _unit(directions[..., None, :] * np.cos(step)[..., None, None] + side * np.sin(step)[..., None, None])
 
 
 def _in_planes(normal: FloatArray) -> FloatArray:
     """(n, m, 3) unit vectors spread over the planes across unit vectors (n, 6, 3), and where two planes meet."""
-    first, second = np.triu_indices(6, 1)
-    meeting = np.cross(normal[:, first], normal[:, second])
+    first_strut, second_strut = np.triu_indices(6, 1)
+    meeting = np.cross(normal[:, first_strut], normal[:, second_strut])
     length = np.linalg.norm(meeting, axis=-1, keepdims=True)
-    meeting = np.where(length > 1e-6, meeting / np.maximum(length, 1e-6), normal[:, first])
-    one = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=-1)])
-    one /= np.linalg.norm(one, axis=-1, keepdims=True)
+    meeting = np.where(length > 1e-6, meeting / np.maximum(length, 1e-6), normal[:, first_strut])
+    first = _beside(normal)
     angle = np.pi * np.arange(IN_PLANE)[:, None] / IN_PLANE
-    circle = one[..., None, :] * np.cos(angle) + np.cross(normal, one)[..., None, :] * np.sin(angle)
+    circle = first[..., None, :] * np.cos(angle) + np.cross(normal, first)[..., None, :] * np.sin(angle)
     return np.concatenate([meeting, circle.reshape(len(normal), -1, 3)], axis=1)
 
 
 def _turned_about(directions: FloatArray, axis: FloatArray, step: FloatArray) -> FloatArray:
     """(n, c, 12, 3) directions (n, c, 3) turned to and fro about each axis (n, 6, 3) by `step` (n, c)."""
     axis = np.concatenate([axis, -axis], axis=1)[:, None]
-    one, angle = directions[..., None, :], step[..., None, None]
-    along = (axis * one).sum(axis=-1, keepdims=True) * axis
-    turned = along + (one - along) * np.cos(angle) + np.cross(axis, one) * np.sin(angle)
-    return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
+    before, angle = directions[..., None, :], step[..., None, None]
+    along = (axis * before).sum(axis=-1, keepdims=True) * axis
+    return _unit(along + (before - along) * np.cos(angle) + np.cross(axis, before) * np.sin(angle))
 
 
 def _flattened(directions: FloatArray, across: FloatArray) -> FloatArray:
@@ -399,10 +382,7 @@ def _flattened(directions: FloatArray, across: FloatArray) -> FloatArray:
     normal = across.reshape(len(across), *[1] * (directions.ndim - 2), 3)
     flat = directions - (directions * normal).sum(axis=-1, keepdims=True) * normal
     length = np.linalg.norm(flat, axis=-1, keepdims=True)
-    least = np.eye(3)[np.abs(normal).argmin(axis=-1)]
-    other = np.cross(normal, least)
-    other /= np.linalg.norm(other, axis=-1, keepdims=True)
-    return np.asarray(np.where(length > 1e-6, flat / np.maximum(length, 1e-6), other))
+    return np.asarray(np.where(length > 1e-6, flat / np.maximum(length, 1e-6), _beside(normal)))
 
 
 def signed(directions: FloatArray) -> FloatArray:

@@ -33,9 +33,9 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import EffectError, InputError, PoseError
-from toolpath_stiff.stiffness import guard
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.stiffness.possible import at_pose, possible, refuse_struts_without_stiffness
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 WHOLE_STEPS, MOST_STEPS, LINE_STEPS = 25, 200, 40
@@ -133,11 +133,11 @@ def _whole_steps(load: SharedLoad, forces: FloatArray, rows: IntArray) -> IntArr
         stiffened = np.linalg.solve(struts, np.concatenate([jacobian, longer[..., None]], axis=-1))
         system = transposed @ stiffened[..., :6] + load.parallel[rows]
         motion = _solved(system, load.wrench[rows] + _times(transposed, stiffened[..., 6]))
-        found = _times(stiffened[..., :6], motion) - stiffened[..., 6]
-        moved = np.abs(found - before).max(axis=1) / load.force[rows]
+        settled = _times(stiffened[..., :6], motion) - stiffened[..., 6]
+        moved = np.abs(settled - before).max(axis=1) / load.force[rows]
         # Between tension and compression of a strut lies its gap, where it is idle.
-        crossing = (found * before < 0.0) & (moved > SETTLED)[:, None]
-        forces[rows] = np.where(crossing, 0.0, found)
+        crossing = (settled * before < 0.0) & (moved > SETTLED)[:, None]
+        forces[rows] = np.where(crossing, 0.0, settled)
         rows = rows[moved > SETTLED]
     return rows
 
@@ -184,14 +184,14 @@ def _length(gradient: Callable[[FloatArray], FloatArray], forces: FloatArray, st
 
     low, high = np.zeros(len(forces)), np.ones(len(forces))
     goal = FLAT * np.abs(slope(low))
-    share, found = high.copy(), slope(high)
+    share, rise = high.copy(), slope(high)
     for _ in range(LINE_STEPS):
-        rising, falling = found > goal, (found < -goal) & (share < 1.0)
+        rising, falling = rise > goal, (rise < -goal) & (share < 1.0)
         if not (rising | falling).any():
             break
         high, low = np.where(rising, share, high), np.where(falling, share, low)
         share = np.where(rising | falling, 0.5 * (low + high), share)
-        found = slope(share)
+        rise = slope(share)
     return share
 
 
@@ -245,7 +245,7 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
         strut = strut if series is None else strut + series
         loads = form if loads is None else loads if form is None else loads + form
         parallel = beside if parallel is None else parallel if beside is None else parallel + beside
-    guard.refuse_struts_without_stiffness(_acting(model), path, strut)
+    refuse_struts_without_stiffness(_acting(model), path, strut)
     return Links(strut, loads, parallel)
 
 
@@ -259,7 +259,7 @@ def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
     worst = np.unravel_index(np.argmin(np.where(holds, np.inf, stiffness)), stiffness.shape)
     raise PoseError(
         f"strut {worst[1] + 1} would be {mm_from_m(float(lengths[worst])):.1f} mm long, where the machine's strut law "
-        f"gives {n_per_um_from_n_per_m(float(stiffness[worst])):.4g} N/um{guard.at_pose(path, int(worst[0]))}",
+        f"gives {n_per_um_from_n_per_m(float(stiffness[worst])):.4g} N/um{at_pose(path, int(worst[0]))}",
         expected="a finite stiffness above 0",
         hint="bound the strut length in the machine file so that the law stays positive",
     )
@@ -307,10 +307,10 @@ def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.solve(matrix, right))
     except np.linalg.LinAlgError:
         solution = np.full(np.broadcast_shapes(matrix.shape[:-2], right.shape[:-2]) + right.shape[-2:], np.nan)
-        for i, (one, side) in enumerate(zip(matrix, right, strict=True)):
+        for i, (left, side) in enumerate(zip(matrix, right, strict=True)):
             # The same test as for a batch without singular poses: a pose's result does not hang on its neighbours.
             with suppress(np.linalg.LinAlgError):
-                solution[i] = np.linalg.solve(one, side)
+                solution[i] = np.linalg.solve(left, side)
         return solution
 
 
@@ -318,13 +318,13 @@ def wrench_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     """(n, 6, 6) compliance of the tip for forces and moments; load-dependent effects are not in it."""
     wrenches = np.broadcast_to(np.eye(6), (len(path), 6, 6))
     twists, _ = respond(path, assemble_links(model, path), wrenches)
-    return guard.possible(_acting(model), path, twists)
+    return possible(_acting(model), path, twists)
 
 
 def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     """(n, 3, 3) m/N, displacements of the tip under forces at it; load-dependent effects are not in it."""
     twists, _ = respond(path, assemble_links(model, path), _unit_forces(len(path)))
-    return guard.possible(_acting(model), path, twists[:, :3])
+    return possible(_acting(model), path, twists[:, :3])
 
 
 def strut_forces(model: StiffnessModel, path: LoadPath) -> FloatArray:
@@ -396,7 +396,7 @@ def compliance_along(
     along = None if equilibrium is None else _stored_along(model, path, direction, equilibrium)
     if along is None:
         along = np.einsum("ni,ni->n", under_load(model, path, direction).twists[:, :3], direction)
-    return guard.possible(_acting(model), path, np.asarray(along)[:, None, None])[:, 0, 0]
+    return possible(_acting(model), path, np.asarray(along)[:, None, None])[:, 0, 0]
 
 
 def _stored_along(

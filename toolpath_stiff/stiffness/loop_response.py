@@ -55,11 +55,11 @@ def loop_compliance(
     InputError
         As `exact.compliance_along`.
     """
-    found = np.empty(len(path))
+    compliance = np.empty(len(path))
     for number in np.unique(which).tolist():
         rows = np.flatnonzero(which == number)
-        found[rows] = _one_loop(model, path.take(rows), direction[rows], loops[number])
-    return found
+        compliance[rows] = _one_loop(model, path.take(rows), direction[rows], loops[number])
+    return compliance
 
 
 def _one_loop(model: StiffnessModel, path: LoadPath, direction: FloatArray, loop: MeasuringLoop) -> FloatArray:
@@ -76,9 +76,9 @@ def _one_loop(model: StiffnessModel, path: LoadPath, direction: FloatArray, loop
         loaded = under_load(model, path, direction)
         path = loaded.path
         real[:, :6], real[:, 6:9] = loaded.forces, direction
-    found = np.zeros(len(path))
+    reading = np.zeros(len(path))
     if loop.kind == "frame":
-        return found + _vertex_reading(model, path, real[:, :6], direction, loop)
+        return reading + _vertex_reading(model, path, real[:, :6], direction, loop)
     pair = np.zeros((len(path), 12))
     if loop.kind in ("spindle", "table"):
         pair[:, 6:9] = direction
@@ -87,18 +87,18 @@ def _one_loop(model: StiffnessModel, path: LoadPath, direction: FloatArray, loop
     if "struts" in loop.links:
         law = path.machine.strut_law.stiffness(path.struts.lengths)
         refuse_law_beyond_zero(path, law)
-        found += (pair[:, :6] * real[:, :6] / law).sum(axis=1)
+        reading += (pair[:, :6] * real[:, :6] / law).sum(axis=1)
     for active in model.effects:
         share = active.effect.seen_by(loop)
         if not share or (active.effect.load_dependent and path.strut_forces is None):
             continue
         series = active.adds("strut_compliance", path)
         if series is not None:
-            found += share * (pair[:, :6] * series * real[:, :6]).sum(axis=1)
+            reading += share * (pair[:, :6] * series * real[:, :6]).sum(axis=1)
         form = active.adds("load_compliance", path)
         if form is not None:
-            found += share * np.einsum("ni,nij,nj->n", pair, form, real)
-    return found
+            reading += share * np.einsum("ni,nij,nj->n", pair, form, real)
+    return reading
 
 
 def _vertex_reading(
@@ -107,13 +107,13 @@ def _vertex_reading(
     """(n,) m/N of a vertex against the floor."""
     _, radial = frame_vertices(path.machine.frame_joints)[loop.number - 1]
     along = {"": direction, "radial": radial, "vertical": np.array([0.0, 0.0, 1.0])}[loop.where]
-    found = np.zeros(len(path))
+    reading = np.zeros(len(path))
     for active in model.effects:
         if active.effect.seen_by(loop) and active.effect.acts_on(path, active.values):
             moved = active.effect.vertex_displacement(path, active.values, forces, loop.number)
             if moved is not None:
-                found += (moved * along).sum(axis=1)
-    return found
+                reading += (moved * along).sum(axis=1)
+    return reading
 
 
 def law_products(forces: FloatArray, loops: Sequence[MeasuringLoop], which: IntArray) -> FloatArray:
@@ -121,13 +121,13 @@ def law_products(forces: FloatArray, loops: Sequence[MeasuringLoop], which: IntA
 
     `forces` (n, 6) are those under the unit load.
     """
-    found = np.zeros_like(forces)
+    products = np.zeros_like(forces)
     for number in np.unique(which).tolist():
         rows, loop = which == number, loops[number]
         if loop.kind in ("tip", "platform"):
-            found[rows] = forces[rows] ** 2
+            products[rows] = forces[rows] ** 2
         elif loop.kind == "strut":
-            found[rows, loop.number - 1] = forces[rows, loop.number - 1]
+            products[rows, loop.number - 1] = forces[rows, loop.number - 1]
         elif loop.kind == "alone":
-            found[rows, loop.number - 1] = 1.0
-    return found
+            products[rows, loop.number - 1] = 1.0
+    return products

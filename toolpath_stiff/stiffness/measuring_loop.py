@@ -6,9 +6,7 @@ holds the whole load path; an indicator across one joint holds that joint alone.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from functools import lru_cache
 
 LINKS_ON_THE_PATH = ("tool", "platform", "joints", "struts", "frame", "table")
 
@@ -33,12 +31,6 @@ ALONG_THE_LOAD = ("tip", "spindle", "platform", "table")
 WORDS = (
     "tip, spindle, platform, table, strut 1 (to 6), strut 1 alone, joint 1, joint 1 platform, joint 1 frame, frame 1 "
     "(to 3), frame 1 radial, frame 1 vertical"
-)
-
-
-_WORD = re.compile(
-    r"(?:(tip|spindle|platform|table)|(strut) ([1-6])( alone)?|(joint) ([1-6])( platform| frame)?"
-    r"|(frame) ([1-3])( radial| vertical)?)"
 )
 
 
@@ -85,22 +77,15 @@ class MeasuringLoop:
 
 
 TIP = MeasuringLoop()
+_LOOPS = (
+    *map(MeasuringLoop, ALONG_THE_LOAD),
+    *(MeasuringLoop(kind, number) for kind in ("strut", "alone") for number in range(1, 7)),
+    *(MeasuringLoop("joint", number, where) for number in range(1, 7) for where in ("", "platform", "frame")),
+    *(MeasuringLoop("frame", number, where) for number in range(1, 4) for where in ("", "radial", "vertical")),
+)
+_NAMED = {"": TIP, **{str(loop): loop for loop in _LOOPS}}
 
 
-@lru_cache(maxsize=1024)  # asked of every record
 def measuring_loop(text: str) -> MeasuringLoop | None:
     """The loop that a cell of the column `loop` names, an empty one the tip's; None where it names none."""
-    words = " ".join(text.lower().split())
-    if not words:
-        return TIP
-    found = _WORD.fullmatch(words)
-    if found is None:
-        return None
-    plain, strut, strut_number, alone, joint, joint_number, end, frame, vertex, axis = found.groups()
-    if plain:
-        return MeasuringLoop(plain)
-    if strut:
-        return MeasuringLoop("alone" if alone else "strut", int(strut_number))
-    if joint:
-        return MeasuringLoop(joint, int(joint_number), (end or "").strip())
-    return MeasuringLoop(frame, int(vertex), (axis or "").strip())
+    return _NAMED.get(" ".join(text.lower().split()))

@@ -22,52 +22,22 @@ from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
-from toolpath_stiff.machine.model import EffectEntry, Machine, with_parameter
+from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
-from toolpath_stiff.stiffness import guard
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
-from toolpath_stiff.stiffness.contract import SETUP, Conditions, Effect, LoadPath, read_parameters
+from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
+from toolpath_stiff.stiffness.parameters import read_parameters
 from toolpath_stiff.units import mm_from_m
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
 TOOL = "tool_extension_mm"
-# Condition -> what it is, how a program gets it.
 WORDS = {
-    "temperature_C": ("the temperature, which nobody gives", both_names("--temperature")),
-    "time_min": ("the time since an indicator was zeroed, which no program has", ""),
-    "direction": ("the direction of a reading, which no program has", ""),
+    "temperature_C": f"the temperature, which nobody gives ({both_names('--temperature')})",
+    "time_min": "the time since an indicator was zeroed, which no program has",
+    "direction": "the direction of a reading, which no program has",
 }
-
-
-@dataclass(frozen=True)
-class ActiveEffect:
-    """An effect with its parameters, name -> SI value."""
-
-    effect: Effect
-    values: Mapping[str, float]
-
-    def adds(self, hook: str, path: LoadPath) -> FloatArray | None:
-        """What `strut_compliance`, `load_compliance` or `parallel_stiffness` returns; None where it does not act.
-
-        Raises `EffectFault`.
-        """
-        if not self.effect.acts_on(path, self.values):
-            return None
-        return guard.added(self.effect, hook, path, self.values)
-
-    def geometry(self, machine: Machine) -> Machine:
-        """The machine with the effect's geometry. Raises `EffectFault`."""
-        return guard.changed_geometry(self.effect, machine, self.values)
-
-    def reading(self, stiffness: FloatArray, path: LoadPath) -> FloatArray:
-        """What an instrument shows, (n,) N/m, for a true stiffness; the same where it does not act.
-
-        Raises `EffectFault`.
-        """
-        if not self.effect.acts_on(path, self.values):
-            return stiffness
-        return guard.read_off(self.effect, stiffness, path, self.values)
 
 
 @dataclass(frozen=True)
@@ -113,7 +83,7 @@ class StiffnessModel:
         """Stiffness of the platform bars in N/m, inf if rigid; only meaningful if `is_plain`."""
         for active in self.effects:
             if isinstance(active.effect, PlatformFlexibility):
-                return active.values["bar_stiffness"]
+                return float(active.values["bar_stiffness"])
         return float(np.inf)
 
     @property
@@ -153,6 +123,7 @@ def build_model(
     >>> import numpy as np
     >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.stiffness import core
+    >>> from toolpath_stiff.stiffness.active import ActiveEffect
     >>> from toolpath_stiff.stiffness.catalogue import find_effect
     >>> machine = load_machine("nist")
     >>> weak = ActiveEffect(find_effect("weak_strut"), {"strut": 1, "factor": 0.7})
@@ -168,17 +139,14 @@ def build_model(
     acting = [_activate(machine, entry, files, instrument=False) for entry in machine.effects]
     reading = [_activate(machine, entry, files, instrument=True) for entry in machine.instruments]
     if np.isfinite(machine.platform_bar_stiffness):
-        bars = ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness})
-        acting.insert(0, bars)
+        acting.insert(0, ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness}))
     for active in extra:
         (reading if active.effect.is_instrument else acting).append(active)
     names = [active.effect.name for active in (*acting, *reading)]
     for name in names:
         if names.count(name) > 1:
-            raise EffectError(
-                f"machine {machine.name}: effect {name} is given twice",
-                hint="keep one of them (finite platform bars count as platform_flexibility)",
-            )
+            hint = "keep one of them (finite platform bars count as platform_flexibility)"
+            raise EffectError(f"machine {machine.name}: effect {name} is given twice", hint=hint)
     return _assembled(machine, acting, reading, conditions or Conditions(machine.setup, machine.temperature))
 
 
@@ -214,22 +182,20 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     """
     if model.given is None:
         raise EffectError(f"a model without its machine has no parameter {name!r}")
-    if name in model.given.strut_law.parameters:
-        moved = with_parameter(model.given, name, change)
-        return _assembled(moved, model.effects, model.instruments, model.conditions)
-    owner, _, key = name.partition(".")
-    effects = {"effects": list(model.effects), "instruments": list(model.instruments)}
-    for kind in effects.values():
-        for i, active in enumerate(kind):
-            parameter = next((p for p in active.effect.parameters if p.key == key), None)
-            if active.effect.name == owner and parameter is not None and not parameter.discrete:
-                value = active.values[parameter.name] + change * parameter.si
-                low, high = (bound * parameter.si for bound in parameter.bounds)
-                if not low <= value <= high:
-                    raise EffectError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
-                kind[i] = ActiveEffect(active.effect, {**active.values, parameter.name: value})
-                return _assembled(model.given, effects["effects"], effects["instruments"], model.conditions)
-    raise EffectError(f"machine {model.given.name} has no parameter {name!r}")
+    given, groups = model.given, (list(model.effects), list(model.instruments))
+    if name in given.strut_law.parameters:
+        return _assembled(given.with_changes(strut_law=given.strut_law.moved(name, change)), *groups, model.conditions)
+    for group in groups:
+        for i, active in enumerate(group):
+            for parameter in active.effect.parameters:
+                if name == f"{active.effect.name}.{parameter.key}" and not parameter.discrete:
+                    value = active.values[parameter.name] + change * parameter.si
+                    low, high = (bound * parameter.si for bound in parameter.bounds)
+                    if not low <= value <= high:
+                        raise EffectError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
+                    group[i] = ActiveEffect(active.effect, {**active.values, parameter.name: value})
+                    return _assembled(given, *groups, model.conditions)
+    raise EffectError(f"machine {given.name} has no parameter {name!r}")
 
 
 def _activate(machine: Machine, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
@@ -322,13 +288,12 @@ class Idle:
 
 def idle_effects(model: StiffnessModel) -> list[Idle]:
     """The effects that add nothing to a program run under the model's conditions; instruments never do."""
-    found = [*model.withheld, *(_idle(active, model) for active in model.effects)]
-    return [one for one in found if one is not None]
+    return [*model.withheld, *(idle for active in model.effects if (idle := _idle(active, model)))]
 
 
 def acting_effects(model: StiffnessModel) -> tuple[ActiveEffect, ...]:
     """The other effects: those that headers list."""
-    return tuple(active for active in model.effects if _idle(active, model) is None)
+    return tuple(active for active in model.effects if not _idle(active, model))
 
 
 def acting_names(model: StiffnessModel) -> list[str]:
@@ -337,23 +302,23 @@ def acting_names(model: StiffnessModel) -> list[str]:
 
 
 def _idle(active: ActiveEffect, model: StiffnessModel) -> Idle | None:
-    waits_for, own = active.effect.conditions(active.values), setup_of(active)
-    missing = [name for name in waits_for if name not in model.conditions.known]
-    if missing:
-        return Idle(active.effect.name, "; ".join(_missing(name, own) for name in missing), True)
-    if SETUP in waits_for and own and own != model.conditions.setup:
+    waits_for, setup = active.effect.conditions(active.values), setup_of(active)
+    reasons = []
+    for name in waits_for:
+        if name in model.conditions.known:
+            continue
+        if name == SETUP:
+            belongs = f"it belongs to set-up {setup!r}" if setup else "it needs the set-up"
+            option = f"--setup {shlex.quote(setup) if setup else 'NAME'}"
+            reasons.append(f"{belongs}, and nobody says which set-up this is ({option}, or --setup {NO_SETUP})")
+        else:
+            reasons.append(f"it needs {WORDS[name]}")
+    if reasons:
+        return Idle(active.effect.name, "; ".join(reasons), True)
+    if SETUP in waits_for and setup and setup != model.conditions.setup:
         here = f"this is {model.conditions.setup!r}" if model.conditions.setup else "that is not there"
-        return Idle(active.effect.name, f"it belongs to set-up {own!r}, and {here}", False)
+        return Idle(active.effect.name, f"it belongs to set-up {setup!r}, and {here}", False)
     return None
-
-
-def _missing(name: str, own: str) -> str:
-    if name == SETUP:
-        belongs = f"it belongs to set-up {own!r}" if own else "it needs the set-up"
-        option = f"--setup {shlex.quote(own) if own else 'NAME'}"
-        return f"{belongs}, and nobody says which set-up this is ({option}, or --setup {NO_SETUP})"
-    what, option = WORDS[name]
-    return f"it needs {what}" + (f" ({option})" if option else "")
 
 
 def setup_of(active: ActiveEffect) -> str:
@@ -368,39 +333,39 @@ def condition_warnings(model: StiffnessModel, tool_given: bool = False) -> list[
     `tool_given`: whether the length of the tool is known; else it is the reference tool's.
     """
     names = ", ".join(active.effect.name for active in model.instruments)
-    found = list(model.unchecked)
-    found += [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
-    found += [str(one) for one in idle_effects(model) if one.waiting]
+    warnings = list(model.unchecked)
+    warnings += [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
+    warnings += [str(idle) for idle in idle_effects(model) if idle.waiting]
     length = mm_from_m(model.machine.reference_tool_length)
     if not tool_given:
-        found += [
+        warnings += [
             f"{active.effect.name} acts as with the reference tool ({length:g} mm): nobody gives the tool's length"
             for active in acting_effects(model)
             if TOOL in active.effect.needs
         ]
     given = model.given
-    asked = model.conditions.setup and (given is None or given.setup != model.conditions.setup)
-    if asked and not any(SETUP in active.effect.conditions(active.values) for active in model.effects):
+    named = model.conditions.setup and (given is None or given.setup != model.conditions.setup)
+    if named and not any(SETUP in active.effect.conditions(active.values) for active in model.effects):
         name = model.machine.name
-        found.append(f"set-up {model.conditions.setup!r} changes nothing: no effect of machine {name} depends on it")
-    return found
+        warnings.append(f"set-up {model.conditions.setup!r} changes nothing: no effect of machine {name} depends on it")
+    return warnings
 
 
 def conditions_stated(model: StiffnessModel) -> list[str]:
     """What the results assume of set-up and temperature, and which effects stand aside for it."""
-    found = []
+    stated = []
     if model.conditions.setup is not None:
-        found.append(f"set-up: {model.conditions.setup or NO_SETUP}")
+        stated.append(f"set-up: {model.conditions.setup or NO_SETUP}")
     if model.conditions.temperature is not None:
-        found.append(f"temperature: {model.conditions.temperature:g} degrees C")
-    return found + [str(one) for one in idle_effects(model) if not one.waiting]
+        stated.append(f"temperature: {model.conditions.temperature:g} degrees C")
+    return stated + [str(idle) for idle in idle_effects(model) if not idle.waiting]
 
 
 def effects_stated(model: StiffnessModel) -> dict[str, Any]:
     """The entries of a result's JSON: what acts, what does not and why, under which set-up and temperature."""
     return {
         "effects": acting_names(model),
-        "effects_idle": [{"effect": one.effect, "reason": one.reason} for one in idle_effects(model)],
+        "effects_idle": [{"effect": idle.effect, "reason": idle.reason} for idle in idle_effects(model)],
         "setup": NO_SETUP if model.conditions.setup == "" else model.conditions.setup,
         "temperature_C": model.conditions.temperature,
     }
@@ -418,24 +383,24 @@ def idle_on_readings(model: StiffnessModel, missing: Collection[str], setups: Co
 
     `missing`: columns that the readings lack; `setups`: names that occur in them.
     """
-    found = {}
+    sentences = {}
     for active in (*model.effects, *model.instruments):
-        waits_for, own = active.effect.conditions(active.values), setup_of(active)
+        waits_for, setup = active.effect.conditions(active.values), setup_of(active)
         lacking = ", ".join(name for name in waits_for if name in missing)
-        if lacking or (SETUP in waits_for and own and own not in setups):
-            why = f"column {lacking} is missing" if lacking else f"none is of set-up {own!r}"
+        if lacking or (SETUP in waits_for and setup and setup not in setups):
+            why = f"column {lacking} is missing" if lacking else f"none is of set-up {setup!r}"
             name = active.effect.name
-            found[name] = f"{name} of the machine file does not act on these readings: {why}"
-    return found
+            sentences[name] = f"{name} of the machine file does not act on these readings: {why}"
+    return sentences
 
 
 def known_setups(models: Iterable[StiffnessModel]) -> list[str]:
     """The set-ups that machine files list and effects name."""
-    found: list[str] = []
+    names: dict[str, None] = {}
     for model in models:
-        found += (model.given or model.machine).setups
-        found += [setup_of(active) for active in (*model.effects, *model.instruments)]
-    return [name for name in dict.fromkeys(found) if name]
+        names |= dict.fromkeys((model.given or model.machine).setups)
+        names |= dict.fromkeys(setup_of(active) for active in (*model.effects, *model.instruments))
+    return [name for name in names if name]
 
 
 def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:
@@ -445,7 +410,7 @@ def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:
     """
     known = known_setups(models)
     effects = [active for model in models for active in model.effects]
-    takes_any = any(SETUP in one.effect.needs and not setup_of(one) for one in effects)
+    takes_any = any(SETUP in active.effect.needs and not setup_of(active) for active in effects)
     if setup in ("", NO_SETUP, *known) or takes_any or not known:
         return
     near = difflib.get_close_matches(setup, known, n=1)

@@ -11,8 +11,8 @@ from typing import Any
 
 from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.contract import Effect, Parameter
-from toolpath_stiff.stiffness.guard import NAME, wrong_in
-from toolpath_stiff.stiffness.term_effect import ASSUMED, TermEffect, kind_of, size_parameter
+from toolpath_stiff.stiffness.declarations import NAME, wrong_in
+from toolpath_stiff.stiffness.term_effect import ASSUMED, kind_of, size_parameter
 from toolpath_stiff.stiffness.terms import (
     ALONG,
     AXES,
@@ -86,28 +86,27 @@ def effects_of_terms(file: str) -> dict[str, Effect]:
     """Name -> effect of a file's terms. Raises `InputError` with file, line and key."""
     toml = TomlReader.read(file, "effect file", EffectError)
     toml.only("", toml.data, ("name", "source", "effect", "drawn_from"))
-    own, rows = _text(toml, "name", toml.data.get("name")), toml.data.get("effect")
-    if not NAME.fullmatch(own):
-        raise toml.error(f"name = {own!r}", "letters, digits and underscores, such as missing", where="name")
+    common, rows = _text(toml, "name", toml.data.get("name")), toml.data.get("effect")
+    if not NAME.fullmatch(common):
+        raise toml.error(f"name = {common!r}", "letters, digits and underscores, such as missing", where="name")
     if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) for row in rows):
         raise toml.error("no [[effect]]", '[[effect]] with name = "term"', where="effect")
     source = _text(toml, "source", toml.data.get("source", ASSUMED))
     drawn_from = toml.table("drawn_from", toml.data.get("drawn_from", {}), "[drawn_from] with readings")
     toml.only("drawn_from", drawn_from, ("readings",))
     marks = tuple(_text(toml, "drawn_from.readings", drawn_from.get("readings", "-")).replace("-", " ").split())
-    sized: dict[type[TermEffect], dict[str, tuple[Term, Parameter]]] = {}
-    names: set[str] = set()
-    for number, row in enumerate(rows, 1):
-        term, parameter = _entry(toml, f"effect[{number}]", row)
-        if parameter.name in names:
-            raise toml.error(f"size {parameter.name!r} is there twice", where=f"effect[{number}].size")
-        names.add(parameter.name)
-        sized.setdefault(kind_of(term), {})[parameter.name] = (term, parameter)
+    entries = [_entry(toml, f"effect[{number}]", row) for number, row in enumerate(rows, 1)]
+    names = [parameter.name for _, parameter in entries]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise toml.error(f"size {name!r} is there twice", where=f"effect[{number + 1}].size")
     effects: dict[str, Effect] = {}
-    for kind in sorted(sized, key=lambda kind: kind.ending):
-        terms, parameters = zip(*sized[kind].values(), strict=True)
-        name = own if len(sized) == 1 else f"{own}{kind.ending}"
-        effects[name] = kind(name, dict(zip(sized[kind], terms, strict=True)), parameters, source, marks, file)
+    kinds = sorted({kind_of(term) for term, _ in entries}, key=lambda kind: kind.ending)
+    for kind in kinds:
+        terms, parameters = zip(*(entry for entry in entries if kind_of(entry[0]) is kind), strict=True)
+        name = common if len(kinds) == 1 else f"{common}{kind.ending}"
+        by_size = {parameter.name: term for term, parameter in zip(terms, parameters, strict=True)}
+        effects[name] = kind(name, by_size, parameters, source, marks, file)
     return effects
 
 
@@ -121,12 +120,12 @@ def _entry(toml: TomlReader, where: str, row: Mapping[str, Any]) -> tuple[Term, 
     along = toml.choice(f"{where}.along", row.get("along"), ways, f"of {action}: {', '.join(ways)}")
     parameter = _parameter(toml, where, row, action)
     toml.only(where, row, (*KEYS, *_range_keys(parameter)))
-    variable, shape, at, column = _shape(toml, where, row, action, action)
+    variable, shape, constants, column = _shape(toml, where, row, action, action)
     times = row.get("times")
     if times is not None:
         toml.only(f"{where}.times", toml.table(f"{where}.times", times, "a table"), SHAPE_KEYS)
         times = Factor(*_shape(toml, f"{where}.times", times, "", action))
-    term = Term(link, along, variable, shape, action, _place(toml, where, row, action), at, column, times=times)
+    term = Term(link, along, variable, shape, action, _place(toml, where, row, action), constants, column, times=times)
     return term, parameter
 
 
@@ -168,13 +167,13 @@ def _shape(
         raise toml.error(
             f"constants {', '.join(constants) or 'none'}", f"of {shape}: {ways}", where=f"{where}.constants"
         )
-    at = tuple(
+    values = tuple(
         (name, toml.number(f"{where}.constants", constants[key], LARGEST) * constant_key(name, variable)[1])
         for key, name in names.items()
     )
-    if pair and not {dict(at)[name] for name in pair} <= set(range(1, 7)):
+    if pair and not {dict(values)[name] for name in pair} <= set(range(1, 7)):
         raise toml.error("first and second", "two numbers of struts, 1 to 6", where=f"{where}.constants")
-    return variable, shape, at, column
+    return variable, shape, values, column
 
 
 def _place(toml: TomlReader, where: str, row: Mapping[str, Any], action: str) -> int | None:

@@ -18,17 +18,17 @@ def carriers(link: str, action: str, direction: str, where: int | None, path: Lo
     if action == "vertex":
         return _vertex_carriers(link, direction, where, path)
     axes = _axes(link, action, direction, path)
-    found = np.zeros((len(path), axes.shape[1], 12))
-    found[:, :, 6:9] = axes
-    return found
+    rows = np.zeros((len(path), axes.shape[1], 12))
+    rows[:, :, 6:9] = axes
+    return rows
 
 
 def _axes(link: str, action: str, direction: str, path: LoadPath) -> FloatArray:
     """(n, k, 3) a: the link's generalised forces are a . F of the tip's force F."""
     n = len(path)
     if link in ("tool", "platform"):
-        own = {"X": [0], "Y": [1], "Z": [2], "axial": [2], "radial": [0, 1], "all": [0, 1, 2]}[direction]
-        axes = np.swapaxes(path.rotation, 1, 2)[:, own]  # rows R e
+        columns = {"X": [0], "Y": [1], "Z": [2], "axial": [2], "radial": [0, 1], "all": [0, 1, 2]}[direction]
+        axes = np.swapaxes(path.rotation, 1, 2)[:, columns]  # rows R e
         if action == "tilting":  # (lever x F) . (R e_z x R e) = F . ((R e_z x R e) x lever)
             lever = -path.struts.arms.mean(axis=1)
             about = np.cross(path.rotation[:, None, :, 2], axes)
@@ -39,33 +39,33 @@ def _axes(link: str, action: str, direction: str, path: LoadPath) -> FloatArray:
     if action == "rocking":  # moments of F at p about Y, X and Z
         of = {"X": (z, none, -x), "Y": (none, z, -y), "tangential": (-y, x, none)}
         chosen = ("X", "Y") if direction == "all" else (direction,)
-        return np.stack([np.stack(of[one], axis=1) for one in chosen], axis=1)
+        return np.stack([np.stack(of[axis], axis=1) for axis in chosen], axis=1)
     if direction in ("radial", "tangential"):
         reach = np.maximum(np.hypot(x, y), 1e-9)
         ends = (x, y, none) if direction == "radial" else (-y, x, none)
         return np.asarray((np.stack(ends, axis=1) / reach[:, None])[:, None])
-    own = {"all": [0, 1, 2], "horizontal": [0, 1]}.get(direction) or [AXES[direction]]
-    return np.broadcast_to(np.eye(3)[own], (n, len(own), 3))
+    columns = {"all": [0, 1, 2], "horizontal": [0, 1]}.get(direction) or [AXES[direction]]
+    return np.broadcast_to(np.eye(3)[columns], (n, len(columns), 3))
 
 
 def _vertex_carriers(link: str, direction: str, where: int | None, path: LoadPath) -> FloatArray:
     """(n, k, 12) of the vertices of frame or platform: the force of two struts along the vertex's own axes."""
     joints = path.machine.frame_joints if link == "frame" else path.machine.platform_joints
-    found = []
+    carried = []
     for number, (pair, outward) in enumerate(frame_vertices(joints), start=1):
         if where not in (None, number):
             continue
-        one = np.zeros((len(path), 12))
+        row = np.zeros((len(path), 12))
         if direction == "along the struts":  # what both carry together
-            one[:, pair] = 1.0
+            row[:, pair] = 1.0
         else:
             across = np.array([-outward[1], outward[0], 0.0])
             upright = np.array([0.0, 0.0, 1.0])
-            own = {"radial": outward, "tangential": across, "Z": upright, "axial": upright}[direction]
-            axis = np.broadcast_to(own, (len(path), 3)) if link == "frame" else path.rotation @ own
-            one[:, pair] = np.einsum("nij,nj->ni", path.struts.directions[:, pair], axis)
-        found.append(one)
-    return np.stack(found, axis=1)
+            along = {"radial": outward, "tangential": across, "Z": upright, "axial": upright}[direction]
+            axis = np.broadcast_to(along, (len(path), 3)) if link == "frame" else path.rotation @ along
+            row[:, pair] = np.einsum("nij,nj->ni", path.struts.directions[:, pair], axis)
+        carried.append(row)
+    return np.stack(carried, axis=1)
 
 
 def along_pins(action: str, direction: str, path: LoadPath) -> FloatArray:

@@ -248,7 +248,7 @@ class Term:
     @property
     def unseen(self) -> tuple[str, ...]:
         """Variables that no effect sees: the order of readings and further columns."""
-        return tuple(one for one in self.variables if one not in VARIABLES or one == "order")
+        return tuple(name for name in self.variables if name not in VARIABLES or name == "order")
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -272,10 +272,10 @@ class Term:
         """A name that no other term has: its words, and its constants to six digits."""
         numbers = [f"{name}={value:.6g}" for name, value in self.at]
         named = [self.link, str(self.where or ""), self.action, self.direction, self.variable, self.column, self.shape]
-        own = " ".join(part for part in (*named, *numbers) if part)
+        words = " ".join(part for part in (*named, *numbers) if part)
         if self.second is None:
-            return own
-        return f"{own} times {self.second.key.removeprefix(f'{self.link} ')}"
+            return words
+        return f"{words} times {self.second.key.removeprefix(f'{self.link} ')}"
 
     def sized(self, size: float) -> Term:
         """The same with a size (SI)."""
@@ -288,13 +288,13 @@ def variable_values(variable: str, path: LoadPath, column: str = "") -> FloatArr
     return np.zeros(len(path)) if values is None else values
 
 
-def shape_values(shape: str, values: FloatArray, at: Mapping[str, float], signed: bool) -> FloatArray:
+def shape_values(shape: str, values: FloatArray, constants: Mapping[str, float], signed: bool) -> FloatArray:
     """s(v) at values of any shape; `at` as of `Term.at`. Not below 0, but for slopes of what may change to both sides.
 
     `at` holds numbers, or arrays that broadcast with the values.
     """
-    names = tuple(name for name in at if name not in PAIR)
-    share = FORMULAS[shape, names][1](values, **{name: at[name] for name in names})
+    names = tuple(name for name in constants if name not in PAIR)
+    share = FORMULAS[shape, names][1](values, **{name: constants[name] for name in names})
     return np.maximum(share, 0.0) if names == ("start", "end") and not signed else np.asarray(share)
 
 

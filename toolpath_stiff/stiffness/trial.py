@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectError, EffectFault, InputError
 from toolpath_stiff.hints import command_line, options
@@ -22,42 +21,29 @@ from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import exact, guard
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ADDING, ActiveEffect
 from toolpath_stiff.stiffness.catalogue import effects_from_file
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
-from toolpath_stiff.stiffness.guard import is_foreign
-from toolpath_stiff.stiffness.model import TOOL, ActiveEffect, StiffnessModel, build_model, load_path
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
+from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
+from toolpath_stiff.stiffness.model import TOOL, StiffnessModel, build_model, load_path
 from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
-
-POSES, DRAWN, TIMED = 24, 600, 512
 
 if TYPE_CHECKING:
     import pandas as pd
 
-
+POSES, DRAWN, TIMED = 24, 600, 512
 LEANING = rad_from_deg(10.0)  # largest roll, pitch and yaw of the poses
-
-
 LONGER = 0.1  # m, of the longest tool, for effects that ask for it
-
-
 SETUPS = ("riser", "table")
-
-
 ALLOW = "--allow-unchecked-effects"
-
-
 SAME = 1e-9  # relative: of results that must agree
 
-
-# SI value of the units that parameters have, with the prefixes below.
+# SI value of the units that parameters have.
 BASE = {"m": 1.0, "N": 1.0, "rad": 1.0, "s": 1.0, "K": 1.0, "C": 1.0, "deg": RAD_PER_DEG, "%": 1e-2, "1": 1.0}
-
-
-BASE |= {"percent": 1e-2, "min": 60.0, "h": 3600.0}
-
-
-PREFIXED, PREFIXES = ("m", "N", "rad", "s"), {"n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+UNITS = {prefix + unit: factor for prefix, factor in PREFIXES.items() for unit in ("m", "N", "rad", "s")}
+UNITS |= BASE | {"percent": 1e-2, "min": 60.0, "h": 3600.0}
 
 
 @dataclass(frozen=True)
@@ -85,25 +71,24 @@ class Trial:
 def own_effects(model: StiffnessModel, effect_files: Iterable[str | Path]) -> list[Effect]:
     """Effects from outside the package that act in a model, or compete as of a file; each once."""
     acting = [active.effect for active in (*model.effects, *model.instruments) if is_foreign(active.effect)]
-    return list(dict.fromkeys([*acting, *(one for file in effect_files for one in effects_from_file(file).values())]))
+    in_files = (effect for file in effect_files for effect in effects_from_file(file).values())
+    return list(dict.fromkeys([*acting, *in_files]))
 
 
 def refuse_failing(effects: Iterable[Effect], machine: Machine, machine_name: str) -> None:
     """Raise `InputError` for the first effect from outside the package that fails on a machine, which it names."""
     for effect in effects:
-        if told := failure(effect, machine):
-            file = guard.file_of(effect)
+        if reason := failure(effect, machine):
+            file = file_of(effect)
             check = command_line("effects", "check", file, *options(machine=machine_name))
-            raise EffectError(
-                f"effect {effect.name} {told}", file=file,
-                hint=f"`{check}` says more; with {ALLOW} (allow_unchecked_effects=True) it is used all the same",
-            )  # fmt: skip
+            hint = f"`{check}` says more; with {ALLOW} (allow_unchecked_effects=True) it is used all the same"
+            raise EffectError(f"effect {effect.name} {reason}", file=file, hint=hint)
 
 
 def failures(effects: Iterable[Effect], machine: Machine) -> list[str]:
     """What results say of effects that were used although they fail."""
-    found = [(effect.name, failure(effect, machine)) for effect in effects]
-    return [f"UNCHECKED effect {name} ({ALLOW}): it {told}" for name, told in dict(found).items() if told]
+    reasons = {effect.name: failure(effect, machine) for effect in effects}
+    return [f"UNCHECKED effect {name} ({ALLOW}): it {reason}" for name, reason in reasons.items() if reason]
 
 
 def failure(effect: Effect, machine: Machine) -> str:
@@ -114,10 +99,10 @@ def failure(effect: Effect, machine: Machine) -> str:
 @lru_cache(maxsize=256)
 def _failure(effect: Effect, machine: bytes) -> str:
     try:
-        trial = try_effect(effect, pickle.loads(machine), timed=False)
+        outcomes = try_effect(effect, pickle.loads(machine), timed=False).outcomes
     except InputError as error:
         return f"cannot be tried: {error}"
-    return "; ".join(f"fails the check of its {one.name}: {one.found}" for one in trial.outcomes if one.passed is False)
+    return "; ".join(f"fails the check of its {row.name}: {row.found}" for row in outcomes if row.passed is False)
 
 
 def try_effect(effect: Effect, machine: Machine, seed: int = 0, timed: bool = True) -> Trial:
@@ -135,9 +120,8 @@ def try_effect(effect: Effect, machine: Machine, seed: int = 0, timed: bool = Tr
         Whether its speed is taken too, which nothing depends on.
     """
     bare = build_model(machine.with_changes(effects=(), instruments=()))
-    poses = _with_tools(effect, _poses(machine, seed))
-    sets = dict(_parameter_sets(effect))
-    outcomes = [*_units(effect)]
+    poses, sets = _poses(effect, machine, seed), dict(_parameter_sets(effect))
+    outcomes = [_unit(p) for p in effect.parameters if p.kind == "real"]
     try:
         plain, acted = _answer(bare, poses), {}
         for words, values in sets.items():
@@ -148,16 +132,20 @@ def try_effect(effect: Effect, machine: Machine, seed: int = 0, timed: bool = Tr
                     return Trial(effect, (*outcomes, Outcome("stiffness", False, f"{words}: {error}")))
         count = f"{len(acted)} sets of parameters, {len(poses)} poses"
         outcomes.append(Outcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}"))
-        outcomes += [_neutral(acted, plain), _acts(effect, acted, plain), _one_by_one(bare, effect, sets, poses)]
-        outcomes += _sign(_with(bare, effect, sets["typical, high"]), effect, poses)
-        outcomes += [_speed(bare, effect, sets["typical, high"], poses)] if timed else []
+        high = _with(bare, effect, sets["typical, high"])
+        outcomes += [_neutral(acted, plain), _acts(effect, acted, plain), _one_by_one(high, poses)]
+        outcomes += _sign(high, effect, poses)
+        if timed:
+            many = np.resize(poses, (TIMED, poses.shape[1]))
+            ratio = _seconds(high, many) / _seconds(bare, many)
+            outcomes.append(Outcome("speed", None, f"{ratio:.1f} times the plain model's time for {TIMED} poses"))
     except EffectFault as fault:
         outcomes.append(Outcome("shapes", False, str(fault)))
     return Trial(effect, tuple(outcomes))
 
 
-def _poses(machine: Machine, seed: int) -> FloatArray:
-    """(n, 6) m and rad within reach, the default origin first."""
+def _poses(effect: Effect, machine: Machine, seed: int) -> FloatArray:
+    """(n, 7) m and rad within reach, the default origin first, and how much longer the tool is, if the effect asks."""
     origin = np.array(machine.default_origin)
     low, high = machine.limits.workspace
     size = 0.25 * float(solve_struts(machine, origin[:3]).lengths.mean())
@@ -168,30 +156,22 @@ def _poses(machine: Machine, seed: int) -> FloatArray:
     drawn[:, 3:] = generator.uniform(-LEANING, LEANING, (DRAWN, 3))
     drawn[0] = origin
     turn = rotation_matrices(drawn[:, 3:])
-    stand = reach(machine, drawn[:, :3], solve_struts(machine, drawn[:, :3], turn), turn)
-    found = drawn[stand.reachable]
-    return found[:POSES] if len(found) else drawn[:1]
+    within = reach(machine, drawn[:, :3], solve_struts(machine, drawn[:, :3], turn), turn).reachable
+    poses = drawn[within][:POSES] if within.any() else drawn[:1]
+    return np.column_stack([poses, np.linspace(0.0, LONGER if TOOL in effect.needs else 0.0, len(poses))])
 
 
-def _with_tools(effect: Effect, poses: FloatArray) -> FloatArray:
-    """(n, 7) poses and how much longer the tool is: not at all, unless the effect asks for it."""
-    longest = LONGER if TOOL in effect.needs else 0.0
-    return np.column_stack([poses, np.linspace(0.0, longest, len(poses))])
-
-
-def _parameter_sets(effect: Effect) -> Iterator[tuple[str, dict[str, Any]]]:
+def _parameter_sets(effect: Effect) -> Iterator[tuple[str, Values]]:
     """Words -> SI values. A bound that is not finite is left out."""
 
-    def values(choose: str, index: int = 0) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+    def values(choose: str, index: int = 0) -> Values:
+        chosen: dict[str, str | float] = {}
         for p in effect.parameters:
-            if p.kind == "text":
-                found[p.name] = SETUPS[0]
-            elif p.kind == "integer":
-                found[p.name] = int(p.bounds[index])
+            if p.discrete:
+                chosen[p.name] = SETUPS[0] if p.kind == "text" else int(p.bounds[index])
             else:
-                found[p.name] = (p.neutral if choose == "neutral" else getattr(p, choose)[index]) * p.si
-        return found
+                chosen[p.name] = (p.neutral if choose == "neutral" else getattr(p, choose)[index]) * p.si
+        return chosen
 
     yield "neutral", values("neutral")
     yield "typical, low", values("typical")
@@ -201,7 +181,7 @@ def _parameter_sets(effect: Effect) -> Iterator[tuple[str, dict[str, Any]]]:
             yield f"{word} bounds", values("bounds", index)
 
 
-def _with(bare: StiffnessModel, effect: Effect, values: Mapping[str, Any]) -> StiffnessModel:
+def _with(bare: StiffnessModel, effect: Effect, values: Values) -> StiffnessModel:
     assert bare.given is not None
     return build_model(bare.given, extra=[ActiveEffect(effect, values)])
 
@@ -210,25 +190,22 @@ def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
     """Everything that an effect may ask for: half of the poses on the riser, an hour of time, 5 K."""
     n = len(poses)
     length = np.where(poses[:, 6] > 0.0, model.machine.reference_tool_length + poses[:, 6], np.nan)
-    ramp = np.linspace(0.0, 1.0, n)
-    setup = np.array([SETUPS[i % 2] for i in range(n)])
-    direction = np.eye(3)[np.arange(n) % 3]
+    ramp, setup = np.linspace(0.0, 1.0, n), np.array([SETUPS[i % 2] for i in range(n)])
     return load_path(
-        model, poses[:, :3], rotation_matrices(poses[:, 3:6]), length, defaults.FORCE, setup, time=3600.0 * ramp,
-        temperature=20.0 + 5.0 * ramp, direction=direction,
+        model, poses[:, :3], rotation_matrices(poses[:, 3:6]), length, setup=setup, time=3600.0 * ramp,
+        temperature=20.0 + 5.0 * ramp, direction=np.eye(3)[np.arange(n) % 3],
     )  # fmt: skip
 
 
 def _answer(model: StiffnessModel, poses: FloatArray) -> FloatArray:
     """(n,) N/m that a gauge shows, one direction a pose; the full tensors are computed, and refused if impossible."""
     path = _path(model, poses)
-    return _along(model, path, tensors=True)
+    exact.tip_compliance(model, path)
+    return _along(model, path)
 
 
-def _along(model: StiffnessModel, path: LoadPath, tensors: bool = False) -> FloatArray:
+def _along(model: StiffnessModel, path: LoadPath) -> FloatArray:
     assert path.direction is not None
-    if tensors:
-        exact.tip_compliance(model, path)
     stiffness = 1.0 / exact.compliance_along(model, path, path.direction)
     for active in model.instruments:
         stiffness = active.reading(stiffness, path)
@@ -246,26 +223,22 @@ def _neutral(acted: Mapping[str, FloatArray], plain: FloatArray) -> Outcome:
 
 def _acts(effect: Effect, acted: Mapping[str, FloatArray], plain: FloatArray) -> Outcome:
     changes = 100.0 * (acted["typical, high"] / plain - 1.0)
-    if np.abs(changes).max() <= 100.0 * SAME and effect.described_from:
-        # Its constants are those of readings: a set-up, a load, a corner that these poses do not have.
-        return Outcome("size", None, "at these poses it changes nothing; `diagnose` judges it where it was drawn from")
     if np.abs(changes).max() <= 100.0 * SAME:
+        if (
+            effect.described_from
+        ):  # its constants are those of readings: a set-up, a load, a corner not among these poses
+            drawn = "at these poses it changes nothing; `diagnose` judges it where it was drawn from"
+            return Outcome("size", None, drawn)
         return Outcome("size", False, "at its upper typical value it changes nothing")
-    return Outcome(
-        "size", None, f"at its upper typical value the stiffness changes by {changes.min():+.3g} to "
-        f"{changes.max():+.3g} % (median {np.median(changes):+.3g} %)",
-    )  # fmt: skip
+    span = f"{changes.min():+.3g} to {changes.max():+.3g} % (median {np.median(changes):+.3g} %)"
+    return Outcome("size", None, f"at its upper typical value the stiffness changes by {span}")
 
 
-def _one_by_one(
-    bare: StiffnessModel, effect: Effect, sets: Mapping[str, Mapping[str, Any]], poses: FloatArray
-) -> Outcome:
+def _one_by_one(model: StiffnessModel, poses: FloatArray) -> Outcome:
     """A pose's result must not hang on the poses beside it."""
-    model = _with(bare, effect, sets["typical, high"])
     path = _path(model, poses)
-    together = _along(model, path)
     alone = np.array([_along(model, path.take(np.array([i])))[0] for i in range(len(path))])
-    gap = float(np.abs(alone / together - 1.0).max())
+    gap = float(np.abs(alone / _along(model, path) - 1.0).max())
     if gap <= SAME:
         return Outcome("poses", True, "each alone gives what all together give")
     return Outcome("poses", False, f"alone and together differ by up to {100.0 * gap:.3g} %: the poses mix")
@@ -279,23 +252,17 @@ def _sign(model: StiffnessModel, effect: Effect, poses: FloatArray) -> list[Outc
     both_ways = any(p.kind == "real" and p.bounds[0] < p.neutral < p.bounds[1] for p in effect.parameters)
     if both_ways or effect.described_from:
         return []
-    path, name = _path(model, poses), "sign"
+    path = _path(model, poses)
     for active in model.effects:
-        for hook in guard.SHAPES:
+        for hook in ADDING:
             added = active.adds(hook, path)
             if added is None:
                 continue
             lowest = added if added.ndim == 2 else np.linalg.eigvalsh(added)
             if lowest.min() < -SAME * np.abs(lowest).max():
-                found = f"{hook} is negative, down to {lowest.min():.3g}"
-                return [Outcome(name, False, f"{found}; if both signs are meant, bound the parameter so")]
+                negative = f"{hook} is negative, down to {lowest.min():.3g}"
+                return [Outcome("sign", False, f"{negative}; if both signs are meant, bound the parameter so")]
     return []
-
-
-def _speed(bare: StiffnessModel, effect: Effect, values: Mapping[str, Any], poses: FloatArray) -> Outcome:
-    many = np.resize(poses, (TIMED, poses.shape[1]))
-    ratio = _seconds(_with(bare, effect, values), many) / _seconds(bare, many)
-    return Outcome("speed", None, f"{ratio:.1f} times the plain model's time for {TIMED} poses")
 
 
 def _seconds(model: StiffnessModel, poses: FloatArray) -> float:
@@ -308,43 +275,29 @@ def _seconds(model: StiffnessModel, poses: FloatArray) -> float:
     return max(best, 1e-6)
 
 
-def _units(effect: Effect) -> list[Outcome]:
-    return [_unit(p) for p in effect.parameters if p.kind == "real"]
-
-
 def _unit(parameter: Parameter) -> Outcome:
     """Whether `si` is what the unit says."""
-    meant = unit_in_si(parameter.unit)
-    name = f"unit of {parameter.name}"
+    meant, name = unit_in_si(parameter.unit), f"unit of {parameter.name}"
     if meant is None:
         return Outcome(name, None, f"{parameter.unit!r} is not known here; si = {parameter.si:g} is not checked")
+    value = f"one {parameter.unit or 'unit'} is {meant:g} in SI"
     if abs(parameter.si / meant - 1.0) > SAME:
-        return Outcome(name, False, f"one {parameter.unit or 'unit'} is {meant:g} in SI, but si = {parameter.si:g}")
-    return Outcome(name, True, f"one {parameter.unit or 'unit'} is {meant:g} in SI")
+        return Outcome(name, False, f"{value}, but si = {parameter.si:g}")
+    return Outcome(name, True, value)
 
 
 def unit_in_si(unit: str) -> float | None:
     """SI value of one `unit` such as `nm/N/m` or `N m/rad`; None if it is not known."""
-    if not unit:
-        return 1.0
     value = 1.0
-    for place, part in enumerate(unit.split("/")):
+    for place, part in enumerate(unit.split("/") if unit else ()):
         for token in re.split(r"[ .*]+", part.strip()):
-            one = _token_in_si(token)
-            if one is None:
+            if token not in UNITS:
                 return None
-            value = value / one if place else value * one
+            value = value / UNITS[token] if place else value * UNITS[token]
     return value
 
 
-def _token_in_si(token: str) -> float | None:
-    if token in BASE:
-        return float(BASE[token])
-    if token[1:] in PREFIXED and token[:1] in PREFIXES:
-        return float(PREFIXES[token[0]] * BASE[token[1:]])
-    return None
-
-
+@dataclass(frozen=True, repr=False, eq=False)
 class EffectCheck(Result):
     """Effects of a file tried against the contract: shapes, symmetry, units, neutral value, speed.
 
@@ -364,8 +317,9 @@ class EffectCheck(Result):
     command: ClassVar[str] = "effects"
     shown_by: ClassVar[str] = "effects"
 
-    def __init__(self, file: str, machine: str, trials: Sequence[Trial]) -> None:
-        self.file, self.machine, self.trials = file, machine, list(trials)
+    file: str
+    machine: str
+    trials: list[Trial]
 
     @property
     def passed(self) -> bool:

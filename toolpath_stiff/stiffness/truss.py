@@ -91,9 +91,9 @@ def _free_flexibility(joints: bytes) -> FloatArray:
     resultants = rigid[loaded].T  # (6, 21): total force and moment about the tip
     arms = rigid[:18]  # (18, 6)
     balance[:18] -= arms @ np.linalg.solve(arms.T @ arms, resultants)
-    found = np.asarray(balance.T @ flexibility @ balance)
-    found.flags.writeable = False
-    return found
+    loaded_flexibility = np.asarray(balance.T @ flexibility @ balance)
+    loaded_flexibility.flags.writeable = False
+    return loaded_flexibility
 
 
 def _rigid_motions(nodes: FloatArray) -> FloatArray:
@@ -160,22 +160,3 @@ def tip_compliance(machine: Machine, position: ArrayLike, rotation: ArrayLike) -
     loads[3 * TIP : 3 * TIP + 3] = np.eye(3)
     displacements = np.linalg.solve(structure_stiffness(machine, position, rotation), loads)
     return np.asarray(displacements[3 * TIP : 3 * TIP + 3])
-
-
-def wrench_compliance(machine: Machine, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-    """(6, 6) compliance of the tip: m/N, m/(N m), rad/N, rad/(N m) blocks.
-
-    A truss node has no rotation, so a moment acts through the smallest forces on the six platform joints that
-    add up to it, and the tip's rotation is its work-conjugate, the least-squares rotation of the six joints.
-    """
-    joints = platform_nodes(machine.platform_joints)[:6] @ np.asarray(rotation).T
-    arms = joints - joints.mean(axis=0)
-    inertia = sum(((arm @ arm) * np.eye(3) - np.outer(arm, arm) for arm in arms), np.zeros((3, 3)))
-    loads = np.zeros((24, 6))
-    loads[3 * TIP : 3 * TIP + 3, :3] = np.eye(3)
-    for column in range(3):
-        turn = np.linalg.solve(inertia, np.eye(3)[column])
-        for i, arm in enumerate(arms):
-            loads[3 * i : 3 * i + 3, 3 + column] = np.cross(turn, arm)
-    structure = structure_stiffness(machine, position, rotation)
-    return np.asarray(loads.T @ np.linalg.solve(structure, loads))

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from toolpath_stiff.api.inputs import Reading
 from toolpath_stiff.case.case import Case
 from toolpath_stiff.case.steps import CASE_FILE
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.nc.program import Reading
 from toolpath_stiff.studio.server import Studio
 from toolpath_stiff.studio.session import Session
 

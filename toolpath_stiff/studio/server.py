@@ -22,6 +22,7 @@ from urllib.parse import parse_qs, unquote, urlsplit
 from toolpath_stiff.api.inputs import finite
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import is_file, reason
+from toolpath_stiff.studio.actions import do, take_file
 from toolpath_stiff.studio.page import exported, page
 from toolpath_stiff.studio.picture import document
 from toolpath_stiff.studio.session import Session
@@ -210,13 +211,13 @@ class Handler(BaseHTTPRequestHandler):
         body = self.rfile.read(length)
         if parts.path == "/file":
             query = {name: values[0] for name, values in parse_qs(parts.query).items()}
-            return self._json(session.take_file(query.get("name", "file"), body, query.get("run") == "yes"))
+            return self._json(take_file(session, query.get("name", "file"), body, query.get("run") == "yes"))
         try:
             asked = json.loads(body, parse_float=_number, parse_constant=_number)
         except (ValueError, RecursionError):
             raise InputError("the question is no JSON") from None
         if parts.path == "/do" and isinstance(asked, dict):
-            return self._json(session.do(asked))
+            return self._json(do(session, asked))
         return self._send(HTTPStatus.NOT_FOUND, "there is no such page", "text/plain")
 
     def _events(self) -> None:

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
+import time
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+import toolpath_stiff as tps
+from toolpath_stiff.case.case import Case
 from toolpath_stiff.errors import TpsError
 
 COARSE_SAMPLES = 6000  # of a path in the page; the statistics are those of all samples
@@ -19,14 +25,16 @@ class Job:
 
     Attributes
     ----------
-    kind, options, key
-        What is done; the state of the case that it is done for.
+    kind, options, given, key
+        What is done, with all that its process needs, with what was asked; the state of the case that it is done for.
     progress
         (what is being done, how much of it, how much there is; 0: not known).
     """
 
-    def __init__(self, folder: Path, kind: str, options: Mapping[str, Any], key: object) -> None:
-        self.kind, self.options, self.key = kind, dict(options), key
+    def __init__(
+        self, folder: Path, kind: str, options: Mapping[str, Any], given: Mapping[str, Any], key: object
+    ) -> None:
+        self.kind, self.options, self.given, self.key = kind, dict(options), given, key
         self.progress: tuple[str, int, int] = (kind, 0, 0)
         context = _context()
         self._pipe, theirs = context.Pipe()
@@ -59,7 +67,7 @@ class Job:
         self._process.kill()
 
 
-PRELOADED = ("toolpath_stiff.studio.work", "toolpath_stiff.case.case", "toolpath_stiff.correction.strut_law", "pandas")
+PRELOADED = ("studio.work", "correction.strut_law", "diagnosis.diagnose", "analysis.results", "planning.result")
 
 
 def _context() -> Any:
@@ -67,14 +75,12 @@ def _context() -> Any:
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([*PRELOADED, "toolpath_stiff.diagnosis.diagnose", "toolpath_stiff.analysis"])
+    context.set_forkserver_preload(["pandas", *(f"toolpath_stiff.{name}" for name in PRELOADED)])
     return context
 
 
 def work(folder: str, kind: str, options: Mapping[str, Any], pipe: Connection) -> None:
     """The process: one task, reports, one answer."""
-    import time
-
     last = 0.0
 
     def tell(text: str, done: int, total: int) -> None:
@@ -84,72 +90,40 @@ def work(folder: str, kind: str, options: Mapping[str, Any], pipe: Connection) -
             pipe.send(("progress", (text, done, total)))
 
     try:
-        from toolpath_stiff.case.case import Case
-
-        pipe.send(("done", TASKS[kind](Case.open(folder), tell, **options)))
+        pipe.send(("done", answer(Case.open(folder), kind, tell, **options)))
     except TpsError as error:
         pipe.send(("error", str(error)))
     except Exception as error:  # a fault of ours, or of an effect of the user's own: the page says so and goes on
         pipe.send(("error", f"{type(error).__name__}: {error}"))
 
 
-Tell = Callable[[str, int, int], None]
-
-
-def diagnose(case: Any, tell: Tell, result: str) -> dict[str, Any]:
-    """Which effect is missing."""
-    import toolpath_stiff as tps
-
-    found = tps.diagnose(case.data, case.machine, progress=tell)
-    found.save(case.folder / result, plots=False)
-    return {"text": repr(found), "document": found.to_dict()}
-
-
-def compare(case: Any, tell: Tell, result: str) -> dict[str, Any]:
-    """Where the model fails, with its pictures and its page."""
-    import toolpath_stiff as tps
-
-    found = tps.compare(case.data, case.machine, progress=tell)
-    tell("drawing", 0, 0)
-    found.save(case.folder / result)
-    return {"text": repr(found), "document": found.to_dict()}
-
-
-def update(case: Any, tell: Tell, result: str, add: list[str]) -> dict[str, Any]:
-    """Effects fitted and judged; the machine file is kept where the data support them."""
-    import toolpath_stiff as tps
-
-    found = tps.update(case.data, case.machine, add=add, machine_file=f"{result}/machine.toml", progress=tell)
-    found.save(case.folder / result, plots=False, machine=False)
-    if found.accepted:
-        found.save_machine(case.folder / result / "machine.toml")
-    return {"text": repr(found), "document": found.to_dict(), "accepted": found.accepted}
-
-
-def plan(case: Any, tell: Tell, result: str, n: int) -> dict[str, Any]:
-    """What to measure next."""
-    import toolpath_stiff as tps
-
-    tell("choosing poses", 0, 0)
-    found = tps.plan(case.data if case.state.data else None, case.machine, n=n)
-    found.save(case.folder / result, plots=False)
-    return {"text": repr(found), "document": found.to_dict(), "rows": found.to_frame().to_dict("records")}
-
-
-def analyze(case: Any, tell: Tell, result: str, machine: str, first: str) -> dict[str, Any]:
-    """The program on the present machine with the effects that are on, or an update's, and on the case's first one."""
-    import toolpath_stiff as tps
-
-    found, command = case.analyze_in(result, machine, tell)
-    origin = case.state.origin or None
-    before = tps.analyze(case.program, case.machine_of(first), origin_mm_deg=origin, partial=True, progress=tell)
-    return {"text": repr(found), "document": found.to_dict(), "command": command, "path": _columns(found, before)}
+def answer(
+    case: Case, kind: str, tell: Callable[[str, int, int], None], result: str, first: str = "", **given: Any
+) -> dict[str, Any]:
+    """What the page needs of a result that is kept in the case; `first`: the machine to hold an analysis against."""
+    case.plots = kind == "compare"  # the only one whose page is opened from the studio
+    tell(kind, 0, 0)
+    found, command = case.find(kind, result, tell, **given)
+    told: dict[str, Any] = {"text": repr(found), "command": command}
+    if kind == "draft":
+        file = f"{result}/{found.name}.toml" if found.text else ""
+        return {**told, "document": {"reason": found.reason, "file": file}}
+    told["document"] = found.to_dict()
+    if kind == "update":
+        told["accepted"] = found.accepted
+    elif kind == "set_up":
+        names = (case.program.name, "not_written.txt")
+        told["written"] = next(name for name in names if (case.folder / result / name).is_file())
+    elif kind == "analyze":
+        origin = case.state.origin or None
+        given_machine = case.machine_of(first)
+        before = tps.analyze(case.program, given_machine, origin_mm_deg=origin, partial=True, progress=tell)
+        told["path"] = _columns(found, before)
+    return told
 
 
 def _columns(found: Any, before: Any) -> dict[str, Any]:
     """What the page draws of a path: at most so many samples, the lowest and the highest of every stretch."""
-    import numpy as np
-
     frame, given = found.to_frame(), before.to_frame()["stiffness_N_per_mm"].to_numpy()
     stiffness = frame["stiffness_N_per_mm"].to_numpy()
     rows = _thinned(stiffness, np.flatnonzero(np.diff(frame["line"], prepend=-1, append=-1)[:-1]))
@@ -173,10 +147,6 @@ def _columns(found: Any, before: Any) -> dict[str, Any]:
 
 def _thinned(values: Any, starts: Any) -> Any:
     """Rows of a drawing: all, or the lowest and highest of each of many stretches, and starts of lines."""
-    from itertools import pairwise
-
-    import numpy as np
-
     if len(values) <= COARSE_SAMPLES:
         return np.arange(len(values))
     edges = np.linspace(0, len(values), COARSE_SAMPLES // 3 + 1).astype(int)
@@ -189,38 +159,4 @@ def _thinned(values: Any, starts: Any) -> Any:
 
 def _plain(values: Any, digits: int) -> list[float | None]:
     """Rounded numbers as JSON has them."""
-    import numpy as np
-
     return [float(one) if np.isfinite(one) else None for one in np.round(values, digits)]
-
-
-def place(case: Any, tell: Tell, result: str, **bounds: Any) -> dict[str, Any]:
-    """Where the work should sit."""
-    import toolpath_stiff as tps
-
-    wanted: dict[str, Any] = {name: tuple(one) if isinstance(one, list) else one for name, one in bounds.items()}
-    found = tps.place(
-        case.program, case.machine, origin_mm_deg=case.state.origin or None, progress=tell,
-        **wanted,
-    )  # fmt: skip
-    found.save(case.folder / result, plots=False)
-    return {"text": repr(found), "document": found.to_dict()}
-
-
-def set_up(case: Any, tell: Tell, result: str) -> dict[str, Any]:
-    """Offsets, set-up sheet and program of the present placement."""
-    found, command = case.set_up_in(result, tell)
-    written = [name for name in (case.program.name, "not_written.txt") if (case.folder / result / name).is_file()]
-    return {"text": repr(found), "document": found.to_dict(), "command": command, "written": written[0]}
-
-
-def draft(case: Any, tell: Tell, result: str) -> dict[str, Any]:
-    """What is left unexplained, as an effect file."""
-    found, command = case.draft_in(result, tell)
-    document = {"reason": found.reason, "file": f"{result}/{found.name}.toml" if found.text else ""}
-    return {"text": repr(found), "document": document, "command": command}
-
-
-TASKS: dict[str, Callable[..., dict[str, Any]]] = {
-    task.__name__: task for task in (diagnose, compare, update, plan, analyze, place, set_up, draft)
-}

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, unit_axis
+from toolpath_stiff.nc.cutter_location.circles import VERTICAL
 from toolpath_stiff.nc.cutter_location.state import State
 from toolpath_stiff.nc.cutter_location.statements import Statement, is_number
+from toolpath_stiff.nc.cutter_location.tool_axes import unit_axis
 from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY, SECONDS_PER_MINUTE
 

@@ -1,11 +1,4 @@
-"""Words of a cutter-location file that move the tool: points, circles that the next point ends, and CYCLE/.
-
-A cycle comes in pairs of a word and its value. Read is what systems agree on: `DEPTH` or `FEDTO` counts from the GOTO
-point into the hole along the tool axis, `CLEAR` from it outwards (PTC, "CL Output for Holemaking Cycles"; Autodesk's
-post for CAMplete; Siemens NX writes FEDTO below zero). The rest is refused by name: numbers without words, whose order
-depends on the system; RAPTO, which Creo counts from CLEAR and others from the surface; RETURN,0 and RTRCTO,AUTO, which
-go to planes that are not in the file.
-"""
+"""Words of a cutter-location file that move the tool: points, and circles that the next point ends."""
 
 from __future__ import annotations
 
@@ -13,102 +6,20 @@ import math
 import re
 from dataclasses import replace
 
-from toolpath_stiff.nc.cutter_location import geometry
-from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle, unit_axis
-from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
+from toolpath_stiff.nc.cutter_location import circles
+from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle
 from toolpath_stiff.nc.cutter_location.state import State, drill, move, stand
-from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number, number
-from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling, Vector
+from toolpath_stiff.nc.cutter_location.statements import Statement, is_number, number
+from toolpath_stiff.nc.cutter_location.tool_axes import angle_of, unit_axis
+from toolpath_stiff.nc.geometry import Vector
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID
-from toolpath_stiff.units import SECONDS_PER_DAY
 
-# The first word of a cycle, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip
-# breaking), G84 (a tap, which feeds out to CLEAR too).
-KINDS = {"DRILL": "G81", "FACE": "G81", "CSINK": "G81", "DEEP": "G83", "BRKCHP": "G73", "TAP": "G84"}
-PAIRS = ("DEPTH", "CLEAR", "STEP", "RETURN", "DWELL")
-ALIASES = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}
-EXPAND = "have the CAM system write the moves of the cycle"
 HOME = "home is the control's: the way there is not part of the path"
 CIRCLE_AXIS = "a circle's axis"
 ROUNDING = 1e-3  # rad, of the arcs that make a whole turn
 GEOMETRY = re.compile(r"\(\s*(CIRCLE|CYLNDR|LINE)\s*/([^()]*)\)", re.IGNORECASE)
 PLANE = re.compile(r"\(\s*PLANE\s*/\s*PERPTO\s*,.*\)", re.IGNORECASE)
 POINT = re.compile(r"\(\s*POINT\s*/([^()]*)\)", re.IGNORECASE)
-
-
-def cycle(state: State, statement: Statement) -> None:
-    """The cycle that the next points drill; CYCLE/OFF ends it."""
-    state.no_circle("CYCLE/")
-    state.hole, arguments = None, list(statement.arguments)
-    kind = arguments.pop(0).text.upper() if arguments else ""
-    if kind in ("OFF", "NOMORE"):
-        return
-    if kind not in KINDS:
-        known = ", ".join(f"CYCLE/{known}" for known in (*KINDS, "OFF"))
-        raise state.fail(f"CYCLE/{kind} is not supported", known, EXPAND)
-    if arguments and arguments[0].text.upper() in ("DEEP", "BRKCHP"):  # NX, CAMplete: CYCLE/DRILL,DEEP
-        kind = arguments.pop(0).text.upper()
-    values = dict[str, float]()
-    for key, value in zip(arguments[::2], arguments[1::2], strict=False):
-        name = _name_in_cycle(state, key)
-        if name in values:
-            raise state.fail(f"{key.text} twice", "one", EXPAND, key)
-        values[name] = state.number(value, f"the number of {key.text}")
-        if name == "feed":
-            factor, state.hole_per_revolution = FEED_UNITS[key.text.upper()]
-            state.hole_feed = values["feed"] * (factor or state.scale)
-    if len(arguments) % 2:
-        raise state.fail(f"{arguments[-1].text!r} without its value", "a number", EXPAND, arguments[-1])
-    for needed in ("DEPTH", "feed", "CLEAR"):
-        if needed not in values:
-            raise state.fail(f"{statement.shown} without {needed}", "DEPTH, CLEAR and a feed as MMPM,100", EXPAND)
-    _check_cycle(state, KINDS[kind], values)
-    scale, dwell = state.scale, values.get("DWELL", 0.0)
-    state.hole = Drilling(
-        code="G82" if dwell and KINDS[kind] == "G81" else KINDS[kind],
-        bottom=-abs(values["DEPTH"]) * scale,
-        retract=values["CLEAR"] * scale,
-        clear=values.get("RETURN", values["CLEAR"]) * scale,
-        peck=values.get("STEP", 0.0) * scale,
-        dwell=dwell,
-        out_at_r=kind == "TAP",
-    )
-
-
-def _name_in_cycle(state: State, key: Argument) -> str:
-    """What a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
-    name = ALIASES.get(key.text.upper(), key.text.upper())
-    if name in FEED_UNITS:
-        return "feed"
-    if is_number(name):
-        found = "a cycle of numbers without words: their order depends on the CAM system"
-        raise state.fail(found, "pairs, as DEPTH,5", EXPAND, key)
-    if name not in PAIRS:
-        expected = "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed"
-        raise state.fail(f"CYCLE/ with {name}, which is not supported", expected, EXPAND, key)
-    return name
-
-
-def _check_cycle(state: State, code: str, values: dict[str, float]) -> None:
-    """Refuse a hole that cannot be, or of which systems mean different things; lengths in the file's unit."""
-    shown, pecks = state.statement.shown, code in ("G73", "G83")
-    depth, clear, step, dwell = (values.get(name, 0.0) for name in ("DEPTH", "CLEAR", "STEP", "DWELL"))
-    back = values.get("RETURN", clear)
-    if not depth or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= dwell <= SECONDS_PER_DAY:
-        raise state.fail(shown, "DEPTH and feed above 0, CLEAR and DWELL of 0 or more")
-    if "RETURN" in values and not back > 0.0:
-        raise state.fail("RETURN,0 goes to a plane of the CAM system's", "a height above the point", EXPAND)
-    if back < clear:
-        raise state.fail("a return below CLEAR", "a height of CLEAR or more")
-    if back != clear and "FEDTO" in state.statement.words:
-        found = "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate"
-        raise state.fail(found, "DEPTH", EXPAND)
-    if step and not pecks:
-        raise state.fail("STEP without DEEP or BRKCHP", "CYCLE/DEEP or CYCLE/BRKCHP")
-    if pecks and (not step > 0.0 or (clear + abs(depth)) / step > MOST_STROKES):
-        raise state.fail(f"{shown} without its STEP, or with one too small", "STEP above 0")
-    if dwell and pecks:
-        raise state.fail("DWELL in a cycle with pecks", "no DWELL", EXPAND)
 
 
 def goto(state: State, statement: Statement) -> None:
@@ -266,15 +177,15 @@ def _await_circle(state: State, circle: Circle) -> Circle:
     if state.point is None:
         raise state.fail("an arc before any point", "FROM/ or GOTO/ before it")
     if state.direction is not None:
-        axis = geometry.turned_as(circle.center, circle.axis, state.point, state.direction)
+        axis = circles.turned_as(circle.center, circle.axis, state.point, state.direction)
         circle, state.direction = replace(circle, axis=axis), None
     state.circle, state.circle_line, state.swept = circle, state.statement.line, 0.0
     # A straight move goes on into an arc smoothly, as it nearly always does, or would turn back.
-    tangent = geometry.cross(circle.axis, geometry.minus(state.point, circle.center))
-    angle = geometry.angle_of(tangent, state.heading) if state.heading is not None else math.nan
-    if angle < geometry.SMOOTH_DEG:
+    tangent = circles.cross(circle.axis, circles.minus(state.point, circle.center))
+    angle = angle_of(tangent, state.heading) if state.heading is not None else math.nan
+    if angle < circles.SMOOTH_DEG:
         state.smooth += 1
-    elif angle > 180.0 - geometry.SMOOTH_DEG:
+    elif angle > 180.0 - circles.SMOOTH_DEG:
         state.unsmooth += 1
         state.first_unsmooth = state.first_unsmooth or state.statement.line
     return circle
@@ -289,7 +200,7 @@ def _arc_through(state: State, targets: list[Vector], axis: Vector) -> None:
         if state.swept and circle.sweep is not None:
             raise state.fail("a second point of an arc whose ANGLE is given", "one point")
         assert state.point is not None
-        arc = geometry.arc_to(circle, state.point, target)
+        arc = circles.arc_to(circle, state.point, target)
         move(state, ARC, target, axis, arc)
         state.swept += arc.sweep
         if circle.sweep is None and state.swept > math.tau * circle.turns + ROUNDING:
@@ -310,7 +221,7 @@ def tlon(state: State, statement: Statement) -> None:
     line = _line(state, texts[2])
     circle = _await_circle(state, _circle(state, texts[0]))
     assert state.point is not None
-    _arc_through(state, [geometry.line_meets(circle, state.point, line, which)], state.next_axis)
+    _arc_through(state, [circles.line_meets(circle, state.point, line, which)], state.next_axis)
     state.followed = None
 
 
@@ -336,7 +247,7 @@ def _line(state: State, text: str) -> tuple[Vector, Vector]:
 
 
 def _geometry(text: str) -> tuple[str, list[float]]:
-    """Word and numbers of a geometry in parentheses; none of what is no such geometry."""
+    """Word and numbers of a geometry in parentheses; none of what is no such circles."""
     match = GEOMETRY.fullmatch(text)
     return (match[1].upper(), _numbers(match[2])) if match else ("", [])
 

@@ -1,9 +1,9 @@
 """Cutter-location files: the points, tool axes and feeds that CAM systems hand to post processors, in APT's words.
 
-`statements` splits lines; `vocabulary` is the table of words, whose functions are in `modes` and `motion`; each takes
-the `state` and a statement. `state` also makes moves of what `geometry` computes.
+`statements` splits lines; `vocabulary` is the table of words, whose functions are in `modes`, `motion` and `cycles`;
+each takes the `state` and a statement. `state` also makes moves of what `circles` and `tool_axes` compute.
 
-A file is read to `Program`, the same contract as the reader of G code, or checked, with all its errors.
+A file is read to `ReadProgram`, the same contract as the reader of G code, or checked, with all its errors.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from toolpath_stiff.nc.cutter_location.state import State
 from toolpath_stiff.nc.cutter_location.statements import Statement, frame_in_comment, plain_point, read_statement
 from toolpath_stiff.nc.cutter_location.vocabulary import execute
 from toolpath_stiff.nc.geometry import ArcError
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program, Unsupported
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Unsupported
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import any_statement
@@ -46,7 +46,7 @@ def not_for(controller: Controller, offsets: Offsets | None, block_delete: Switc
     )
 
 
-def read(request: Request) -> Program:
+def read(request: Request) -> ReadProgram:
     r"""Read a cutter-location file; lengths of the tool table win over the file's.
 
     Raises
@@ -58,13 +58,13 @@ def read(request: Request) -> Program:
     --------
     >>> from toolpath_stiff.nc.reader import parse_program
     >>> parse_program("UNITS/MM\nFEDRAT/600,MMPM\nFROM/0,0,50\nGOTO/0,0,0\nGOTO/40,0,0\nFINI\n", "part.apt")
-    <Program part.apt: 2 moves, read as cutter-location file>
+    <ReadProgram part.apt: 2 moves, read as cutter-location file>
     """
-    state = State(request.name, copy.deepcopy(request.tools), request.controller.feed)
+    state = State(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
     for error in run(state, request.lines):
         raise error
-    warnings = not_for(request.controller, request.offsets, request.block_delete)
-    return Program(
+    warnings = not_for(request.controller, request.work_offsets, request.block_delete)
+    return ReadProgram(
         name=request.name,
         path=request.path,
         source=request.lines,

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.cutter_location import geometry
-from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle
+from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, dot, minus
 from toolpath_stiff.nc.cutter_location.statements import NUMBERS, Argument, Statement, number
+from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
 from toolpath_stiff.nc.geometry import Drilling, Vector, point_on_arc, strokes
 from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Recorder, ToolUse
 from toolpath_stiff.nc.place import Place
@@ -159,7 +159,7 @@ class State:
 def stand(state: State, point: Vector, axis: Vector) -> None:
     """The tool stands somewhere; how it got there is not part of the path."""
     state.point, state.axis, state.heading = point, axis, None
-    state.angles = geometry.angles_near(axis, state.angles)
+    state.angles = angles_near(axis, state.angles)
     if axis != VERTICAL:
         state.assume(FREE_YAW)
 
@@ -177,7 +177,7 @@ def move(state: State, motion: int, target: Vector, axis: Vector, arc: Arc | Non
     turns, still = axis != first, target == start
     if still and not turns and arc is None:
         return
-    parts = geometry.division(first, axis) if turns else 1
+    parts = division(first, axis) if turns else 1
     feed = math.nan
     if motion != RAPID:
         if state.feed is None:
@@ -191,18 +191,18 @@ def move(state: State, motion: int, target: Vector, axis: Vector, arc: Arc | Non
             state.assume(TURN_FEED)
     if turns:
         state.assume(FREE_YAW)
-    whole = geometry.minus(target, start)
+    whole = minus(target, start)
     for part in range(1, parts + 1):
         share, end, turned, piece = part / parts, target, axis, arc
         if part < parts:
-            end = point_on_arc(arc, start, target, share) if arc else geometry.along(start, whole, share)
-            turned = geometry.on_great_circle(first, axis, share)
+            end = point_on_arc(arc, start, target, share) if arc else along(start, whole, share)
+            turned = on_great_circle(first, axis, share)
         if turns:
-            angles = geometry.angles_near(turned, angles)
+            angles = angles_near(turned, angles)
         if arc is not None and parts > 1:
-            climb = geometry.dot(geometry.minus(target, arc.center), arc.normal)
+            climb = dot(minus(target, arc.center), arc.normal)
             piece = replace(
-                arc, center=geometry.along(arc.center, arc.normal, climb * (part - 1) / parts), sweep=arc.sweep / parts
+                arc, center=along(arc.center, arc.normal, climb * (part - 1) / parts), sweep=arc.sweep / parts
             )
         _add(state, motion, end, angles, feed, piece)
     state.axis = axis
@@ -217,20 +217,20 @@ def drill(state: State, target: Vector, axis: Vector, hole: Drilling) -> None:
         )
     feed = state.feed_per_minute(state.hole_feed, state.hole_per_revolution)
     if state.point is None:
-        stand(state, geometry.along(target, axis, hole.clear), axis)
+        stand(state, along(target, axis, hole.clear), axis)
         state.assume(FIRST_POINT)
     assert state.point is not None
-    height = geometry.dot(geometry.minus(state.point, target), state.axis)
+    height = dot(minus(state.point, target), state.axis)
     level = max(height, hole.clear, hole.retract)
     # Up to the level of the holes first, where the tool is below it; then across, then down.
     stops = [
-        (geometry.along(state.point, axis, -height), level, RAPID, 0.0),
+        (along(state.point, axis, -height), level, RAPID, 0.0),
         (target, level, RAPID, 0.0),
         (target, hole.retract, RAPID, 0.0),
         *((target, stroke.height, CYCLE if stroke.feed else RAPID, stroke.dwell) for stroke in strokes(hole)),
     ]
     for foot, above, motion, dwell in stops:
-        point = geometry.along(foot, axis, above)
+        point = along(foot, axis, above)
         if math.dist(point, state.point) > 1e-9:
             _add(state, motion, point, state.angles, feed)
         if dwell:

@@ -8,10 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any
 
-from toolpath_stiff.nc.cutter_location import modes, motion
+from toolpath_stiff.nc.cutter_location import cycles, modes, motion
 from toolpath_stiff.nc.cutter_location.modes import FRAMES, HEADING, TOOL
 from toolpath_stiff.nc.cutter_location.state import State
 from toolpath_stiff.nc.cutter_location.statements import Statement, is_number, number
@@ -156,7 +155,7 @@ _ACTING = (
     Word("MOVARC", motion.movarc, _CIRCLE, AUTODESK, ISO, "/x,y,z,i,j,k,r,ANGLE,a"),
     Word("INDIRV", motion.indirv, _DIRECTION, CATIA_CREO, APT, "/i,j,k"),
     Word("TLON,GOFWD", motion.tlon, "the tool moves along a circle", CATIA_CREO, DASSAULT, "/(...),ON,(...)"),
-    Word("CYCLE", motion.cycle, "drilling cycle", ALL, PTC, _CYCLE_FORM),
+    Word("CYCLE", cycles.cycle, "drilling cycle", ALL, PTC, _CYCLE_FORM),
     Word("FEDRAT", modes.fedrat, "feed", ALL, ISO, "/number[,unit] or unit,number"),
     Word("SPINDL", modes.spindl, "spindle speed", ALL, ISO),
     Word("UNITS", modes.units, "length unit", f"{CREO}, {AUTODESK}", ISO, "/MM or INCHES"),
@@ -265,24 +264,3 @@ def execute(state: State, statement: Statement) -> None:
             f"{statement.shown}: {name} {UNKNOWN}, and may move the tool", GEOMETRY, "take the line out if it does not"
         )
     state.note(f"{name} {UNKNOWN}, and not acted upon", doubtful=True)
-
-
-def words_table() -> str:
-    r"""The words as a Markdown table, as it stands in docs/nc.md: neighbours with the same meaning share a row.
-
-    Examples
-    --------
-    >>> print("\n".join(words_table().splitlines()[:3]))
-    | words | taken for | | written by | source |
-    | --- | --- | --- | --- | --- |
-    | `GOTO/x,y,z[,i,j,k]` | the tool moves to a point | read | all | ISO 4343 |
-    """
-    lines = ["| words | taken for | | written by | source |", "| --- | --- | --- | --- | --- |"]
-    order = (READ, LISTED, DOUBTFUL, REFUSED)
-    words = sorted(WORDS.values(), key=lambda word: order.index(word.kind))
-    for (kind, meaning, by, source), group in groupby(
-        words, lambda word: (word.kind, word.meaning, word.written_by, word.source)
-    ):
-        names = " ".join(f"`{word.name}{word.form}`" for word in group)
-        lines.append(f"| {names} | {meaning} | {kind} | {by} | {source} |")
-    return "\n".join(lines) + "\n"

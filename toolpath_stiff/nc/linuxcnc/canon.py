@@ -12,19 +12,21 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, needs_tags, step_in_words, tool_numbers
+from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, step_in_words
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
-from toolpath_stiff.nc.tables import ToolEntry, tool_table_hint
+from toolpath_stiff.nc.request import ZERO
+from toolpath_stiff.nc.tables import Offsets, ToolEntry, tool_table_hint
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH
 
 CALL = re.compile(r"^ *\d+ +N(?:\.+|(\d+)) *([A-Z][A-Z0-9_]*)\((.*)\) *$", re.MULTILINE)
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
-PLANES = {"XY": geometry.PLANES["G17"], "XZ": geometry.PLANES["G18"], "YZ": geometry.PLANES["G19"]}
+PLANES = {"XY": "G17", "XZ": "G18", "YZ": "G19"}
 MOTION_CODE = re.compile(r"G0*(0|1|2|3|5|33|38|73|74|76|8\d)(?![\d])")
 CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
 MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
@@ -51,7 +53,9 @@ class Follower:
     name: str
     lines: Sequence[Line]
     tools: dict[int, ToolEntry] | None
-    posted: bool
+    posted: PostedKinematics | None
+    tagged: bool  # the copy carries its line numbers as comments
+    numbers: Sequence[int]  # of the tools, in the order of their table
     reference: Sequence[float] = (0.0, 0.0, 0.0)
     recorder: Recorder = field(default_factory=Recorder)
     used_tools: list[int] = field(default_factory=list)
@@ -59,12 +63,7 @@ class Follower:
     ended: bool = False
 
     scale: float = 1.0
-    plane: str = "XY"
-    g5x: Vector = field(default_factory=lambda: [0.0] * 6)
-    g92: Vector = field(default_factory=lambda: [0.0] * 6)
-    rotation: float = 0.0
-    tool_z: float = 0.0
-    position: Vector = field(default_factory=lambda: [0.0] * 6)
+    plane: str = "G17"
     feed: float = 0.0  # mm/min or mm/rev; degrees/min where only rotary axes move
     feed_scale: float = 1.0
     feed_line: int = 0
@@ -82,10 +81,9 @@ class Follower:
     raised: float = 0.0  # mm that changes of length since the last move added to Z's number
     lost: float = 0.0  # the same, where a tool change has made rs274 forget them
     moves_of_line: int = 0
-    from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
 
     def __post_init__(self) -> None:
-        self.tagged, self.numbers = needs_tags(self.lines), tool_numbers(self.tools, self.lines)
+        self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
 
     def follow(self, text: str) -> None:
         """Take every command. Raises `InputError` for what gives no path: probing, splines, tools of unknown length."""
@@ -104,19 +102,13 @@ class Follower:
         """An error of a line of the program."""
         return ProgramError(found, expected=expected, hint=hint, file=self.name, line=line or None)
 
-    def world(self, program: Vector) -> Vector:
-        """Control coordinates (mm, degrees) of a point as printed."""
-        s, g, o = self.scale, self.g92, self.g5x
-        x, y, z, a, b, c = program
-        x, y = _turned(x * s + g[0], y * s + g[1], self.rotation)
-        return [x + o[0], y + o[1], z * s + g[2] + o[2], a + g[3] + o[3], b + g[4] + o[4], c + g[5] + o[5]]
-
-    def _lengths(self, inner: str) -> Vector:
+    def _point(self, inner: str) -> Vector:
+        """X, Y, Z as printed in mm, A, B, C in degrees."""
         return [v * self.scale if i < 3 else v for i, v in enumerate(_numbers(inner)[:6])]
 
     def _on_use_length_units(self, inner: str) -> None:
         scale = MM_PER_INCH if "INCH" in inner else 1.0
-        if scale != self.scale and self.tool_z:
+        if scale != self.scale and self.frames.tool:
             raise self.fail(
                 self.reading,
                 "G20 or G21 changes the unit while a tool length is in force: LinuxCNC's rs274 loses the length",
@@ -128,19 +120,19 @@ class Follower:
             self.feed_scale = scale
 
     def _on_set_g5x_offset(self, inner: str) -> None:
-        self.g5x = self._lengths(inner.partition(",")[2])
+        self.frames.offsets.table[0].axes = self._point(inner.partition(",")[2])
         self.frame_changed = True
 
     def _on_set_g92_offset(self, inner: str) -> None:
-        self.g92 = self._lengths(inner)
+        self.frames.g92 = self._point(inner)
         self.frame_changed = True
 
     def _on_set_xy_rotation(self, inner: str) -> None:
-        rotation = math.radians(_numbers(inner)[0])
+        rotation, offset = _numbers(inner)[0], self.frames.offsets.table[0]
         # G10 that turns the offset in force: rs274 keeps the old numbers of axes that the next move does not name.
-        if rotation != self.rotation and "G10" in self._words(self.reading):
+        if rotation != offset.rotation and "G10" in self._words(self.reading):
             self.turned_by = self.reading
-        self.rotation = rotation
+        offset.rotation = rotation
         self.frame_changed = True
 
     def _no_length(self, words: str) -> InputError:
@@ -160,15 +152,15 @@ class Follower:
             raise self._no_length(words)
         if self.renamed and "G43" in words and "H" not in words and "G43.1" not in words:
             raise self.fail(self.reading, "G43 after M61: LinuxCNC's rs274 takes the length of the tool before", "H")
-        self.position[2] += self.tool_z - z
-        self.raised += self.tool_z - z
-        self.tool_z = z
+        self.raised += self.frames.tool - z
+        self.frames.set_tool(z)
         cancelled = z == 0.0 and "G49" in words
         self.tool_length = math.nan if cancelled or not self.reading else z
         self.frame_changed = True
 
     def _on_select_plane(self, inner: str) -> None:
-        self.plane = inner.removeprefix("CANON_PLANE_")
+        name = inner.removeprefix("CANON_PLANE_")
+        self.plane = PLANES.get(name, name)
 
     def _on_set_feed_rate(self, inner: str) -> None:
         self.feed, self.feed_scale, self.feed_line = _numbers(inner)[0], self.scale, self.reading
@@ -248,46 +240,55 @@ class Follower:
         self.ended = True
 
     def _on_straight_traverse(self, inner: str) -> None:
-        self._move(RAPID, self.world(_numbers(inner)))
+        self._move(RAPID, self._point(inner))
 
     def _on_straight_feed(self, inner: str) -> None:
-        self._move(CYCLE if self.cycle else FEED, self.world(_numbers(inner)))
+        self._move(CYCLE if self.cycle else FEED, self._point(inner))
 
     def _on_rigid_tap(self, inner: str) -> None:
         """Down and, the spindle reversed, back."""
-        here = list(self.position)
-        self._move(CYCLE, [*self.world([*_numbers(inner)[:3], 0.0, 0.0, 0.0])[:3], *here[3:]])
+        here = self.frames.to_program(self.frames.position)
+        self._move(CYCLE, [*self._point(inner)[:3], *here[3:]])
         self._move(CYCLE, here)
 
     def _on_arc_feed(self, inner: str) -> None:
-        e1, e2, c1, c2, turns, axis_end, a, b, c = _numbers(inner)
-        if self.plane not in PLANES:
+        e1, e2, c1, c2, turns, axis_end, *rotary = _numbers(inner)
+        scale = self.scale
+        if self.plane not in geometry.PLANES:
             raise self.fail(self.line, f"an arc in the plane {self.plane}", "G17, G18 or G19")
-        first, second, normal = PLANES[self.plane]
-        end = [0.0, 0.0, 0.0, a, b, c]
-        end[first], end[second], end[normal] = e1, e2, axis_end
-        self._move(ARC, self.world(end), (c1, c2, turns))
+        first, second, normal = geometry.PLANES[self.plane]
+        end = [0.0, 0.0, 0.0, *rotary]
+        end[first], end[second], end[normal] = e1 * scale, e2 * scale, axis_end * scale
+        self._move(ARC, end, (c1 * scale, c2 * scale, turns))
 
-    def _move(self, motion: int, end: Vector, arc: tuple[float, float, float] | None = None) -> None:
-        """One move to a point in control coordinates; an arc with its centre as printed and its turns."""
+    def _move(self, motion: int, target: Vector, arc: tuple[float, float, float] | None = None) -> None:
+        """One move to a point in program coordinates; an arc with its centre in the plane and its turns."""
+        end = self.frames.to_control(target)
         if self.lost and self.line:
             self._find_height(end)
         self.raised = 0.0
-        start, self.position = self.position, end
+        start, self.frames.position = self.frames.position, end
         if self.line == 0:  # one of the moves that the copy puts before the program
             self.frame_changed = False
             return
         if self.first_motion is None:
             self.first_motion = self.line
-        if self.turned_by:
-            self._check_turned()
+        if self.turned_by and not {"X", "Y"} <= set(self._words(self.line)):
+            raise self.fail(
+                self.turned_by,
+                "G10 turns the work offset in force, and the next move does not name both X and Y: "
+                "LinuxCNC's rs274 would take the old numbers for them",
+                "X and Y in the move that follows",
+            )
+        self.turned_by = 0
         if self.frame_changed:  # the same place in other numbers, up to the digits printed
             near = SAME_PLACE * self.scale
             start = [e if abs(e - s) < near else s for s, e in zip(start, end, strict=True)]
             self.frame_changed = False
         centred = self._arc(start, end, *arc) if arc else None
         shift = (*self.reference, 0.0, 0.0, 0.0)
-        start, end = ([value - zero for value, zero in zip(point, shift, strict=True)] for point in (start, end))
+        start = [value - zero for value, zero in zip(start, shift, strict=True)]
+        end = [value - zero for value, zero in zip(end, shift, strict=True)]
         feed = math.nan if motion == RAPID else self._feed_of(start, end, arc is not None)
         flags = self._machine_flags(start, end)
         added = self.recorder.add(self.line, motion, start, end, feed, self.tool, self.tool_length, flags, centred)
@@ -295,27 +296,26 @@ class Follower:
             self.used_tools.append(self.tool)
 
     def _arc(self, start: Vector, end: Vector, c1: float, c2: float, turns: float) -> Arc:
-        first, second, normal = PLANES[self.plane]
+        frames, (first, second, _) = self.frames, geometry.PLANES[self.plane]
         # In the plane the sweep is that of program coordinates, before any rotation.
-        here, there = self._unrotated(start), self._unrotated(end)
+        here, there = frames.to_program(start), frames.to_program(end)
         if max(abs(here[first] - there[first]), abs(here[second] - there[second])) < SAME_PLACE * self.scale:
             there = self._end_in_words(here, there, (first, second))
         middle = list(here)
-        middle[first], middle[second] = c1 * self.scale + self.g92[first], c2 * self.scale + self.g92[second]
+        middle[first], middle[second] = c1, c2
         beginning, ending, center = ((point[first], point[second]) for point in (here, there, middle))
         sweep = geometry.arc_sweep(beginning, ending, center, turns < 0, int(abs(turns)) or 1)
         try:
             geometry.check_bulge(math.dist(beginning, center), sweep)
         except geometry.ArcError as error:
             raise self.fail(self.line, error.found, error.expected) from None
-        middle[:2] = _turned(middle[0], middle[1], self.rotation)
-        x, y, z = (v + o - r for v, o, r in zip(middle, self.g5x[:3], self.reference, strict=True))
-        vector = [float(axis == normal) for axis in range(3)]
-        return Arc((x, y, z), (*_turned(vector[0], vector[1], self.rotation), vector[2]), sweep)
+        x, y, z = (c - r for c, r in zip(frames.to_control(middle), self.reference, strict=False))
+        return Arc((x, y, z), frames.turn_direction(geometry.normal_of(self.plane)), sweep)
 
     def _end_in_words(self, here: Vector, there: Vector, axes: tuple[int, int]) -> Vector:
         """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
-        step = None if self.incremental else step_in_words(self.lines, self.line, [AXES[axis] for axis in axes])
+        incremental = any("G" in line.words and "1" in DISTANCE_MODE.findall(line.plain) for line in self.lines)
+        step = None if incremental else step_in_words(self.lines, self.line, [AXES[axis] for axis in axes])
         if step is None or max(map(abs, step)) > SAME_PLACE:  # computed, or compensated
             if max(abs(here[axis] - there[axis]) for axis in axes) > ROUNDING * self.scale:
                 raise self.fail(
@@ -328,27 +328,6 @@ class Follower:
         for axis, length in zip(axes, step, strict=True):
             end[axis] += length * self.scale
         return end
-
-    @cached_property
-    def incremental(self) -> bool:
-        """Whether the program uses G91 anywhere."""
-        return any("G" in line.words and "1" in DISTANCE_MODE.findall(line.plain) for line in self.lines)
-
-    def _unrotated(self, control: Vector) -> Vector:
-        """Control coordinates less the work offset, turned back: those to which G92 adds."""
-        x, y, z = (p - o for p, o in zip(control[:3], self.g5x[:3], strict=True))
-        return [*_turned(x, y, -self.rotation), z]
-
-    def _check_turned(self) -> None:
-        words = self._words(self.line)
-        if not ("X" in words and "Y" in words):
-            raise self.fail(
-                self.turned_by,
-                "G10 turns the work offset in force, and the next move does not name both X and Y: "
-                "LinuxCNC's rs274 would take the old numbers for them",
-                "X and Y in the move that follows",
-            )
-        self.turned_by = 0
 
     def _find_height(self, end: Vector) -> None:
         """Until a move names Z, rs274 prints the number that Z had before the length changed."""
@@ -370,8 +349,7 @@ class Follower:
         """Whether start and end were given in machine coordinates (G53, G28, G30), axis by axis as in `Frames`."""
         if not self.tagged or (self.cycle and start == end):
             return (False, False)
-        of = slice(0, 3 if self.posted else 6)
-        was = any(self.from_machine[of])
+        was = self.frames.bound
         words = self._words(self.line)
         named = {AXES.index(letter) for letter in AXIS_WORD.findall(words)}
         named |= {0, 1} if {"@", "^"} & set(words) else set()
@@ -381,19 +359,12 @@ class Follower:
             named = named or (set(range(6)) if machine else set())
         self.moves_of_line += 1
         if self.cycle and not HOME_MOVE.search(words):  # to the hole at the height of before, or along the normal
-            normal = PLANES[self.plane][2]
+            normal = geometry.PLANES[self.plane][2]
             along = all(start[axis] == end[axis] for axis in range(6) if axis != normal)
             named = {normal} if along else named - {normal}
         for axis in named:
-            self.from_machine[axis] = machine
-        return (was, any(self.from_machine[of]))
-
-
-def _turned(x: float, y: float, rotation: float) -> tuple[float, float]:
-    if not rotation:
-        return (x, y)
-    cos, sin = math.cos(rotation), math.sin(rotation)
-    return (cos * x - sin * y, sin * x + cos * y)
+            self.frames.from_machine[axis] = machine
+        return (was, self.frames.bound)
 
 
 def _numbers(inner: str) -> Vector:

@@ -25,7 +25,7 @@ from toolpath_stiff.nc.linuxcnc.inputs import (
     tool_numbers,
 )
 from toolpath_stiff.nc.linuxcnc.runner import StoppedError, find_rs274, message_and_line, run_rs274
-from toolpath_stiff.nc.moves import Program, Unsupported
+from toolpath_stiff.nc.moves import ReadProgram, Unsupported
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START
 from toolpath_stiff.nc.tables import tool_of
@@ -46,7 +46,7 @@ MOST_NAMED = 5  # loops, in a message
 NO_SHIFT = (0.0, 0.0, 0.0)
 
 
-def read(request: Request, limits: Limits | None = None) -> Program:
+def read(request: Request, limits: Limits | None = None) -> ReadProgram:
     """A program as `rs274` reads it, within the limits of its run.
 
     Raises
@@ -84,9 +84,10 @@ class _Session:
         self, request: Request, lines: list[Line], rs274: str, dropped: Sequence[Dropped], limits: Limits | None
     ) -> None:
         self.request, self.lines, self.rs274, self.dropped, self.limits = request, lines, rs274, dropped, limits
-        self.offsets = copy.deepcopy(request.offsets)
+        self.offsets = copy.deepcopy(request.work_offsets)
+        self.tagged, self.tool_numbers = needs_tags(lines), tool_numbers(request.tool_table, lines)
 
-    def read(self) -> Program:
+    def read(self) -> ReadProgram:
         request = self.request
         origin, default_origin = request.zero
         shift = self._shift(origin, default_origin)
@@ -104,7 +105,7 @@ class _Session:
         if not follower.recorder.cuts:
             raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
         moves = follower.recorder.moves()
-        return Program(
+        return ReadProgram(
             name=request.name,
             path=request.path,
             source=request.lines,
@@ -114,7 +115,7 @@ class _Session:
             unsupported=tuple(self._unsupported()),
             warnings=(*self._warnings(source, given), *lathe_warning(self._turning(), moves)),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program", *self._left_out()),
-            tools=tuple(tool_of(request.tools, number).in_use() for number in follower.used_tools),
+            tools=tuple(tool_of(request.tool_table, number).in_use() for number in follower.used_tools),
             interpreter="linuxcnc",
             dialect="linuxcnc",
         )
@@ -172,15 +173,15 @@ class _Session:
 
     def _run(self, shift: Sequence[float], until: int | None = None) -> tuple[Run, Follower]:
         """Run the program, or its part before the line `until` is first executed."""
-        name, tools = self.request.name, self.request.tools
+        name = self.request.name
         prefix, active = self._prefix(shift)
         lines = [Line(line.number, "M2") if line.number == until else line for line in self.lines]
         switch = bool(self.request.switches)
         try:
             run = run_rs274(
-                numbered(lines, name, block_delete=switch, tags=needs_tags(self.lines), prefix=prefix),
+                numbered(lines, name, block_delete=switch, tags=self.tagged, prefix=prefix),
                 parameter_file(self.offsets, shift, active),
-                tool_file(tool_numbers(tools, self.lines), tools),
+                tool_file(self.tool_numbers, self.request.tool_table),
                 rs274=self.rs274,
                 limits=self.limits,
             )
@@ -195,7 +196,8 @@ class _Session:
 
     def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
         request = self.request
-        follower = Follower(request.name, self.lines, request.tools, request.posted is not None, reference)
+        tools = (request.tool_table, request.posted, self.tagged, self.tool_numbers)
+        follower = Follower(request.name, self.lines, *tools, reference)
         follower.follow(run.canon)
         return follower
 

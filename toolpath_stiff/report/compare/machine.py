@@ -54,7 +54,7 @@ def machine_png(found: Comparison) -> Figure:
     """PNG: glyphs on the machine from above, plane by plane, and from the front and the right."""
     data = found.data
     where = planes(data)
-    order = [*reversed(found.document["by_plane"])]
+    order = [*reversed(found.summary.by_plane)]
     along = directions(data)
     axes_shown = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     largest = _largest(found)
@@ -68,7 +68,7 @@ def machine_png(found: Comparison) -> Figure:
             place = (LEFT + i * pitch, 4.75, pitch - 0.45, pitch - 0.45)
             axes = figure.add_axes(_relative(place, width, height))
             _from_above(axes, found)
-            z = found.document["by_plane"][plane]["z_mm"]
+            z = found.summary.by_plane[plane].z_mm
             axes.set_title("from above" if len(order) == 1 else _plane_title(plane, z), fontsize=10)
             axes.set_xlabel("X mm", fontsize=9)
             if i == 0:

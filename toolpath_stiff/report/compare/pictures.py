@@ -51,7 +51,7 @@ def heading(figure: Figure, question: str, remark: str) -> None:
 def near_rows(found: Comparison) -> NDArray[np.bool_]:
     """(n,) readings that are not far off."""
     near = np.ones(len(found.residual), dtype=bool)
-    near[[one["reading"] - 1 for one in found.document["outliers"]]] = False
+    near[[reading.reading - 1 for reading in found.summary.outliers]] = False
     return near
 
 
@@ -167,8 +167,8 @@ def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict
     keys: list[Line2D | Patch] = []
     for axis, colour in DIRECTION_COLOURS.items():
         if (along == axis).any():
-            figures = found.document["by_direction"][axis]
-            mean, bias = figures["mean_abs_error_percent"], figures["bias_percent"]
+            errors = found.summary.by_direction[axis]
+            mean, bias = errors.mean_abs_error_percent, errors.bias_percent
             text = (
                 f"{axis}: mean error {mean:.1f} %, {abs(bias):.1f} % {'softer' if bias < 0 else 'stiffer'} on balance"
             )
@@ -251,13 +251,13 @@ def _changes(axes: Axes, setup: NDArray[np.str_], file: NDArray[np.str_], named:
 
 def _name_far_off(axes: Axes, found: Comparison, axis: str, residual: FloatArray) -> None:
     """File lines of the readings that are far off."""
-    for one in found.document["outliers"][:12]:
-        if one["direction"] != axis:
+    for far in found.summary.outliers[:12]:
+        if far.direction != axis:
             continue
-        i = one["reading"] - 1
+        i = far.reading - 1
         axes.plot(i + 1, residual[i], "o", ms=10, mfc="none", mec=UNREACHABLE_RED, mew=1.4, zorder=4)
         axes.annotate(
-            f"line {one['line']}", (i + 1, residual[i]), xytext=(8, 0), textcoords="offset points", va="center",
+            f"line {far.line}", (i + 1, residual[i]), xytext=(8, 0), textcoords="offset points", va="center",
             fontsize=8, color=UNREACHABLE_RED, zorder=5,
         )  # fmt: skip
 
@@ -269,7 +269,7 @@ def planes_png(found: Comparison) -> Figure:
     along, where = directions(data), planes(data)
     columns = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     columns += ["all"] if len(columns) > 1 else []
-    rows = [*reversed(found.document["by_plane"])]
+    rows = [*reversed(found.summary.by_plane)]
     rows += ["all"] if len(rows) > 1 else []
     near = near_rows(found)
     cells = np.full((len(rows), len(columns), 3), np.nan)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.comparison.residuals import Label, Variable
+    from toolpath_stiff.comparison.summary import PatternTest
 
 
 ACROSS = 5  # panels in a row
@@ -66,9 +66,9 @@ def variables_png(found: Comparison) -> Figure:
     panels: list[tuple[float, str, Variable | Label]] = []
     held_against: list[Variable | Label] = [*found.numbers, *found.names]
     for one in held_against:
-        tests = [t for t in found.document["tests"] if _about(t, one.name)]
-        p = min((t["p_adjusted"] for t in tests), default=1.0)
-        strongest = max((abs(t["statistic"]) for t in tests), default=0.0)
+        tests = [t for t in found.summary.tests if _about(t, one.name)]
+        p = min((t.p_adjusted for t in tests), default=1.0)
+        strongest = max((abs(t.statistic) for t in tests), default=0.0)
         panels.append((-strongest, f"p = {p:.2g}" + ("" if p >= SIGNIFICANT else " *"), one))
     panels.sort(key=lambda panel: panel[0])
     rows = -(-len(panels) // ACROSS)
@@ -104,9 +104,9 @@ def variables_png(found: Comparison) -> Figure:
         return figure
 
 
-def _about(test: Mapping[str, Any], name: str) -> bool:
+def _about(test: PatternTest, name: str) -> bool:
     """Whether a pattern is about this variable, or a level of this label, or the same as one that is."""
-    about = [test["variable"], *(same.partition(": ")[2] for same in test["same"])]
+    about = [test.variable, *(same.partition(": ")[2] for same in test.same)]
     return any(variable == name or variable.startswith(f"{name} ") for variable in about)
 
 

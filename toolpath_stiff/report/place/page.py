@@ -2,141 +2,21 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from typing import Any
-
-import numpy as np
-
-from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.placement.paths import DrawnPath, drawn_path
-from toolpath_stiff.placement.result import Placement
+from toolpath_stiff.placement.result import Placement, Refused, Written
 from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
-from toolpath_stiff.report.figure import page_colours
-from toolpath_stiff.report.pages import render
-from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, setup_sheet, workspace_picture
-from toolpath_stiff.report.words import machine_text, plain
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
-
-POINTS = (150, 800)  # of the path on the page, fewest and most
-
-
-ENDS = (0.05, 0.95)  # of the path's length, all placements together, between which the colours run
-
-
-VALUES = 48_000  # points times placements that the page holds, some 300 kB
-
-
-def place_page(placed: Placement) -> str:
-    """The page's text."""
-    best, present = placed.best, placed.present
-    shown = [*placed.front, *([present] if present else [])]
-    path = drawn_path(
-        best.model,
-        placed.program,
-        np.array([row.origin for row in shown]),
-        best.load,
-        force=best.force,
-        step=best.step,
-        points=int(np.clip(VALUES // len(shown), *POINTS)),
-    )
-    data = {
-        "front": [vars(row) for row in placed.front],
-        "chosen": (placed.chosen.number or 0) - 1,
-        "recommended": placed.search["recommended"] - 1,
-        "before": present.figures() if present else None,
-        "before_reason": plain(placed.present_reason),
-        "force": best.force,
-        "keepouts": [{"name": plain(box.name), "box": _box(box.low, box.high)} for box in placed.task.rules.keepouts],
-        "workspace": _workspace(best),
-        **_drawn(path),
-        **page_colours(),
-    }
-    return render(
-        "place.html",
-        styles=["viewer.css", "place.css"],
-        scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
-        data=data,
-        title=f"Placements of {placed.program.name}",
-        about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
-        objective=placed.objective,
-        load=str(best.load),
-        note=_note(path),
-        warnings=placed.warnings,
-    )
-
-
-def _drawn(path: DrawnPath) -> dict[str, Any]:
-    """The path in the program's axes and its stiffness; the tool's axis where it leans."""
-    stiffness = n_per_mm_from_n_per_m(path.stiffness)
-    about = np.isfinite(stiffness) & ~path.plunge
-    if not about.any():
-        about = np.isfinite(stiffness)
-    finite = stiffness[about]
-    length = np.broadcast_to(_lengths(path), stiffness.shape)[about]
-    low, high = _scale(finite, length)
-    digits = max(0, 5 - int(np.log10(max(float(finite.max()), 1.0))))  # six digits
-    leaning = bool((path.axis[:, 2] < 1.0 - 1e-12).any())
-    rounded = np.round(stiffness, digits)
-    values = (rounded if digits else np.nan_to_num(rounded).astype(np.int64)).tolist()
-    for row, column in np.argwhere(np.isnan(stiffness)):
-        values[row][column] = None
-    return {
-        "position": np.round(mm_from_m(path.position), 3).tolist(),
-        "axis": np.round(path.axis, 5).tolist() if leaning else None,
-        "s": np.round(mm_from_m(path.s), 2).tolist(),
-        "cut": path.cut.tolist(),
-        "plunge": path.plunge.tolist() if path.plunge.any() else None,
-        "stiffness": values,
-        "scale": [low, high],
-        "beyond": [bool(np.nanmin(stiffness) < low), bool(np.nanmax(stiffness) > high)],
-    }
-
-
-def _scale(stiffness: FloatArray, length: FloatArray) -> tuple[float, float]:
-    """Ends of the colour scale in N/mm: a few corners would otherwise take all the contrast."""
-    order = np.argsort(stiffness, kind="stable")
-    along = np.cumsum(length[order])
-    low, high = (float(v) for v in stiffness[order[np.searchsorted(along, np.array(ENDS) * along[-1])]])
-    return (low, high) if high > low * (1.0 + 1e-6) else (low * (1.0 - 1e-3), high * (1.0 + 1e-3))
-
-
-def _lengths(path: DrawnPath) -> FloatArray:
-    """(m,) length in m that each drawn point stands for: half the way to its neighbours in the same cut."""
-    step = np.where(np.diff(path.cut) == 0, np.diff(path.s), 0.0)
-    length = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
-    return np.asarray(length if length.any() else np.ones(len(length)))
-
-
-def _workspace(best: Analysis) -> list[list[float | None]]:
-    """Lower and upper corner in mm; None where the machine file sets no bound."""
-    corners = mm_from_m(best.machine.limits.workspace)
-    return [[round(float(v), 3) if np.isfinite(v) else None for v in corner] for corner in corners]
-
-
-def _box(low: Sequence[float], high: Sequence[float]) -> list[list[float]]:
-    return [[round(mm_from_m(v), 3) for v in corner] for corner in (low, high)]
-
-
-def _note(path: DrawnPath) -> str:
-    shown = len(path.s)
-    scale = f" Colours span the middle {100.0 * (ENDS[1] - ENDS[0]):.0f} % of the length at all placements"
-    scale += ", plunges left out." if path.plunge.any() else "."
-    if shown == path.samples:
-        return f"All {number(shown)} samples of the cutting path are drawn.{scale}"
-    return (
-        f"Drawn are {number(shown)} of the {number(path.samples)} samples of the cutting path, joined by straight "
-        "lines, each with the stiffness that was evaluated there; the figures in the table are of all samples." + scale
-    )
+from toolpath_stiff.report.place.html import place_page
+from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, workspace_picture
+from toolpath_stiff.report.place.sheet import setup_sheet
+from toolpath_stiff.report.words import machine_text
+from toolpath_stiff.units import number
 
 
 def text(placed: Placement) -> str:
-    """What got worse, the placement, what it brings, what it costs."""
+    """A placement in words: what got worse, the placement, what it brings, what it costs."""
     best, present, count = placed.chosen, placed.present, len(placed.front)
-    first = len(placed.worse) + bool(placed.search.get("nothing_better"))
+    first = len(placed.worse) + placed.search.nothing_better
     label = "picked" if placed.picked else "recommended"
     which = f"placement {best.number} of {count}, picked" if placed.picked else f"objective {placed.objective}"
     lines = [
@@ -164,7 +44,7 @@ def text(placed: Placement) -> str:
     lines.append(f"LinuxCNC        {blocks.linuxcnc or blocks.linuxcnc_reason}")
     fanuc = (blocks.fanuc or blocks.fanuc_reason).replace("\n", "\n                ")
     lines.append(f"Fanuc-style     {fanuc}")
-    evaluated = placed.search["pose_evaluations"]
+    evaluated = placed.search.pose_evaluations
     lines.append(f"front           {count} placements, {number(evaluated)} poses evaluated")
     lines += _written(placed.written) if placed.written else []
     lines += [f"warning         {warning}" for warning in placed.warnings[first:]]
@@ -178,17 +58,17 @@ def _figures_words(row: PlacementRow) -> str:
     )
 
 
-def _written(written: dict[str, Any]) -> list[str]:
-    """What became of the transformed program."""
-    if "refused" in written:
-        return [f"not rewritten   {written['file']}: {written['refused']}"]
-    at, apart = written["analysed_at"], written["relative_difference"]
+def _written(written: Written | Refused) -> list[str]:
+    """Lines on the transformed program."""
+    if isinstance(written, Refused):
+        return [f"not rewritten   {written.file}: {written.refused}"]
+    zero, apart = written.analysed_at, written.relative_difference
     figures = ", ".join(f"{name} {value:.1e}" for name, value in apart.items())
     lines = [
-        f"rewritten       {written['file']}; at X{at['x_mm']:g} Y{at['y_mm']:g} Z{at['z_mm']:g}, "
-        f"{at['rotation_deg']:g} degrees it differs from the placed program by (relative) {figures}"
+        f"rewritten       {written.file}; at X{zero['x_mm']:g} Y{zero['y_mm']:g} Z{zero['z_mm']:g}, "
+        f"{zero['rotation_deg']:g} degrees it differs from the placed program by (relative) {figures}"
     ]
-    return lines + [f"                {note}" for note in written["notes"]]
+    return lines + [f"                {note}" for note in written.notes]
 
 
 def names(plots: bool = True) -> tuple[str, ...]:
@@ -201,7 +81,7 @@ def files(placed: Placement, *, plots: bool = True) -> dict[str, Content]:
     """The front as a table, everything as JSON, and with `plots` page, pictures and set-up sheet."""
     contents: dict[str, Content] = {
         "placements.csv": csv_text(COLUMNS, ([_cell(value) for value in vars(row).values()] for row in placed.front)),
-        "placement.json": json.dumps(placed.to_dict(), indent=2) + "\n",
+        "placement.json": placed.to_json(),
     }
     if plots:
         contents["report.html"] = place_page(placed)

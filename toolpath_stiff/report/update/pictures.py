@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,64 +15,41 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
-def figure_of(step: Mapping[str, Any], name: str) -> float | None:
-    """A finite number of a step, or None."""
-    value = step.get(name)
-    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+    from toolpath_stiff.correction.result import Update
+    from toolpath_stiff.correction.strut_law import BarCurve
 
 
 @drawn
-def error_ladder_png(
-    steps: Sequence[Mapping[str, Any]],
-    noise_floor_percent: float | None = None,
-    title: str = "How the error falls",
-    turned_down: Sequence[Mapping[str, Any]] = (),
-) -> Figure:
+def error_ladder_png(update: Update) -> Figure:
     """PNG: mean error from the first model to the last, in sample and at left-out points, with the noise floor.
 
-    Parameters
-    ----------
-    steps
-        Each with `name`, `mean_abs_error_percent`, `held_out_error_percent`; optionally `held_out_se_percent`, the
-        standard error of the fall from the step before, and `remark`.
-    noise_floor_percent
-        Mean absolute error that scatter alone would leave: 0.80 times its standard deviation.
-    title
-        Heading.
-    turned_down
-        Further steps that were tried from the last one and not taken; keys as of `steps`.
+    What was tried from the last model and not taken stands beside it; bars are the standard errors of each fall.
     """
-    taken = len(steps)
-    steps = [*steps, *turned_down]
+    document, floor = update.document, update.document["noise_floor_percent"]
+    taken, down = document["steps"], document["rejected"]
+    steps = [*taken, *down]
     with house_style():
         figure = new_figure(max(11.0, 2.4 + 1.9 * len(steps)), 5.2)
         width, height = figure.get_size_inches()
-        figure.text(0.25 / width, 1.0 - 0.4 / height, plain(title), size=14, weight="bold")
+        title = "What does each step do to the error?"
+        figure.text(0.25 / width, 1.0 - 0.4 / height, title, size=14, weight="bold")
         axes = figure.add_axes((0.85 / width, 0.95 / height, 1.0 - 1.15 / width, 1.0 - 1.75 / height))
-        at = np.arange(len(steps))
+        places = np.arange(len(steps))
         held, inside = (
-            np.array(
-                [figure_of(step, key) if figure_of(step, key) is not None else np.nan for step in steps], dtype=float
-            )
+            np.array([step[key] for step in steps], dtype=float)
             for key in ("held_out_error_percent", "mean_abs_error_percent")
         )
-        _draw_steps(axes, held, inside, taken)
-        spread = np.array([figure_of(step, "held_out_se_percent") or 0.0 for step in steps])
+        _draw_steps(axes, held, inside, len(taken))
+        spread = np.array([step.get("held_out_se_percent") or 0.0 for step in steps])
         if spread.any():
-            axes.errorbar(at, held, yerr=spread, fmt="none", ecolor=BLUE, elinewidth=1.5, capsize=4, zorder=4)
-        if noise_floor_percent is not None:
-            axes.axhline(
-                noise_floor_percent, color=SECOND_ORANGE, ls=":", lw=1.5,
-                label=f"noise floor {percent(noise_floor_percent)}",
-            )  # fmt: skip
-        known = np.array([*held, *inside, noise_floor_percent or 0.0])
-        top = float(np.nanmax(known)) if np.isfinite(known).any() else 1.0
+            axes.errorbar(places, held, yerr=spread, fmt="none", ecolor=BLUE, elinewidth=1.5, capsize=4, zorder=4)
+        axes.axhline(floor, color=SECOND_ORANGE, ls=":", lw=1.5, label=f"noise floor {percent(floor)}")
         _name_values(axes, held, {"xytext": (9, 7), "color": BLUE})
         _name_values(axes, inside, {"xytext": (-9, -14), "color": MUTED, "size": 9, "ha": "right"})
-        axes.set_ylim(0.0, 1.25 * top or 1.0)
+        axes.set_ylim(0.0, 1.25 * float(np.nanmax([*held, *inside, floor])) or 1.0)
         axes.set_xlim(-0.4, len(steps) - 0.3)
-        axes.set_xticks(at, [_step_text(step) for step in steps], color=INK, size=9)
+        names = [*(_step_text(step["name"]) for step in taken), *(shortened(step["effect"], 24) for step in down)]
+        axes.set_xticks(places, names, color=INK, size=9)
         axes.set_ylabel("mean |modelled - measured| / measured, %", size=9.5)
         axes.grid(visible=False, axis="x")
         axes.spines[["top", "right"]].set_visible(False)
@@ -101,49 +77,27 @@ def _name_values(axes: Axes, values: FloatArray, style: dict[str, Any]) -> None:
             axes.annotate(percent(value), (x, value), textcoords="offset points", **style)
 
 
-def _step_text(step: Mapping[str, Any]) -> str:
-    lines = [shortened(plain(str(step.get("name") or "-")), 24)]
-    if step.get("remark"):
-        lines.append(shortened(plain(str(step["remark"])), 28))
-    return "\n".join(lines)
+def _step_text(name: str) -> str:
+    """The name of a step, with what its effect acts on below."""
+    choices = ", ".join(re.findall(r"\(([^)]*)\)", name))
+    lines = [shortened(plain(re.sub(r" \([^)]*\)", "", name)), 24), shortened(plain(choices), 28)]
+    return "\n".join(filter(None, lines))
 
 
 @drawn
-def figure3_png(
-    bars_N_per_m: Sequence[float] | FloatArray,
-    error_percent: Sequence[float] | FloatArray,
-    printed_points: Sequence[tuple[float, float]] = (),
-    refitted_percent: Sequence[float] | FloatArray = (),
-) -> Figure:
+def figure3_png(curve: BarCurve) -> Figure:
     """PNG of the paper's Figure 3: mean error against the stiffness of the platform's bars.
 
-    Parameters
-    ----------
-    bars_N_per_m
-        (n,) stiffness of each bar.
-    error_percent
-        (n,) mean error of the model with the machine's own strut law.
-    printed_points
-        (bar stiffness N/m, error %) that the paper prints or draws.
-    refitted_percent
-        (n,) with the strut law that makes the error smallest for each platform, if known.
+    With the machine's own strut law, and with the one that makes the error smallest for each platform.
     """
-    bars, errors = np.asarray(bars_N_per_m, dtype=float), np.asarray(error_percent, dtype=float)
+    bars, own, refitted = curve.bars[:-1], 100.0 * curve.error[:-1], 100.0 * curve.error_refitted[:-1]
     with house_style():
         figure = new_figure(11.0, 5.2)
         figure.text(0.03, 0.93, "How stiff must the platform be taken?", size=14, weight="bold")
         figure.text(0.03, 0.88, "Figure 3 of Clinton, Zhang and Wavering (1997), computed here", size=9.5, color=MUTED)
         axes = figure.add_axes((0.09, 0.13, 0.87, 0.68))
-        axes.plot(bars, errors, color=BLUE, lw=2.0, label="with the machine file's strut law")
-        if len(refitted_percent):
-            axes.plot(
-                bars, refitted_percent, color=MUTED, lw=1.5, ls="--", label="strut law refitted for each platform"
-            )
-        if len(printed_points):
-            printed = np.asarray(printed_points, dtype=float)
-            axes.plot(
-                printed[:, 0], printed[:, 1], "o", ms=8, mfc="white", mec=SECOND_ORANGE, mew=2.0, label="the paper"
-            )
+        axes.plot(bars, own, color=BLUE, lw=2.0, label="with the machine file's strut law")
+        axes.plot(bars, refitted, color=MUTED, lw=1.5, ls="--", label="strut law refitted for each platform")
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(lambda value, _: significant(value, 1))
         axes.set_xlabel("stiffness of each platform bar, N/m")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance
+from toolpath_stiff.stiffness.sizes import about
 
 REFERENCE_FORCE = 500.0  # N, force in the strut at which the compliance is given
 IDLE = 1e-3  # N: below, a strut adds nothing to the tip that could be measured, and the power law would diverge
@@ -26,11 +27,9 @@ class ContactNonlinearity(Effect):
     load_dependent = True
     needs = ("force_N",)
     parameters = (
-        Parameter(
-            name="compliance",
-            unit="nm/N",
-            si=1e-9,
-            bounds=(0.0, 200.0),
+        compliance(
+            "compliance",
+            largest=200.0,
             typical=(3.0, 20.0),
             source="Hertz: 7.5 nm/N a joint at 500 N for steel, ball in socket of effective radius 0.2 m (assumed)",
             meaning="secant compliance of one strut's contacts together, at 500 N in the strut",

@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, compliance
+from toolpath_stiff.stiffness.sizes import sizes_in_words
 
 EXPERIENCE = "engineering experience, no source: stiff machine frames are built for 100 to 500 N/um"
 
@@ -35,24 +36,8 @@ class FrameCompliance(Effect):
             meaning="which vertex; 0 is all three",
             kind="integer",
         ),
-        Parameter(
-            name="radial",
-            unit="nm/N",
-            si=1e-9,
-            bounds=(0.0, 200.0),
-            typical=(2.0, 10.0),
-            source=EXPERIENCE,
-            meaning="compliance of a vertex towards the machine's axis",
-        ),
-        Parameter(
-            name="vertical",
-            unit="nm/N",
-            si=1e-9,
-            bounds=(0.0, 200.0),
-            typical=(2.0, 10.0),
-            source=EXPERIENCE,
-            meaning="compliance of a vertex up and down",
-        ),
+        compliance("radial", 200.0, (2.0, 10.0), EXPERIENCE, "compliance of a vertex towards the machine's axis"),
+        compliance("vertical", 200.0, (2.0, 10.0), EXPERIENCE, "compliance of a vertex up and down"),
     )
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
@@ -63,9 +48,9 @@ class FrameCompliance(Effect):
                 continue
             outward = path.struts.directions[:, pair] @ radial
             upward = path.struts.directions[:, pair, 2]
-            own = p["radial"] * _outer(outward) + p["vertical"] * _outer(upward)
+            springs = p["radial"] * _outer(outward) + p["vertical"] * _outer(upward)
             first, last = pair
-            form[:, first : last + 1 : last - first, first : last + 1 : last - first] += own
+            form[:, first : last + 1 : last - first, first : last + 1 : last - first] += springs
         return form
 
     def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:

@@ -6,7 +6,8 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectError
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about, setup_parameter
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, setup_parameter
+from toolpath_stiff.stiffness.sizes import about
 
 ALONG = 0.999  # |d_axis| from which a reading counts as taken along that axis: 2.6 degrees, no one aligns better
 

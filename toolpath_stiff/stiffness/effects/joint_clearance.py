@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
+from toolpath_stiff.stiffness.sizes import about
 
 # N: a strut under less is idle. It would add less than g times this over F^2 to the tip's compliance, some 1e-14 m/N.
 IDLE = 1e-3

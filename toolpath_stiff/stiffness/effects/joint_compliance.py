@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance
+from toolpath_stiff.stiffness.sizes import about
 
 
 class JointCompliance(Effect):
@@ -20,11 +21,9 @@ class JointCompliance(Effect):
     equation = "c_i += c_j"
     source = "springs in series"
     parameters = (
-        Parameter(
-            name="compliance",
-            unit="nm/N",
-            si=1e-9,
-            bounds=(0.0, 200.0),
+        compliance(
+            "compliance",
+            largest=200.0,
             typical=(3.0, 20.0),
             source="two joints in series: 94 N/um each for a flexure joint (T. Dehaeze, test bench of flexible joints, "
             "by finite elements), over 100 N/um for a kinematic coupling (Schouten, Rosielle, Schellekens 1997); "

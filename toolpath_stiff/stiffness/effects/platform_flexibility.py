@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
+from toolpath_stiff.stiffness.sizes import about
 from toolpath_stiff.stiffness.truss import free_platform_flexibility
 from toolpath_stiff.units import n_per_um_from_n_per_m
 

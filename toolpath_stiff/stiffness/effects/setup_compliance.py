@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, setup_parameter, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance, setup_parameter
+from toolpath_stiff.stiffness.sizes import sizes_in_words
+
+EXPERIENCE = "engineering experience, no source"
 
 
 class SetupCompliance(Effect):
@@ -20,15 +23,7 @@ class SetupCompliance(Effect):
     parameters = (
         setup_parameter("name of the set-up"),
         *(
-            Parameter(
-                name=axis,
-                unit="nm/N",
-                si=1e-9,
-                bounds=(0.0, 200.0),
-                typical=(1.0, 10.0),
-                source="engineering experience, no source",
-                meaning=f"compliance of this set-up along {axis.upper()}",
-            )
+            compliance(axis, 200.0, (1.0, 10.0), EXPERIENCE, f"compliance of this set-up along {axis.upper()}")
             for axis in "xyz"
         ),
     )

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, at_the_tip, compliance
+from toolpath_stiff.stiffness.sizes import sizes_in_words
 
 
 class SpindleCompliance(Effect):
@@ -21,21 +22,17 @@ class SpindleCompliance(Effect):
     equation = "c += (R^T d)^T diag(c_r, c_r, c_a) (R^T d)"
     source = "springs in series; the load's components in platform axes"
     parameters = (
-        Parameter(
-            name="radial",
-            unit="nm/N",
-            si=1e-9,
-            bounds=(0.0, 1000.0),
+        compliance(
+            "radial",
+            largest=1000.0,
             typical=(1.0, 30.0),
             source="FAG spindle bearing catalogue, pairs 7014 to 7020: 0.4 to 1.8 nm/N at the bearings; M. Tsutsumi in "
             "Modular Design for Machine Tools, p. 446: 25 to 100 nm/N for a 45 x 160 mm arm in HSK-A63 or ISO 40",
             meaning="compliance across the tool axis",
         ),
-        Parameter(
-            name="axial",
-            unit="nm/N",
-            si=1e-9,
-            bounds=(0.0, 1000.0),
+        compliance(
+            "axial",
+            largest=1000.0,
             typical=(2.6, 7.9),
             source="FAG spindle bearing catalogue, pairs 7014 to 7020, medium preload: 127 to 387 N/um",
             meaning="compliance along the tool axis",
@@ -44,10 +41,8 @@ class SpindleCompliance(Effect):
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Quadratic form of the tip force alone."""
-        form = np.zeros((len(path), 12, 12))
-        own = np.diag([p["radial"], p["radial"], p["axial"]])
-        form[:, 6:9, 6:9] = path.rotation @ own @ np.swapaxes(path.rotation, 1, 2)
-        return form
+        on_platform = np.diag([p["radial"], p["radial"], p["axial"]])
+        return at_the_tip(path, path.rotation @ on_platform @ np.swapaxes(path.rotation, 1, 2))
 
     def finding(self, p: Values) -> str:
         """Which part gives way, by how much."""

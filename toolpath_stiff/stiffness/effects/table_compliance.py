@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, sizes_in_words
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, at_the_tip, compliance
+from toolpath_stiff.stiffness.sizes import sizes_in_words
 
 EXPERIENCE = "engineering experience, no source: machine beds are built for 100 to 500 N/um"
 
@@ -24,15 +25,7 @@ class TableCompliance(Effect):
     source = "springs in series, base axes"
     parameters = (
         *(
-            Parameter(
-                name=axis,
-                unit="nm/N",
-                si=1e-9,
-                bounds=(0.0, 200.0),
-                typical=(2.0, 10.0),
-                source=EXPERIENCE,
-                meaning=f"compliance of the table along {axis.upper()}",
-            )
+            compliance(axis, 200.0, (2.0, 10.0), EXPERIENCE, f"compliance of the table along {axis.upper()}")
             for axis in "xyz"
         ),
         Parameter(
@@ -52,9 +45,8 @@ class TableCompliance(Effect):
         moment = np.zeros((len(path), 2, 3))  # (p x F)_x and (p x F)_y per component of F
         moment[:, 0, 1], moment[:, 0, 2] = -z, y
         moment[:, 1, 0], moment[:, 1, 2] = z, -x
-        form = np.zeros((len(path), 12, 12))
-        form[:, 6:9, 6:9] = np.diag([p["x"], p["y"], p["z"]]) + p["rocking"] * np.swapaxes(moment, 1, 2) @ moment
-        return form
+        shift = np.diag([p["x"], p["y"], p["z"]])
+        return at_the_tip(path, shift + p["rocking"] * np.swapaxes(moment, 1, 2) @ moment)
 
     def finding(self, p: Values) -> str:
         """Which part gives way, by how much."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, about
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
+from toolpath_stiff.stiffness.sizes import about
 
 
 class ThermalDrift(Effect):

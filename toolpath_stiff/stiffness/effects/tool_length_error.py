@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.contract import Effect, Values, about, length_error
+from toolpath_stiff.stiffness.contract import Effect, Values, length_error
+from toolpath_stiff.stiffness.sizes import about
 
 
 class ToolLengthError(Effect):

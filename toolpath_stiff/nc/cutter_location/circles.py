@@ -1,6 +1,4 @@
-"""Geometry of a cutter-location file, which knows no file: circles in mm, tool axes in degrees.
-
-Circles: which way round, how far, and whether start, end and radius agree.
+"""Circles of a cutter-location file in mm: which way round, how far, and whether start, end and radius agree.
 
 - `CIRCLE/x,y,z,i,j,k,r`: by the right hand about i, j, k (PTC, "CL Output for Circular Interpolation").
 - `CIRCLE/x,y,z,i,j,k`: by the right hand too (files of a post for CAMplete, whose arcs enter smoothly so).
@@ -8,20 +6,11 @@ Circles: which way round, how far, and whether start, end and radius agree.
   Autodesk's post for CAMplete).
 - `MOVARC/x,y,z,i,j,k,r,ANGLE,a`: by the right hand (ISO 4343; Autodesk's post for it).
 - `INDIRV/i,j,k` before `CIRCLE/x,y,z,r` or `TLON,GOFWD/(CIRCLE/...)`: the direction at the start.
-
-Tool axes as roll and pitch, and moves divided where the axis turns. A machine that is told two tool axes turns the tool
-in their plane, along the great circle between them. Our moves turn
-roll and pitch linearly. On the unit sphere with roll a as latitude and pitch b as longitude a geodesic of angle t has
-a'' = -sin a cos a b'^2 and b'' = 2 tan a a' b' (do Carmo, "Differential Geometry of Curves and Surfaces", 4-4). With
-y = cos a b' / t, which is the share of its speed across, both together are tan|a| y sqrt(4 - 3 y^2) t^2 long, and the
-linear interpolation departs by at most an eighth of the largest of them. Along the geodesic y cos a is constant
-(Clairaut), the y component of its normal.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.geometry import (
@@ -30,7 +19,6 @@ from toolpath_stiff.nc.geometry import (
     Point2,
     Vector,
     check_bulge,
-    roll_pitch_of_axis,
 )
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
@@ -44,10 +32,6 @@ LARGEST_DIFFERENCE = 0.127
 ROUNDING_MM = 2.0 * math.sqrt(3.0) * 0.5e-4 * MM_PER_INCH
 SMOOTH_DEG = 5.0  # a path that enters an arc within this of its tangent enters it smoothly
 SWEEP_TOLERANCE_DEG = 0.05
-AXIS_TOLERANCE = 1e-3  # of the length of a unit vector: four decimals and a little more
-GREAT_CIRCLE_DEG = 0.01  # how far the tool axis may leave the great circle within a move
-STEEPEST = 89.0  # deg of roll up to which that holds; at 90 pitch is not defined
-TURNED_OVER = 179.0  # deg: beyond, two axes do not say in which plane the tool turns
 
 
 @dataclass(frozen=True)
@@ -185,71 +169,3 @@ def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which
     rise = dot(minus(start, circle.center), circle.axis)
     flat = along(along(circle.center, first, x), second, y)
     return along(flat, circle.axis, rise)
-
-
-def unit_axis(numbers: Sequence[float], what: str = "a tool axis") -> Vector:
-    """An axis of length 1. Raises `ArcError` if the given one is further off than `AXIS_TOLERANCE`."""
-    i, j, k = numbers
-    length = math.sqrt(i * i + j * j + k * k)
-    if abs(length - 1.0) > AXIS_TOLERANCE:
-        raise ArcError(f"{what} {i:g},{j:g},{k:g} of length {length:.6g}", f"a unit vector, within {AXIS_TOLERANCE:g}")
-    return (i / length, j / length, k / length)
-
-
-def angles_near(axis: Vector, near: tuple[float, float]) -> tuple[float, float]:
-    """Roll and pitch of a unit tool axis, the pitch within half a turn of the one before."""
-    i, j, k = axis
-    roll, pitch = roll_pitch_of_axis(i, j, k)
-    if i * i + k * k < 1e-18:  # along Y any pitch gives this axis
-        return roll, near[1]
-    # Adding 0 makes a 0 of -0.
-    return roll + 0.0, pitch + 360.0 * round((near[1] - pitch) / 360.0)
-
-
-def angle_between(first: Vector, second: Vector) -> float:
-    """Degrees between two unit vectors; exact for small ones too."""
-    return math.degrees(2.0 * math.asin(min(1.0, math.dist(first, second) / 2.0)))
-
-
-def angle_of(first: Vector, second: Vector) -> float:
-    """Degrees between two vectors of any length, nan where one has none."""
-    x, y, z = cross(first, second)
-    if min(dot(first, first), dot(second, second)) < 1e-18:
-        return math.nan
-    return math.degrees(math.atan2(math.sqrt(x * x + y * y + z * z), dot(first, second)))
-
-
-def division(first: Vector, second: Vector) -> int:
-    """Into how many equal parts a turn of the tool axis is divided. Raises `ArcError` where it turns over."""
-    chord = math.dist(first, second)
-    if chord < 0.008 and abs(first[1]) < 0.9 and abs(second[1]) < 0.9:
-        return 1  # half a degree and less, of a tool well away from Y: what most moves turn by
-    angle = angle_between(first, second)
-    if angle > TURNED_OVER:
-        raise ArcError(f"a tool axis that turns over by {angle:.1f} degrees within one move", "points in between")
-    turn = math.radians(angle)
-    steepest = math.radians(min(_steepest_roll(first, second, turn), STEEPEST))
-    normal_y = abs(first[2] * second[0] - first[0] * second[2]) / math.sin(turn)
-    across = min((normal_y / math.cos(steepest)) ** 2, 2.0 / 3.0)  # y^2; beyond 2/3 y sqrt(4 - 3 y^2) falls again
-    departure = math.sqrt(across * (4.0 - 3.0 * across)) * math.tan(steepest) * turn**2 / 8.0
-    return max(1, math.ceil(math.sqrt(departure / math.radians(GREAT_CIRCLE_DEG))))
-
-
-def _steepest_roll(first: Vector, second: Vector, angle: float) -> float:
-    """Greatest roll in degrees on the way: sin(roll) is -j, and j = j0 cos t + g sin t along the great circle."""
-    sine = max(abs(first[1]), abs(second[1]))
-    if angle > 1e-9:
-        growth = (second[1] - first[1] * math.cos(angle)) / math.sin(angle)
-        if 0.0 < math.atan2(growth, first[1]) % math.pi < angle:
-            sine = math.hypot(first[1], growth)
-    return math.degrees(math.asin(min(sine, 1.0)))
-
-
-def on_great_circle(first: Vector, second: Vector, share: float) -> Vector:
-    """The unit vector at a share of the way from one to another."""
-    angle = math.radians(angle_between(first, second))
-    if angle < 1e-9:
-        return second
-    near, far = math.sin((1.0 - share) * angle) / math.sin(angle), math.sin(share * angle) / math.sin(angle)
-    x, y, z = (near * a + far * b for a, b in zip(first, second, strict=True))
-    return (x, y, z)

@@ -1,0 +1,101 @@
+"""A pattern that residuals show, in a sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.comparison.residuals import ALL
+from toolpath_stiff.comparison.structure import SIGNIFICANT, FoundPattern, Pattern
+from toolpath_stiff.stiffness.sizes import about
+
+NOUGHT = 0.3  # of a course's change: a residual below is nothing beside it
+
+
+SHARE = "share_of_strut_"  # of the compliance; the strut's number follows
+
+
+def sentence(finding: FoundPattern, residual: FloatArray, first: bool) -> tuple[str, float]:
+    """A finding in words, and its size in per cent: of a level the readings' mean, of a slope the change end to end.
+
+    `first`: nothing was found before it, so that what it says is what the readings show as they are.
+    """
+    pattern = finding.pattern
+    who = {ALL: "all directions", "oblique": "oblique directions"}.get(pattern.direction, f"along {pattern.direction}")
+    mean, count = float(residual[pattern.rows].mean()), int(pattern.rows.sum())
+    readings = f"({count} reading{'' if count == 1 else 's'})"
+    if pattern.given is None:
+        return _level(finding, _capital(who), mean, readings, first)
+    x = pattern.values[pattern.rows]
+    if pattern.kind == "curve":
+        middle, ends = finding.coefficient * float(x.min()), finding.coefficient * float(x.max())
+        size = percent(middle - ends)
+        how = "stiffer" if middle > ends else "softer"
+        return (
+            f"{_capital(who)} {how} against the model at middling values of {pattern.place} than at its extremes, by "
+            f"{abs(size):.2g} % {readings}"
+        ), size
+    values = pattern.given[pattern.rows]
+    ends_at = [int(np.argmin(values)), int(np.argmax(values))]
+    low, high = values[ends_at].tolist()
+    first_end, last_end = (mean + finding.coefficient * float(x[i]) for i in ends_at)
+    size = percent(last_end - first_end)
+    unit = f" {pattern.unit}".rstrip()
+    largest = float(np.abs(values).max())
+    text = (
+        f"{who} {'stiffer' if size > 0 else 'softer'} against the model as {pattern.place} grows, from "
+        f"{percent(first_end):+.2g} % at {_short(low, largest)}{unit} to "
+        f"{percent(last_end):+.2g} % at {_short(high, largest)}{unit} {readings}"
+    )
+    cause = ""
+    if finding.p_adjusted < SIGNIFICANT:
+        cause = _as_if(pattern, first_end, last_end, low / 100.0, high / 100.0)
+    return (f"{cause}: {text}" if cause else _capital(text)), size
+
+
+def _as_if(pattern: Pattern, first: float, last: float, low: float, high: float) -> str:
+    """Which strut of what stiffness would make such a course from its low to its high share of the compliance, or "".
+
+    A strut's stiffness times f adds share (1 / f - 1) to the compliance, and nothing where the share is nothing.
+    """
+    if not pattern.variable.startswith(SHARE) or pattern.direction != ALL or high <= low:
+        return ""
+    change = last - first
+    without = first - change * low / (high - low)
+    softer = 1.0 + float(np.expm1(-change)) / (high - low)
+    if softer <= 0.0 or abs(without) > NOUGHT * abs(change):
+        return ""
+    off = 100.0 * (1.0 / softer - 1.0)
+    strut = pattern.variable.removeprefix(SHARE)
+    return f"As if strut {strut} were about {about(off)} % too {'soft' if off < 0.0 else 'stiff'}"
+
+
+def _level(finding: FoundPattern, who: str, mean: float, readings: str, first: bool) -> tuple[str, float]:
+    pattern, coefficient = finding.pattern, finding.coefficient
+    place = f" {pattern.place}" if pattern.place else " everywhere" if pattern.direction == ALL else ""
+    size, beside = percent(mean), percent(coefficient)
+    whole = f"{abs(size):.2g} % {_side(size)} than modelled"
+    if first or (mean * coefficient > 0 and abs(mean) > 0.5 * abs(coefficient)):
+        return f"{who} {whole}{place} {readings}", size
+    text = f"{who} {abs(beside):.2g} % {_side(beside)}{place} than the findings above explain: {whole} {readings}"
+    return text, beside
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _short(value: float, largest: float) -> str:
+    """A value to three digits; 0 where it is nothing beside the others."""
+    if abs(value) < 1e-3 * largest:
+        return "0"
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+
+
+def _side(change: float) -> str:
+    return "softer" if change < 0.0 else "stiffer"
+
+
+def percent(log_ratio: float) -> float:
+    """A logarithm of a ratio as a change in per cent."""
+    return float(100.0 * np.expm1(log_ratio))

@@ -1,0 +1,179 @@
+"""What a machine file may hold: sections, keys, units, bounds; and values held against it, one fault a message."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputError, MachineFileError
+from toolpath_stiff.machine.model import ORIGINS
+from toolpath_stiff.toml_reader import TomlReader, is_number, is_text, shortened
+
+
+class MachineToml(TomlReader):
+    """The text of a machine file, and errors at its sections and keys."""
+
+    def fault(self, section: str, key: str, mistake: str, expected: str = "", hint: str = "") -> InputError:
+        """An error at a key of a section, or at the section itself."""
+        label = f"[{section}] {key}".strip() if section else key
+        line = self.line_of(section, key)
+        return MachineFileError(f"{label}{mistake}", expected=expected, hint=hint, file=self.file, line=line)
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a key of a machine file may hold.
+
+    `shape` () for a number, (3,) or (6, 3) for lists; `also_length` admits a second length, `many` any greater one,
+    `or_one` a single number instead of a list.
+    Bounds are inclusive unless `open_low`.
+    """
+
+    unit: str = ""
+    shape: tuple[int, ...] = ()
+    low: float = -1e5
+    high: float = 1e5
+    required: bool = True
+    text: bool = False
+    infinite: bool = False
+    open_low: bool = False
+    also_length: int | None = None
+    many: bool = False
+    or_one: bool = False
+
+    @property
+    def expected(self) -> str:
+        """What the key may hold, in words."""
+        if self.text:
+            return "a text"
+        count = " rows of ".join(map(str, self.shape))
+        if self.also_length:
+            count += f" or {self.also_length}"
+        if self.many:
+            count = f"{'a number or ' if self.or_one else ''}{count} or more"
+        unit = f" in {self.unit}" if self.unit else ""
+        low = f"above {self.low:g}" if self.open_low else f"at least {self.low:g}"
+        high = "" if math.isinf(self.high) else f", at most {self.high:g}"
+        return f"{f'{count} numbers' if self.shape else 'a number'}{unit}, {low}{high}"
+
+    def fits(self, shape: tuple[int, ...]) -> bool:
+        """Whether numbers of a shape will do."""
+        if self.many and len(shape) == 1:
+            return shape[0] >= self.shape[0]
+        return shape in (self.shape, (self.also_length,)) or (self.or_one and not shape)
+
+
+JOINTS = {
+    "mm": Key(unit="mm", shape=(6, 3), required=False),
+    # Rows of radius, angle about Z, height: keeps the symmetry of a machine exact, and reads better.
+    "cylindrical_mm_deg": Key(unit="mm, deg, mm", shape=(6, 3), required=False),
+}
+ANGLE = Key(unit="deg", low=0.0, high=180.0, open_low=True, infinite=True)
+CORNER = Key(unit="mm", shape=(3,))
+
+SECTIONS: dict[str, dict[str, Key]] = {
+    "": {"name": Key(text=True), "title": Key(text=True, required=False), "source": Key(text=True, required=False)},
+    **dict.fromkeys(("frame_joints", "platform_joints"), JOINTS),
+    "reference_tool": {"length_mm": Key(unit="mm", low=0.0, high=2000.0)},
+    "strut_law": {
+        "length_mm": Key(unit="mm", shape=(2,), low=0.0, open_low=True, required=False, many=True),
+        "stiffness_N_per_um": Key(unit="N/um", shape=(2,), low=1e-6, high=1e5, many=True, or_one=True),
+    },
+    "platform": {"bar_stiffness_N_per_m": Key(unit="N/m", low=1e5, high=math.inf, infinite=True, open_low=True)},
+    "limits.strut_length": {"min_mm": Key(unit="mm", low=0.0), "max_mm": Key(unit="mm", low=0.0, open_low=True)},
+    "limits.joint_angle": {
+        "frame_max_deg": ANGLE,
+        "platform_max_deg": ANGLE,
+        "neutral_pose_mm_deg": Key(unit="mm, deg", shape=(6,)),
+    },
+    "limits.workspace": {"min_mm": CORNER, "max_mm": CORNER},
+    "limits.singularity": {"min_index": Key(low=0.0, high=1.0)},
+    "setup": {
+        "default_origin_mm": Key(unit="mm[, deg]", shape=(3,), also_length=6),
+        "rapid_mm_per_min": Key(unit="mm/min", low=0.0, high=1e6, open_low=True),
+        "name": Key(text=True, required=False),
+        "names": Key(text=True, shape=(0,), required=False),
+        "temperature_C": Key(unit="degrees C", low=-50.0, high=200.0, required=False),
+    },
+}
+OPTIONAL_SECTIONS = ("limits.joint_angle", "limits.workspace", "limits.singularity", "platform", "setup")
+BESIDE = ("effect", "instrument", "uncertainty")  # sections that others read
+
+Sections = dict[str, dict[str, Any]]  # section -> key -> value in the units of the file; lists as arrays
+
+
+def read_sections(toml: MachineToml) -> Sections:
+    """The sections of the schema, each key checked; unknown and missing ones are errors."""
+    sections: Sections = {"": {}}
+    for name, content in toml.data.items():
+        nested = name == "limits" and isinstance(content, dict)
+        for full, part in ((f"limits.{key}", part) for key, part in content.items()) if nested else [(name, content)]:
+            if full in BESIDE:
+                continue
+            if full in SECTIONS:
+                if not isinstance(part, dict):
+                    raise toml.fault("", full, f" = {part!r}", expected=f"a section [{full}]")
+                sections[full] = part
+            elif nested or isinstance(part, dict):
+                known = ", ".join(f"[{section}]" for section in SECTIONS if section)
+                expected = f"one of {known}, [[effect]], [[instrument]], [uncertainty]"
+                raise MachineFileError(
+                    f"unknown section [{full}]", expected=expected, file=toml.file, line=toml.line_at(full)
+                )
+            else:
+                sections[""][full] = part
+    for name in SECTIONS:
+        if name not in sections and name not in OPTIONAL_SECTIONS:
+            hint = "`tps machine new template.toml` writes a template with every section"
+            raise MachineFileError(f"section [{name}] is missing", hint=hint, file=toml.file)
+    return {name: _section(toml, name, content) for name, content in sections.items()}
+
+
+def _section(toml: MachineToml, name: str, content: dict[str, Any]) -> dict[str, Any]:
+    keys = SECTIONS[name]
+    allowed = [*keys, *(("origin", "remark") if name else ())]
+    for key in content:
+        if key not in allowed:
+            raise toml.fault(name, key, ": unknown key", expected=f"one of {', '.join(allowed)}")
+    for key, rule in keys.items():
+        if rule.required and key not in content:
+            raise toml.fault(name, key, " is missing", expected=rule.expected)
+    if name and name != "setup" and content.get("origin") not in ORIGINS:
+        mistake = f" = {content['origin']!r}" if "origin" in content else " is missing"
+        raise toml.fault(name, "origin", mistake, expected=f"one of {', '.join(ORIGINS)}")
+    return {key: _value(toml, name, key, v, keys[key]) if key in keys else str(v) for key, v in content.items()}
+
+
+def _value(toml: MachineToml, section: str, key: str, raw: Any, rule: Key) -> Any:
+    if rule.text:
+        names = raw if rule.shape else [raw]
+        if not isinstance(names, list) or not all(map(is_text, names)) or len(set(names)) < len(names):
+            expected = "a list of names, each once" if rule.shape else "a text that is not empty"
+            raise toml.fault(section, key, f" = {shortened(raw)}", expected)
+        return tuple(names) if rule.shape else raw
+    array = as_array(raw)
+    if array is None or not rule.fits(array.shape):
+        raise toml.fault(section, key, f" = {shortened(raw)}", rule.expected)
+    bad = np.isnan(array) | (array < rule.low) | (array > rule.high)
+    bad |= (rule.open_low & (array <= rule.low)) | (not rule.infinite) & np.isinf(array)
+    if bad.any():
+        raise toml.fault(section, key, f" = {float(array[bad][0]):g}", rule.expected)
+    return float(array) if array.ndim == 0 else array
+
+
+def as_array(raw: Any) -> FloatArray | None:
+    """A float array of TOML numbers and lists of them; None for anything else (booleans too)."""
+
+    def numeric(item: Any) -> bool:
+        return all(map(numeric, item)) if isinstance(item, list) else is_number(item)
+
+    if not numeric(raw):
+        return None
+    try:
+        return np.array(raw, dtype=float)
+    except ValueError:  # rows of unequal length
+        return None

@@ -1,0 +1,98 @@
+"""CYCLE/ of a cutter-location file: the holes that the next points drill.
+
+A cycle comes in pairs of a word and its value. Read is what systems agree on: `DEPTH` or `FEDTO` counts from the GOTO
+point into the hole along the tool axis, `CLEAR` from it outwards (PTC, "CL Output for Holemaking Cycles"; Autodesk's
+post for CAMplete; Siemens NX writes FEDTO below zero). The rest is refused by name: numbers without words, whose order
+depends on the system; RAPTO, which Creo counts from CLEAR and others from the surface; RETURN,0 and RTRCTO,AUTO, which
+go to planes that are not in the file.
+"""
+
+from __future__ import annotations
+
+from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
+from toolpath_stiff.nc.cutter_location.state import State
+from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number
+from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling
+from toolpath_stiff.units import SECONDS_PER_DAY
+
+# The first word of a cycle, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip
+# breaking), G84 (a tap, which feeds out to CLEAR too).
+KINDS = {"DRILL": "G81", "FACE": "G81", "CSINK": "G81", "DEEP": "G83", "BRKCHP": "G73", "TAP": "G84"}
+PAIRS = ("DEPTH", "CLEAR", "STEP", "RETURN", "DWELL")
+ALIASES = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}
+EXPAND = "have the CAM system write the moves of the cycle"
+
+
+def cycle(state: State, statement: Statement) -> None:
+    """The cycle that the next points drill; CYCLE/OFF ends it."""
+    state.no_circle("CYCLE/")
+    state.hole, arguments = None, list(statement.arguments)
+    kind = arguments.pop(0).text.upper() if arguments else ""
+    if kind in ("OFF", "NOMORE"):
+        return
+    if kind not in KINDS:
+        known = ", ".join(f"CYCLE/{known}" for known in (*KINDS, "OFF"))
+        raise state.fail(f"CYCLE/{kind} is not supported", known, EXPAND)
+    if arguments and arguments[0].text.upper() in ("DEEP", "BRKCHP"):  # NX, CAMplete: CYCLE/DRILL,DEEP
+        kind = arguments.pop(0).text.upper()
+    values = dict[str, float]()
+    for key, value in zip(arguments[::2], arguments[1::2], strict=False):
+        name = _name_in_cycle(state, key)
+        if name in values:
+            raise state.fail(f"{key.text} twice", "one", EXPAND, key)
+        values[name] = state.number(value, f"the number of {key.text}")
+        if name == "feed":
+            factor, state.hole_per_revolution = FEED_UNITS[key.text.upper()]
+            state.hole_feed = values["feed"] * (factor or state.scale)
+    if len(arguments) % 2:
+        raise state.fail(f"{arguments[-1].text!r} without its value", "a number", EXPAND, arguments[-1])
+    for needed in ("DEPTH", "feed", "CLEAR"):
+        if needed not in values:
+            raise state.fail(f"{statement.shown} without {needed}", "DEPTH, CLEAR and a feed as MMPM,100", EXPAND)
+    _check_cycle(state, KINDS[kind], values)
+    scale, dwell = state.scale, values.get("DWELL", 0.0)
+    state.hole = Drilling(
+        code="G82" if dwell and KINDS[kind] == "G81" else KINDS[kind],
+        bottom=-abs(values["DEPTH"]) * scale,
+        retract=values["CLEAR"] * scale,
+        clear=values.get("RETURN", values["CLEAR"]) * scale,
+        peck=values.get("STEP", 0.0) * scale,
+        dwell=dwell,
+        out_at_r=kind == "TAP",
+    )
+
+
+def _name_in_cycle(state: State, key: Argument) -> str:
+    """What a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
+    name = ALIASES.get(key.text.upper(), key.text.upper())
+    if name in FEED_UNITS:
+        return "feed"
+    if is_number(name):
+        problem = "a cycle of numbers without words: their order depends on the CAM system"
+        raise state.fail(problem, "pairs, as DEPTH,5", EXPAND, key)
+    if name not in PAIRS:
+        expected = "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed"
+        raise state.fail(f"CYCLE/ with {name}, which is not supported", expected, EXPAND, key)
+    return name
+
+
+def _check_cycle(state: State, code: str, values: dict[str, float]) -> None:
+    """Refuse a hole that cannot be, or of which systems mean different things; lengths in the file's unit."""
+    shown, pecks = state.statement.shown, code in ("G73", "G83")
+    depth, clear, step, dwell = (values.get(name, 0.0) for name in ("DEPTH", "CLEAR", "STEP", "DWELL"))
+    back = values.get("RETURN", clear)
+    if not depth or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= dwell <= SECONDS_PER_DAY:
+        raise state.fail(shown, "DEPTH and feed above 0, CLEAR and DWELL of 0 or more")
+    if "RETURN" in values and not back > 0.0:
+        raise state.fail("RETURN,0 goes to a plane of the CAM system's", "a height above the point", EXPAND)
+    if back < clear:
+        raise state.fail("a return below CLEAR", "a height of CLEAR or more")
+    if back != clear and "FEDTO" in state.statement.words:
+        problem = "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate"
+        raise state.fail(problem, "DEPTH", EXPAND)
+    if step and not pecks:
+        raise state.fail("STEP without DEEP or BRKCHP", "CYCLE/DEEP or CYCLE/BRKCHP")
+    if pecks and (not step > 0.0 or (clear + abs(depth)) / step > MOST_STROKES):
+        raise state.fail(f"{shown} without its STEP, or with one too small", "STEP above 0")
+    if dwell and pecks:
+        raise state.fail("DWELL in a cycle with pecks", "no DWELL", EXPAND)

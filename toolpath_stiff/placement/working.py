@@ -1,0 +1,130 @@
+"""The means of a search: evaluators of the whole path and of the samples that stand for it, bounds and rules."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from toolpath_stiff import defaults
+from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.placement.climb import Climber
+from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
+from toolpath_stiff.placement.fronts import apart
+from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
+from toolpath_stiff.placement.paths import WorkPath, representative_path, with_rows
+from toolpath_stiff.stiffness.model import StiffnessModel
+
+SCOUT_SAMPLES, POLISH_SAMPLES = 120, 400
+HEEDED = 4  # stretches whose extremes join the few samples, for each placement that these are held against
+NO_FLOORS = np.full(3, -np.inf)
+ENDS = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
+
+
+@dataclass
+class Search:
+    """One search for placements: the evaluators of a few samples, of more, of the whole path; bounds and rules.
+
+    Attributes
+    ----------
+    model, path, load, force
+        The machine, the path in the set-up frame, the load.
+    bounds, wanted
+        What may vary; what a placement must keep and is to be good at.
+    present
+        (6,) where program zero sits now: what the recommendation must not be worse than; None where it is out of reach.
+    report
+        Called with (stages done, stages in all).
+    start, now
+        The present placement where it lies within the bounds, (0, 6) or (1, 6); its figures, within them or not.
+    rules
+        Get their largest share of extrapolated samples when the scouts are back.
+    """
+
+    model: StiffnessModel
+    path: WorkPath
+    load: Load
+    bounds: Bounds
+    wanted: SearchRules = field(default_factory=SearchRules)
+    force: float = defaults.FORCE
+    present: FloatArray | None = None
+    report: Callable[[int, int], None] = lambda done, total: None
+    start: FloatArray = field(init=False)
+    now: PlacementFigures | None = None
+    rules: Rules = field(init=False)
+    evaluators: dict[str, Evaluator] = field(default_factory=dict)
+    made: list[Evaluator] = field(default_factory=list)
+    heeded: IntArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.rules, self.start = Rules(self.wanted.margin), np.zeros((0, 6))
+        self.sample(self.path)
+        if self.present is not None:
+            self.now = self.whole.figures(self.present[None])
+            self.start = self.present[None] if self.bounds.holds(self.present) else self.start
+            self.present = self.present if self.now.margin[0] >= 0.0 else None
+
+    def sample(self, path: WorkPath) -> None:
+        """Take a path, and samples that stand for it."""
+        self.path, self.heeded = path, np.zeros(0, dtype=np.int64)
+        self.evaluators = {"whole": self.evaluator(path)}
+        for name, count in (("middle", POLISH_SAMPLES), ("few", SCOUT_SAMPLES)):
+            short = len(path) <= count
+            self.evaluators[name] = self.whole if short else self.evaluator(representative_path(path, count))
+
+    def heed(self, placements: FloatArray) -> None:
+        """Add to the samples that stand for the path those that decide on the whole of it at some placements."""
+        deciding = [self.whole.deciding_rows(placement, HEEDED) for placement in placements]
+        rows = np.setdiff1d(np.concatenate([self.heeded[:0], *deciding]), self.heeded)
+        self.heeded = np.concatenate([self.heeded, rows])
+        for name, evaluator in self.evaluators.items():
+            if evaluator is not self.whole:
+                self.evaluators[name] = self.evaluator(with_rows(evaluator.path, self.path, rows))
+
+    def evaluator(self, path: WorkPath) -> Evaluator:
+        """An evaluator of a part of the path."""
+        self.made.append(Evaluator(self.model, path, self.load, self.force, self.wanted.keepouts))
+        return self.made[-1]
+
+    @property
+    def whole(self) -> Evaluator:
+        """The evaluator of the whole path."""
+        return self.evaluators["whole"]
+
+    @property
+    def few(self) -> Evaluator:
+        """The evaluator of the few samples that stand for it."""
+        return self.evaluators["few"]
+
+    @property
+    def poses(self) -> int:
+        """Poses evaluated so far."""
+        return sum(evaluator.poses for evaluator in self.made)
+
+    def climber(self, name: str) -> Climber:
+        """A climber on some of the samples."""
+        return Climber(self.evaluators[name], self.bounds, self.rules_for(name))
+
+    def rules_for(self, name: str) -> Rules:
+        """The rules as some samples see them: of those that stand for the path another share is outside the law."""
+        if name == "whole" or self.present is None or not 0.0 < self.rules.extrapolated < np.inf:
+            return self.rules
+        now = self.evaluators[name].figures(self.present[None])
+        return replace(self.rules, extrapolated=float(now.extrapolated[0]))
+
+    def kept(self, figures: PlacementFigures) -> BoolArray:
+        """(k,) placements that keep the rules on the whole path."""
+        return np.asarray(self.rules.violation(figures) == 0.0)
+
+    def ranked(self, goal: Goal, figures: PlacementFigures) -> IntArray:
+        """Rows, best first: the rules, then what must not get worse, then the value."""
+        return np.lexsort((-goal.value(figures), goal.worsening(figures), self.rules.violation(figures)))
+
+    def best_apart(
+        self, placements: FloatArray, figures: PlacementFigures, goal: Goal, count: int, distance: float
+    ) -> FloatArray:
+        """The best of some placements for a goal that are not beside each other."""
+        ranked = placements[self.ranked(goal, figures)]
+        return ranked[apart(self.bounds, ranked, count, distance)]

@@ -1,0 +1,215 @@
+"""Forecasts of rivals: the mean of each reading, and how they vary together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.defaults import STRUT_SPREAD
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.inference.candidates import Component
+from toolpath_stiff.inference.noise import JOINT_ERROR
+from toolpath_stiff.inference.prediction import JOINT_STEP, Predictor
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.model import StiffnessModel, load_path
+
+LAW_STEP = 1e-4  # of the strut law's logarithms, for differences
+LARGEST_STEP = 0.3  # of a size, for differences: a secant over the posterior's width where that is wide
+ALIKE = 1e-6  # relative difference within which two variances are equal
+SMALL_SHARE = 1e-3  # of the largest usual size: the step where the size is nothing
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An explanation of the data, as fitted to them.
+
+    Attributes
+    ----------
+    name
+        For people: `none`, or the effects joined by " + ".
+    law
+        (2,) logarithms of the factors on the strut law's stiffnesses.
+    effects
+        What it adds to the machine file.
+    covariance
+        (2 + p, 2 + p) of the law and of the p real parameters of the effects that are `free`, as sizes from their
+        neutral values (`candidates.Component`); None: law and parameters are known.
+    free
+        Which real parameters these are, counted over all effects; None: all.
+    weight
+        Its probability, up to a common factor.
+    """
+
+    name: str
+    law: tuple[float, float] | FloatArray = (0.0, 0.0)
+    effects: tuple[ActiveEffect, ...] = ()
+    covariance: FloatArray | None = None
+    free: tuple[int, ...] | None = None
+    weight: float = 1.0
+
+    @property
+    def components(self) -> list[tuple[int, Component]]:
+        """The free real parameters: which effect, which component."""
+        every = [
+            (k, Component.of(parameter))
+            for k, active in enumerate(self.effects)
+            for parameter in active.effect.parameters
+            if not parameter.discrete
+        ]
+        return every if self.free is None else [every[i] for i in self.free]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its effects."""
+        return tuple(active.effect.name for active in self.effects)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """A rival's forecast of m readings: mean (m,) of ln k, and a factor (m, q) of its own covariance."""
+
+    name: str
+    weight: float
+    mean: FloatArray
+    factor: FloatArray
+
+
+def forecast_all(
+    machine: Machine,
+    rivals: Sequence[Rival],
+    readings: Measurements,
+    effect_files: Sequence[str | Path] = (),
+    strut_spread: float = STRUT_SPREAD,
+    joint_error: float = JOINT_ERROR,
+) -> tuple[list[Forecast], BoolArray, FloatArray]:
+    """The rivals' forecasts, which readings (m,) all of them can answer, and what the machine scatters by.
+
+    The last is (m, k), a factor of the covariance that the struts' spread (relative sd) and the joints' errors (m, sd
+    of each coordinate) cause.
+
+    Raises
+    ------
+    InputError
+        A rival's covariance does not fit its parameters; the machine is wrong.
+    """
+    predictor = Predictor(machine, readings, effect_files)
+    forecasts = [_forecast(rival, predictor) for rival in rivals]
+    good = np.all([np.isfinite(f.mean) & np.isfinite(f.factor).all(axis=1) for f in forecasts], axis=0)
+    # What a loop beside the tip reads hangs on the joints' places too little to count them.
+    joints = np.zeros((len(readings), 36))
+    joints[readings.tip] = joint_columns(predictor.base, readings.of_tip) * joint_error
+    return forecasts, good, principal(np.concatenate([strut_spread * predictor.strut_columns(), joints], axis=1))
+
+
+def joint_columns(model: StiffnessModel, readings: Measurements) -> FloatArray:
+    """(m, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
+
+    As `Predictor.joint_columns`, but every pose is solved once for all its directions, without load-dependent effects:
+    plans choose from thousands of readings.
+    """
+    keys = np.concatenate([readings.position, readings.angles, readings.tool_extension[:, None]], axis=1)
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    which = which.reshape(-1)
+    places = readings.select(first)
+
+    def log_stiffness(of: StiffnessModel) -> FloatArray:
+        length = places.tool_extension + of.machine.reference_tool_length
+        path = load_path(of, places.position, places.rotation, length, setup=places.setup)
+        tensor = exact.tip_compliance(of, path)[which]
+        return np.asarray(-np.log(np.einsum("mi,mij,mj->m", readings.direction, tensor, readings.direction)))
+
+    base, columns = log_stiffness(model), []
+    for name in ("frame_joints", "platform_joints"):
+        for strut, axis in product(range(6), range(3)):
+            joints = np.array(getattr(model.machine, name))
+            joints[strut, axis] += JOINT_STEP
+            true = model.machine.with_changes(**{name: joints})
+            moved = replace(model, machine=true, control=model.control or model.machine)
+            columns.append((log_stiffness(moved) - base) / JOINT_STEP)
+    return np.stack(columns, axis=1)
+
+
+def principal(columns: FloatArray, share: float = 1e-3) -> FloatArray:
+    """(m, k) columns with the same covariance as (m, q), but for a share of the variance at most."""
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    if not values.any():
+        return columns[:, :0]
+    least = values[np.cumsum(values) > share * values.sum()][0]
+    # Of equal values, which a symmetric machine has, all or none: which of them comes first is chance.
+    return np.asarray(columns @ vectors[:, values >= (1.0 - ALIKE) * least])
+
+
+def _forecast(rival: Rival, predictor: Predictor) -> Forecast:
+    law = np.asarray(rival.law, dtype=float)
+    mean = _answers(predictor, law, rival.effects)
+    if rival.covariance is None:
+        return Forecast(rival.name, rival.weight, mean, np.zeros((len(mean), 0)))
+    components = rival.components
+    covariance = np.asarray(rival.covariance, dtype=float)
+    if covariance.shape != (2 + len(components),) * 2:
+        raise InputError(
+            f"rival {rival.name}: a covariance of shape {covariance.shape}",
+            expected=f"{2 + len(components)} rows and columns: the strut law's two and the free parameters",
+        )
+    columns = []
+    for k in range(2):
+        moved = law.copy()
+        moved[k] += LAW_STEP
+        columns.append((_answers(predictor, moved, rival.effects) - mean) / LAW_STEP)
+    deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
+    for (k, component), sd in zip(components, deviations, strict=True):
+        columns.append(_slope(rival, k, component, float(sd), predictor, law, mean))
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    factor = np.stack(columns, axis=1) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    return Forecast(rival.name, rival.weight, mean, factor)
+
+
+def _slope(
+    rival: Rival, k: int, component: Component, sd: float, predictor: Predictor, law: FloatArray, mean: FloatArray
+) -> FloatArray:
+    """(m,) d ln k / d size, by a difference that stays within the bounds."""
+    active = rival.effects[k]
+    size = size_of(component, float(active.values[component.parameter.name]))
+    usual = component.typical()[1]
+    least = SMALL_SHARE * (usual if np.isfinite(usual) and usual > 0.0 else 1.0)
+    step = max(min(sd, LARGEST_STEP * abs(size)), least)
+    low, high = component.bounds
+    if size + step > high and size - step >= low:
+        step = -step
+    value = component.value(size + step)
+    moved = ActiveEffect(active.effect, {**active.values, component.parameter.name: value})
+    effects = (*rival.effects[:k], moved, *rival.effects[k + 1 :])
+    return (_answers(predictor, law, effects) - mean) / step
+
+
+def size_of(component: Component, value: float) -> float:
+    """The size from neutral of a parameter's SI value; the inverse of `Component.value`."""
+    if component.inverse:
+        return 1.0 / value
+    return value - component.parameter.neutral * component.parameter.si
+
+
+def _answers(predictor: Predictor, law: FloatArray, effects: Sequence[ActiveEffect]) -> FloatArray:
+    """(m,) ln k, nan only for the readings that the model itself cannot answer.
+
+    `Predictor` answers all readings or none; halving finds those at fault.
+    """
+    logs = predictor.log_stiffness(law, effects)
+    if not np.isnan(logs).all() or len(logs) <= 1:
+        return logs
+    half = len(logs) // 2
+    parts = (np.arange(half), np.arange(half, len(logs)))
+    return np.concatenate(
+        [
+            _answers(Predictor(predictor.machine, predictor.data.select(part), predictor.effect_files), law, effects)
+            for part in parts
+        ]
+    )

@@ -1,0 +1,149 @@
+"""Campaigns: which poses, loads, tools and set-ups are measured in which order.
+
+A `Table` maps column names of measurement files to arrays or lists of one length, in shop units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.rig.nominal import Nominal, reachable
+from toolpath_stiff.units import m_from_mm, rad_from_deg
+
+Table = dict[str, Any]
+
+LAYOUTS = ("paper", "tilted", "campaign")
+POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+DEFAULT_SETUP = "table"
+
+# Clinton, Zhang, Wavering (1997), Table 1: x, y in mm, measured at both heights; published.
+PAPER_POINTS = ((0, 0), (-150, 0), (-300, 0), (-130, 75), (-260, 150), (-75, 130), (-150, 260))
+PAPER_HEIGHTS = ((1268.225, "riser"), (353.225, "table"))  # the upper plane stood on a riser (Figure 6)
+
+# The tilted campaign; every figure is a choice (assumed), with the machine's limits respected.
+TILTED_POSES = 24
+TILTED_LOADS = (500.0, 4000.0)  # N
+TILTED_REPEATS = 2
+TILTED_HEIGHTS = (400.0, 600.0, 800.0, 1000.0, 1200.0)  # mm
+TILTED_RADIUS = 300.0  # mm
+LONG_TOOL = 150.0  # mm longer, at four poses
+RISER_EVERY = 3  # each third pose is taken on a riser
+
+
+def campaign(layout: str, nominal: Nominal, plan: Mapping[str, Any] | None, rng: Generator) -> Table:
+    """The campaign of a layout. Raises `InputError`."""
+    if layout not in LAYOUTS:
+        raise InputError(f"layout {layout!r}", expected=", ".join(LAYOUTS))
+    if (layout == "campaign") != (plan is not None):
+        raise InputError("layout campaign and a file of poses go together", expected="both, or neither")
+    if plan is not None:
+        return dict(plan)
+    if layout == "paper":
+        return paper_campaign()
+    try:
+        return tilted_campaign(nominal, rng)
+    except LookupError as error:
+        raise InputError(
+            f"machine {nominal.name}: {error}", hint="use layout campaign with poses of your own for this machine"
+        ) from None
+
+
+def paper_campaign() -> Table:
+    """The paper's 14 points along X, Y, Z: 42 rows in the order of its Table 1."""
+    poses = [(x, y, z, setup) for z, setup in PAPER_HEIGHTS for x, y in PAPER_POINTS]
+    rows = [(*pose, number, axis) for number, pose in enumerate(poses, 1) for axis in AXES]
+    x, y, z, setup, point, direction = zip(*rows, strict=True)
+    zeros = np.zeros(len(rows))
+    return {
+        "x_mm": np.array(x, dtype=float),
+        "y_mm": np.array(y, dtype=float),
+        "z_mm": np.array(z),
+        "a_deg": zeros,
+        "b_deg": zeros,
+        "c_deg": zeros,
+        "direction": list(direction),
+        "setup": list(setup),
+        "point": np.array(point),
+    }
+
+
+def tilted_campaign(nominal: Nominal, rng: Generator) -> Table:
+    """24 tilted poses, X, Y, Z, two loads, two repeats: 288 rows; poses in random order, each repeat clamped anew."""
+    poses = _tilted_poses(nominal, rng)
+    visits = [(pose, repeat) for repeat in range(1, TILTED_REPEATS + 1) for pose in rng.permutation(TILTED_POSES)]
+    columns: dict[str, list[Any]] = {name: [] for name in (*POSE, *_TILTED_COLUMNS)}
+    for clamp, (pose, repeat) in enumerate(visits, 1):
+        jobs = [(axis, load) for axis in AXES for load in TILTED_LOADS]
+        minutes = 0.0
+        for job in rng.permutation(len(jobs)):
+            # A reading takes half a minute to a minute and a half after the indicator was zeroed.
+            minutes = round(minutes + float(rng.uniform(0.5, 1.5)), 1)
+            axis, load = jobs[job]
+            for name, value in zip(POSE, poses[pose], strict=True):
+                columns[name].append(value)
+            cells = (
+                axis,
+                load,
+                "riser" if pose % RISER_EVERY == 0 else DEFAULT_SETUP,
+                clamp,
+                repeat,
+                int(pose) + 1,
+                minutes,
+                _extension(int(pose)),
+                round(20.0 + 1.5 * np.sin(np.pi * clamp / len(visits)), 1),  # a shop that warms up over the day
+            )
+            for name, value in zip(_TILTED_COLUMNS, cells, strict=True):
+                columns[name].append(value)
+    return {name: values if name in ("direction", "setup") else np.array(values) for name, values in columns.items()}
+
+
+_TILTED_COLUMNS = (
+    "direction",
+    "force_N",
+    "setup",
+    "clamp",
+    "repeat",
+    "point",
+    "time_min",
+    "tool_extension_mm",
+    "temperature_C",
+)
+
+
+def _extension(pose: int) -> float:
+    """Mm by which the tool at a pose is longer: poses 0, 7, 14, 21, two of them on the riser."""
+    return LONG_TOOL if pose % 6 == pose // 6 else 0.0
+
+
+def _tilted_poses(nominal: Nominal, rng: Generator) -> FloatArray:
+    """(24, 6) mm and degrees, reachable, drawn until each height has its share; tilts of 5 to 25 degrees."""
+    poses: list[FloatArray] = []
+    for _ in range(20_000):
+        pose = len(poses)
+        if pose == TILTED_POSES:
+            return np.array(poses)
+        radius, azimuth = TILTED_RADIUS * np.sqrt(rng.random()), rng.uniform(0.0, 2.0 * np.pi)
+        tilt, about = rng.uniform(5.0, 25.0), rng.uniform(0.0, 2.0 * np.pi)
+        height = TILTED_HEIGHTS[pose % len(TILTED_HEIGHTS)]
+        trial = np.round(
+            [
+                radius * np.cos(azimuth),
+                radius * np.sin(azimuth),
+                height,
+                tilt * np.cos(about),
+                tilt * np.sin(about),
+                rng.uniform(-10.0, 10.0),
+            ],
+            1,
+        )
+        extension = np.array([m_from_mm(_extension(pose))])
+        if reachable(nominal, m_from_mm(trial[None, :3]), rad_from_deg(trial[None, 3:]), extension)[0]:
+            poses.append(trial)
+    raise LookupError("too few reachable tilted poses within 300 mm of the axis")
