@@ -31,10 +31,14 @@ from toolpath_stiff.nc.findings import (
     in_order,
 )  # fmt: skip
 from toolpath_stiff.nc.languages import foreign_program, refused_program
+from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
+from toolpath_stiff.nc.parametric.run import ParametricRun
+from toolpath_stiff.nc.parametric.statements import uses_variables
+from toolpath_stiff.nc.posted import check_rotary_offsets, on_the_part
 from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun, Tally
-from toolpath_stiff.nc.reader import INTERPRETERS, conclusions, read
+from toolpath_stiff.nc.reader import INTERPRETERS, feed_assumption, millimetre_warning, read
 from toolpath_stiff.nc.request import ZERO, Request
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import WORK_OFFSETS
@@ -69,18 +73,23 @@ def check_lines(
         raise ProgramError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
         return _check_cutter_location(lines, name, origin or default_origin, bool(block_delete), controller)
-    zero = None if origin is None else _pose(origin)
+    placed = None if origin is None else _pose(origin)
     request = Request(
-        lines, name, origin=zero, default_origin=_pose(default_origin), block_delete=block_delete, controller=controller
+        lines,
+        name,
+        origin=placed,
+        default_origin=_pose(default_origin),
+        block_delete=block_delete,
+        controller=controller,
     )
     run, start, errors, ending = _checked_run(request)
     state, frames, tally, posted = run.state, run.state.frames, run.tally, request.posted
     assert tally is not None
-    moves, warnings, assumptions = conclusions(run, controller)
-    warnings, zero = [*ending, *warnings], pose_in_si(frames.origin)
+    moves = state.recorder.moves() if len(state.recorder) else None
+    warnings = [*ending, *state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, lines)]
+    assumptions = [*state.assumptions, *feed_assumption(controller, moves)]
+    zero = pose_in_si(frames.origin)
     if posted is not None:
-        from toolpath_stiff.nc.posted import check_rotary_offsets, on_the_part
-
         x, y, z = (m_from_mm(v) for v in frames.origin[:3])
         there: Pose | None = (x, y, z, 0.0, 0.0, 0.0) if frames.source == "program" else None
         zero = request.default_origin if request.origin is None else request.origin
@@ -88,8 +97,8 @@ def check_lines(
             if moves is not None:
                 check_rotary_offsets(frames.offsets, posted, name)
                 tools = state.used_tools.values()
-                moves, doubts, taken = on_the_part(moves, posted, there, tools, name, state.tip_held)
-                warnings, assumptions = [*warnings, *doubts], [*assumptions, *taken]
+                moves, more, assumed = on_the_part(moves, posted, there, tools, name, state.tip_held)
+                warnings, assumptions = [*warnings, *more], [*assumptions, *assumed]
         except InputError as error:
             moves, errors = None, [*errors, error]
     return Checked(
@@ -115,15 +124,9 @@ def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[Inp
     run = ProgramRun(request.start(), lines, name, request.switches, tally=Tally())
     start = modal_state(run.state)
     errors, warnings = _run_to_the_end(run)
-    if errors:
-        from toolpath_stiff.nc.parametric.statements import uses_variables
-
-        if uses_variables(lines):
-            from toolpath_stiff.nc.parametric.run import ParametricRun
-
-            folder = request.controller.subprograms
-            run = ParametricRun(request.start(), lines, name, request.switches, folder, Tally())
-            errors, warnings = _run_to_the_end(run)
+    if errors and uses_variables(lines):
+        run = ParametricRun(request.start(), lines, name, request.switches, request.controller.subprograms, Tally())
+        errors, warnings = _run_to_the_end(run)
     return run, start, errors, warnings
 
 

@@ -74,7 +74,7 @@ class Checked:
     remarks
         What the tool table says of the tools that were used, by number.
     marks, jumps
-        Where operations begin, where the run left the order of the lines; as in `Program`.
+        Where operations begin, where the run left the order of the lines; as in `ReadProgram`.
     """
 
     used: tuple[UsedCode, ...]

@@ -33,7 +33,7 @@ INTERPRETERS = ("builtin", "linuxcnc", "auto")
 
 
 class Options(TypedDict, total=False):
-    """Options of reading; see `Request`."""
+    """How a program is read; see `Request`."""
 
     origin: Pose | None
     default_origin: Pose
@@ -116,7 +116,7 @@ def read(request: Request) -> ReadProgram:
         raise refused
     if native:
         check_plain(request.block_delete, request.controller)
-        return _on_the_part(_with_feed(linuxcnc.read(request), request), request)
+        return _on_the_part(linuxcnc.read(request), request)
     try:
         return _read_built_in(request)
     except InputError as error:
@@ -126,7 +126,7 @@ def read(request: Request) -> ReadProgram:
         if request.interpreter == "builtin" or not plain(request.block_delete, request.controller):
             raise
         _check_second(error, request)
-    return _on_the_part(_with_feed(linuxcnc.read(request), request), request)
+    return _on_the_part(linuxcnc.read(request), request)
 
 
 def _check_second(error: InputError, request: Request) -> None:
@@ -166,8 +166,8 @@ def _run_built_in(
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
     if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
         warnings.append(ORIGIN_WINS)
-    moves, more, assumptions = conclusions(run, request.controller)
-    assert moves is not None
+    moves = state.recorder.moves()
+    warnings += [*state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, run.lines)]
     program = ReadProgram(
         name=request.name,
         path=request.path,
@@ -176,8 +176,8 @@ def _run_built_in(
         origin=pose_in_si(frames.origin),
         origin_source=frames.source,
         unsupported=tuple(state.unsupported),
-        warnings=(*warnings, *more),
-        assumptions=(START, *assumptions),
+        warnings=tuple(warnings),
+        assumptions=(START, *state.assumptions),
         tools=tuple(state.used_tools.values()),
         dialect=request.controller.label,
         jumps=tuple(run.jumps),
@@ -197,6 +197,7 @@ def _on_the_part(
     offsets: Offsets | None = None,
 ) -> ReadProgram:
     """A program with the moves of the tool on the part, if it was posted for another machine."""
+    program = _with_feed(program, request)
     if request.posted is None:
         return program
     check_rotary_offsets(offsets or request.work_offsets, request.posted, program.name)
@@ -205,20 +206,12 @@ def _on_the_part(
     return recovered(program, request.posted, tip_held, request.origin, "option")
 
 
-def conclusions(run: ProgramRun, controller: Controller) -> tuple[Moves | None, list[str], list[str]]:
-    """Moves of a run that has ended, None if there are none; its warnings and assumptions."""
-    state = run.state
-    moves = state.recorder.moves() if len(state.recorder) else None
-    warnings = [*state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, run.lines)]
-    return moves, warnings, [*state.assumptions, *feed_assumption(controller, moves)]
-
-
 _LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)
 _LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beginning
 
 
 def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
-    """A warning that numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
+    """That numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
 
     Where whole numbers are increments, posts end those in mm with their point.
     """
@@ -234,7 +227,7 @@ def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
 
 
 def feed_assumption(controller: Controller, moves: Moves | None) -> list[str]:
-    """The assumption that the first cuts have the feed that was asked for."""
+    """That the first cuts have the feed that was asked for."""
     if controller.feed is None or moves is None:
         return []
     cuts = moves.feed[moves.motion != RAPID][:1]
