@@ -316,10 +316,7 @@ def _turn(moves: Moves) -> FloatArray:
 def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> FloatArray:
     """(n,) whole numbers from 1, into how many pieces the samples divide each move. Raises `InputError`."""
     # A length that is a whole number of steps up to rounding must not gain a step.
-    pieces = np.maximum(
-        np.ceil(length * _fastest_part(moves) / step - 1e-9),
-        np.ceil(turn / ANGULAR_STEP - 1e-9),
-    )
+    pieces = np.maximum(np.ceil(length * _fastest_part(moves) / step - 1e-9), np.ceil(turn / ANGULAR_STEP - 1e-9))
     pieces = np.maximum(pieces, 1.0)
     total = float(pieces.sum()) + len(moves)
     if total > MOST_SAMPLES:
