@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 
 from toolpath_stiff.errors import ProgramError, TpsError
-from toolpath_stiff.files import temporary_folder
+from toolpath_stiff.locks import temporary_folder
 
 HOW_TO_CONFINE = (
     "install bubblewrap (Debian, Ubuntu: apt install bubblewrap), or say --unconfined (unconfined=True): "
