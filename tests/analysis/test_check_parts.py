@@ -57,12 +57,12 @@ def test_parts_make_the_whole(program):
     checked, tools, operations = parts(program.read_text())
     whole = figures(checked.moves, 0.1)
     for rows in (tools, operations):
-        for key, total in (("lengths_mm", whole.lengths), ("times_s", whole.times)):
+        for key, total in (("lengths_mm", whole.lengths_mm), ("times_s", whole.times_s)):
             for name, value in total.items():
                 assert sum(row[key][name] for row in rows) == pytest.approx(value, abs=1e-9)
         for axis in "xyz":
             ends = [row["extents_mm"][axis] for row in rows if row["extents_mm"]]
-            assert [min(low for low, _ in ends), max(high for _, high in ends)] == whole.cutting_extents[axis]
+            assert [min(low for low, _ in ends), max(high for _, high in ends)] == whole.extents_mm[axis]
 
 
 def test_nothing_to_tell_of_a_program_without_moves_or_cuts():

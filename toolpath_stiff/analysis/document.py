@@ -12,73 +12,70 @@ from toolpath_stiff.analysis.loads import RULES
 from toolpath_stiff.analysis.statistics import (
     FIGURES,
     EvaluatedPath,
-    band_figures,
     describe_sample,
     path_length,
     per_operation,
     per_tool,
     share,
 )
+from toolpath_stiff.analysis.uncertainty import band_figures
+from toolpath_stiff.documents import to_dict
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.stiffness.model import acting_effects, conditions_stated, effects_stated
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
+from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m, pose_in_mm
 
 
 def assumptions(analysis: EvaluatedPath) -> list[str]:
     """Everything that was assumed or recovered rather than published or given; plain sentences."""
     machine = analysis.machine
-    found = list(analysis.program.assumptions)
+    sentences = list(analysis.program.assumptions)
     if words_turn_the_platform(analysis.program):
-        found.append(
+        sentences.append(
             "A, B, C of the program are roll, pitch, yaw of the platform (see [kinematics] of controller files)"
         )
-    x, y, z, *angles = analysis.origin
-    where = f"X{mm_from_m(x):g} Y{mm_from_m(y):g} Z{mm_from_m(z):g}" + (
-        " A{:g} B{:g} C{:g}".format(*(deg_from_rad(v) for v in angles)) if any(angles) else ""
-    )
     if analysis.origin_source == "default":
-        found.append(
+        values = pose_in_mm(analysis.origin)
+        words = [f"{axis}{value:g}" for axis, value in zip("XYZABC", values, strict=True)]
+        where = " ".join(words if any(analysis.origin[3:]) else words[:3])
+        sentences.append(
             f"program zero (G54) sits at {where} in machine coordinates, the machine's default; "
             f"{both_names('--origin')} puts it elsewhere"
         )
     for quantity, origin in machine.origins.items():
         if origin != "published":
             remark = machine.remarks.get(quantity)
-            found.append(f"machine {machine.name}: {quantity} {origin}" + (f": {remark}" if remark else ""))
+            sentences.append(f"machine {machine.name}: {quantity} {origin}" + (f": {remark}" if remark else ""))
     feed = mm_per_min_from_m_per_s(machine.rapid_feed)
-    found.append(f"rapid moves take {feed:g} mm/min (time only)")
-    found.append(f"load {analysis.load}: {RULES[analysis.load.kind]}")
-    found += conditions_stated(analysis.model)
+    sentences += [f"rapid moves take {feed:g} mm/min (time only)", f"load {analysis.load}: {RULES[analysis.load.kind]}"]
+    sentences += conditions_stated(analysis.model)
     acting = acting_effects(analysis.model)
-    load_dependent = any(active.effect.load_dependent for active in acting)
-    secant = "; the stiffness is the secant one at this load" if load_dependent else ""
-    found.append(f"a force of {analysis.force:g} N for deflections{secant}")
+    secant = "; the stiffness is the secant one at this load" if analysis.model.load_dependent else ""
+    sentences.append(f"a force of {analysis.force:g} N for deflections{secant}")
     law = machine.strut_law
-    found.append(
+    sentences.append(
         "the stiffness of a strut is the same at every length"
         if law.constant
         else f"the strut law is extrapolated outside {mm_from_m(min(law.length_1, law.length_2)):.1f} to "
         f"{mm_from_m(max(law.length_1, law.length_2)):.1f} mm of strut length"
     )
     if analysis.parameter_band is not None:
-        found.append(
+        sentences.append(
             "the band of the stiffness holds the uncertainty of the fitted parameters alone, propagated linearly: "
             f"{', '.join(analysis.parameter_band.names)}"
         )
     if not acting:
-        found.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
-    return found
+        sentences.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
+    return sentences
 
 
 def summarise(analysis: EvaluatedPath) -> dict[str, Any]:
     """The figures of `summary.json`, in the shop's units."""
     samples = analysis.samples
-    places = analysis.weakest_rows
     cutting = samples.cutting & analysis.at.reachable
-    x, y, z, a, b, c = analysis.origin
     nearest = int(np.argmin(np.where(cutting, analysis.at.margin, np.inf)))
-    band = None if analysis.parameter_band is None else band_figures(analysis, analysis.parameter_band)
+    band = analysis.parameter_band
+    uncertainty = None if band is None else band_figures(band, samples, analysis.at.stiffness, analysis.headline)
     return {
         "program": analysis.program.name,
         "interpreter": analysis.program.interpreter,
@@ -87,15 +84,15 @@ def summarise(analysis: EvaluatedPath) -> dict[str, Any]:
         "load": str(analysis.load),
         "force_N": analysis.force,
         "step_mm": mm_from_m(analysis.step),
-        "origin_mm_deg": [mm_from_m(x), mm_from_m(y), mm_from_m(z), *(deg_from_rad(v) for v in (a, b, c))],
+        "origin_mm_deg": list(pose_in_mm(analysis.origin)),
         "origin_source": analysis.origin_source,
         "samples": len(samples),
         "cutting_length_mm": mm_from_m(path_length(samples, rapid=False)),
         "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
         "time_s": float(samples.t[-1]) if len(samples) else 0.0,
         **analysis.figures,
-        **({} if band is None else {"parameter_uncertainty": band}),
-        "weakest_places": [describe_sample(analysis, row) for row in places],
+        **({} if band is None else {"parameter_uncertainty": to_dict(uncertainty)}),
+        "weakest_places": [describe_sample(analysis, row) for row in analysis.weakest_rows],
         "per_tool": per_tool(analysis),
         "per_operation": per_operation(analysis),
         "min_margin": float(analysis.at.margin[nearest]),
@@ -104,10 +101,7 @@ def summarise(analysis: EvaluatedPath) -> dict[str, Any]:
         "out_of_reach_samples": int(analysis.out_of_reach.sum()),
         "extrapolated_share": share(analysis.at.extrapolated, cutting),
         **effects_stated(analysis.model),
-        "unsupported": [
-            {"line": u.line, "column": u.column, "word": u.word, "reason": u.reason}
-            for u in analysis.program.unsupported
-        ],
+        "unsupported": to_dict(analysis.program.unsupported),
         "assumptions": assumptions(analysis),
         "warnings": analysis.warnings,
         "version": defaults.VERSION,
@@ -128,20 +122,15 @@ def compare_summaries(summary: Mapping[str, Any], other: Mapping[str, Any]) -> d
     The other machine's figures, and `difference_percent`: how much higher each is than the first machine's
     (None where a figure is missing, or the first machine's is zero); the same for the mean of the plunges.
     """
-    difference = {
-        name.partition("_N_per")[0].removesuffix("_um"): _higher(summary.get(name), other.get(name)) for name in FIGURES
-    }
-    plunges = [(one.get("plunges") or {}).get("mean_N_per_mm") for one in (summary, other)]
+    names = {name: name.partition("_N_per")[0].removesuffix("_um") for name in FIGURES}
+    plunges = [(figures["plunges"] or {}).get("mean_N_per_mm") for figures in (summary, other)]
     return {
         "machine": other["machine"],
-        "effects": list(other.get("effects") or ()),
-        **{name: other.get(name) for name in FIGURES},
-        "weakest": other.get("weakest"),
-        "out_of_reach_samples": other.get("out_of_reach_samples"),
-        "extrapolated_share": other.get("extrapolated_share"),
-        "difference_percent": difference,
-        "headline": other.get("headline"),
-        "plunges": other.get("plunges"),
+        "effects": list(other["effects"]),
+        **{name: other[name] for name in (*FIGURES, "weakest", "out_of_reach_samples", "extrapolated_share")},
+        "difference_percent": {short: _higher(summary[name], other[name]) for name, short in names.items()},
+        "headline": other["headline"],
+        "plunges": other["plunges"],
         "plunges_difference_percent": _higher(*plunges),
     }
 
@@ -164,9 +153,9 @@ def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[
     part (`partial`), and for all cutting lines where no sample counts at all.
     """
     samples, counted = analysis.samples, analysis.counted
-    asked = samples.cutting & ((samples.weight > 0.0) | (not counted.any()))
-    stiffness = np.where(counted, analysis.at.stiffness, np.nan)[asked]
-    lines, index = np.unique(samples.line[asked], return_inverse=True)
+    cuts = samples.cutting & ((samples.weight > 0.0) | (not counted.any()))
+    stiffness = np.where(counted, analysis.at.stiffness, np.nan)[cuts]
+    lines, index = np.unique(samples.line[cuts], return_inverse=True)
     lowest = np.full(len(lines), np.inf)
     with np.errstate(invalid="ignore"):
         np.minimum.at(lowest, index, stiffness)

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.loads import (
-    Load,
-    geometric_directions,
-    load_directions,
-)
+from toolpath_stiff.analysis.loads import Load, geometric_directions, load_directions
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import PoseError
 from toolpath_stiff.machine.kinematics import solve_struts
@@ -69,6 +64,18 @@ class Evaluation:
         """The limits' side of it, for `Reach.describe`."""
         return Reach(self.margin, self.limit, self.limit_value, self.limits)
 
+    def put(
+        self,
+        rows: slice | IntArray,
+        stiffness: FloatArray,
+        strut_lengths: FloatArray,
+        extrapolated: BoolArray,
+        stand: Reach,
+    ) -> None:
+        """Enter the figures of some rows."""
+        self.stiffness[rows], self.strut_lengths[rows], self.extrapolated[rows] = stiffness, strut_lengths, extrapolated
+        self.margin[rows], self.limit[rows], self.limit_value[rows] = stand.margin, stand.limit, stand.value
+
 
 def evaluate(
     model: StiffnessModel,
@@ -110,7 +117,6 @@ def evaluate(
     array([54823., 49735.])
     """
     n = len(position)
-    load = load or Load()
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
     new = _new_poses(position, abc, lengths)
     route = core.choose_route(model, int(np.count_nonzero(new)))  # by all poses, not by those of a block
@@ -124,29 +130,41 @@ def evaluate(
         limit_value=np.empty(n),
         limits=machine_limits(model.machine),
     )
+    task = _Task(model, position, abc, tangent, lengths, load or Load(), force, route, result)
     for start in range(0, n, BLOCK):
         rows = slice(start, min(start + BLOCK, n))
         left: slice | IntArray = rows
-        if route != "exact" and load.kind != "softest":
-            left = _evaluate_fast(model.machine, rows, new, position, abc, tangent, lengths, load, route, result)
+        if route != "exact" and task.load.kind != "softest":
+            left = _evaluate_fast(task, rows, new)
         if isinstance(left, slice) or len(left):
-            _evaluate_rows(model, left, position, abc, tangent, lengths, load, force, route, result)
+            _evaluate_rows(task, left)
         if progress:
             progress(rows.stop, n)
     return result
 
 
+@dataclass(frozen=True)
+class _Task:
+    """Poses as of `evaluate`, how they are evaluated, and where the figures go."""
+
+    model: StiffnessModel
+    position: FloatArray
+    abc: FloatArray
+    tangent: FloatArray
+    tool_length: FloatArray
+    load: Load
+    force: float
+    route: str
+    result: Evaluation
+
+
 def _new_poses(position: FloatArray, abc: FloatArray, tool_length: FloatArray) -> BoolArray:
-    """(n,) whether a row is another pose than the one before it, of more than two alike every other one.
+    """(n,) True for another pose than the one before it, of more than two alike every other one.
 
     At a corner of a path the end of one move and the start of the next are one pose under two loads. True throughout
     where few rows are such.
     """
-    new = np.zeros(len(position), dtype=bool)
-    new[:1] = True
-    tools = () if isinstance(_one_if_equal(tool_length), float) else (tool_length,)
-    for values in (*position.T, *abc.T, *tools):
-        new[1:] |= values[1:] != values[:-1]
+    new = other_poses(position, abc, tool_length)
     if np.count_nonzero(new) > MOST_NEW * len(new):
         return np.ones_like(new)
     third = ~(new[1:] | new[:-1])
@@ -156,35 +174,35 @@ def _new_poses(position: FloatArray, abc: FloatArray, tool_length: FloatArray) -
     return new
 
 
-def _evaluate_fast(
-    machine: Machine,
-    rows: slice,
-    new: BoolArray,
-    position: FloatArray,
-    abc: FloatArray,
-    tangent: FloatArray,
-    tool_length: FloatArray,
-    load: Load,
-    route: str,
-    result: Evaluation,
-) -> IntArray:
+def other_poses(position: FloatArray, abc: FloatArray, tool_length: FloatArray) -> BoolArray:
+    """(n,) True for another pose than the one before it: a move begins where the last one has ended."""
+    other = np.zeros(len(position), dtype=bool)
+    other[:1] = True
+    tools = () if isinstance(_one_if_equal(tool_length), float) else (tool_length,)
+    for values in (*position.T, *abc.T, *tools):
+        other[1:] |= values[1:] != values[:-1]
+    return other
+
+
+def _evaluate_fast(task: _Task, rows: slice, new: BoolArray) -> IntArray:
     """Poses of struts on a rigid platform along loads that the geometry directs: margins and stiffness at once.
 
     `new` (n,) as of `_new_poses`. Returns the rows that are left: other directions, poses near singular ones, and where
     an angle near zero decides.
     """
+    machine, result, abc = task.model.machine, task.result, task.abc
     left: list[Any] = []
     samples = _rows_of_poses(rows, new[rows])
     poses = samples[0]
     rotation = rotation_matrices(abc[poses]) if np.any(abc[rows] != 0.0) else None
-    directed = [geometric_directions(load, position[some], rotation, tangent[some]) for some in samples]
+    directed = [geometric_directions(task.load, task.position[some], rotation, task.tangent[some]) for some in samples]
     turns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
-    tip, towards = np.ascontiguousarray(position[poses].T), np.stack([direction.T for direction, _ in directed])
-    for tool, some in _of_one_tool(tool_length[poses]):
+    tip, towards = np.ascontiguousarray(task.position[poses].T), np.stack([direction.T for direction, _ in directed])
+    for tool, some in _of_one_tool(task.tool_length[poses]):
         turn = None if turns is None else turns[:, some]
         there = tip[:, some]
         compliance, determinant, lengths, good = core.compliance_along_columns(
-            machine, there, towards[:, :, some], turn, tool, route
+            machine, there, towards[:, :, some], turn, tool, task.route
         )
         stand, sure = Extremes(machine, there, lengths, determinant, turn, tool).reach()
         extrapolated = machine.strut_law.room(lengths).min(axis=0) < 0.0
@@ -192,10 +210,7 @@ def _evaluate_fast(
             at = _part(into, some)
             certain = sure & good & known[some] & (along > 0.0) & (along < np.inf)
             along[~(stand.reachable & known[some])] = np.nan
-            result.stiffness[at] = 1.0 / along
-            result.strut_lengths[at] = lengths.T
-            result.extrapolated[at] = extrapolated
-            result.margin[at], result.limit[at], result.limit_value[at] = stand.margin, stand.limit, stand.value
+            result.put(at, 1.0 / along, lengths.T, extrapolated, stand)
             if not certain.all():
                 left.append(_part(at, np.flatnonzero(~certain)))  # they are looked at one by one
     return np.unique(np.concatenate(left)) if left else np.empty(0, dtype=np.int64)
@@ -226,44 +241,41 @@ def _of_one_tool(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]
     return [(float(length), np.flatnonzero(number == i)) for i, length in enumerate(lengths)]
 
 
-def _evaluate_rows(
-    model: StiffnessModel,
-    rows: slice | IntArray,
-    position: FloatArray,
-    abc: FloatArray,
-    tangent: FloatArray,
-    tool_length: FloatArray,
-    load: Load,
-    force: float,
-    route: str,
-    result: Evaluation,
-) -> None:
-    machine = model.machine
-    tip, angles, tool = position[rows], abc[rows], tool_length[rows]
+def _evaluate_rows(task: _Task, rows: slice | IntArray) -> None:
+    """Any poses under any load, one by one where effects ask for it."""
+    model, machine, force = task.model, task.model.machine, task.force
+    tip, angles, tool = task.position[rows], task.abc[rows], task.tool_length[rows]
     rotation = rotation_matrices(angles) if np.any(angles != 0.0) else None
     struts = solve_struts(machine, tip, rotation, _one_if_equal(tool))
     stand = reach(machine, tip, struts, rotation)
     within = stand.reachable
     compliance = np.full((len(tip), 3, 3), np.nan)
     turned = None if rotation is None else rotation[within]
-    compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force, route)
+    compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force, task.route)
     refuse_no_number(machine, tip, within & np.isnan(compliance[:, 0, 0]))
-    softest = partial(_softest, model, tip, rotation, tool, force, within) if model.load_dependent else None
-    direction, substituted = load_directions(load, compliance, tip, rotation, tangent[rows], softest)
-    along = np.full(len(tip), np.nan)
+
+    def softest(some: BoolArray, across: FloatArray | None) -> FloatArray:
+        """Softest directions under the load, of some rows; nan where these are out of reach."""
+        directions = np.full((int(some.sum()), 3), np.nan)
+        inside, both = within[some], some & within
+        turn = None if rotation is None else rotation[both]
+        normals = None if across is None else across[inside]
+        directions[inside] = core.extreme_directions(model, tip[both], turn, tool[both], force, across=normals)
+        return directions
+
+    direction, substituted = load_directions(
+        task.load, compliance, tip, rotation, task.tangent[rows], softest if model.load_dependent else None
+    )
     if model.load_dependent:
+        along = np.full(len(tip), np.nan)
         along[within] = core.compliance_along(model, direction[within], tip[within], turned, tool[within], force)
     else:
         along = np.einsum("ni,nij,nj->n", direction, compliance, direction)
     stiffness = 1.0 / along
     refuse_no_number(machine, tip, within & ~((stiffness > 0.0) & (stiffness < np.inf)))
-    result.stiffness[rows] = stiffness
-    result.substituted[rows] = substituted
-    result.strut_lengths[rows] = struts.lengths
-    result.extrapolated[rows] = machine.strut_law.extrapolates(struts.lengths).any(axis=1)
-    result.margin[rows] = stand.margin
-    result.limit[rows] = stand.limit
-    result.limit_value[rows] = stand.value
+    task.result.substituted[rows] = substituted
+    extrapolated = np.asarray(machine.strut_law.extrapolates(struts.lengths).any(axis=1))
+    task.result.put(rows, stiffness, struts.lengths, extrapolated, stand)
 
 
 def refuse_no_number(machine: Machine, tip: FloatArray, bad: BoolArray) -> None:
@@ -274,26 +286,6 @@ def refuse_no_number(machine: Machine, tip: FloatArray, bad: BoolArray) -> None:
             f"machine {machine.name} is singular at X{x:g} Y{y:g} Z{z:g} mm: the tip has no stiffness there",
             hint="keep such poses out of reach: min_index of [limits.singularity] in the machine file, such as 0.05",
         )
-
-
-def _softest(
-    model: StiffnessModel,
-    tip: FloatArray,
-    rotation: FloatArray | None,
-    tool: FloatArray,
-    force: float,
-    within: BoolArray,
-    rows: BoolArray,
-    across: FloatArray | None,
-) -> FloatArray:
-    """Softest directions under the load, of some rows; nan where these are out of reach."""
-    found = np.full((int(rows.sum()), 3), np.nan)
-    inside = within[rows]
-    some = rows & within
-    turn = None if rotation is None else rotation[some]
-    normals = None if across is None else across[inside]
-    found[inside] = core.extreme_directions(model, tip[some], turn, tool[some], force, across=normals)
-    return found
 
 
 def _one_if_equal(tool_length: FloatArray) -> FloatArray | float:

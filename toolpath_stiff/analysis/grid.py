@@ -51,8 +51,8 @@ class StiffnessMap(FolderResult):
     [800.0, 1200.0]
     >>> found.to_frame().columns.tolist(), len(found.to_frame())
     (['x_mm', 'y_mm', 'z_mm', 'stiffness_N_per_mm', 'reachable'], 50)
-    >>> [plane["x_mm"].size for plane in found.columns()], found.grid is found
-    ([25, 25], True)
+    >>> [plane["x_mm"].size for plane in found.columns()]
+    [25, 25]
     >>> type(found.plot()).__name__
     'Figure'
     """
@@ -69,11 +69,6 @@ class StiffnessMap(FolderResult):
     load: Load
     abc: tuple[float, float, float]
     inputs: tuple[str, ...] = ()
-
-    @property
-    def grid(self) -> StiffnessMap:
-        """The grid and the stiffness on it, arrays in SI."""
-        return self
 
     def to_dict(self) -> dict[str, Any]:
         """Extremes of each plane, and of a circle about the machine axis where the planes hold one: `map.json`."""

@@ -50,8 +50,8 @@ class MachineCheck(Result):
     >>> found = tps.Machine.load("nist").check()
     >>> found.good, found.to_dict()["wrong"], found.warnings, len(found.to_frame())
     (True, [], [], 0)
-    >>> found.file, found.found is found, found.symmetry.kind
-    ('nist', True, 'three-fold')
+    >>> found.file, found.symmetry.kind
+    ('nist', 'three-fold')
     >>> type(found.plot()).__name__
     'Figure'
     """
@@ -71,11 +71,6 @@ class MachineCheck(Result):
     def good(self) -> bool:
         """Whether nothing is wrong."""
         return not self.wrong
-
-    @property
-    def found(self) -> MachineCheck:
-        """What cannot be right, what is doubtful, the machine at its neutral pose and default origin."""
-        return self
 
     @property
     def warnings(self) -> list[str]:

@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.analysis.evaluation import other_poses
+from toolpath_stiff.analysis.statistics import operation_heading, rows_of_parts
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.checking import ERROR, WARNING, Checked, Finding, check_by
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches
-from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.nc.operations import find_operations
 from toolpath_stiff.nc.request import ZERO
@@ -42,48 +44,32 @@ Extents = dict[str, list[float]]
 
 @dataclass(frozen=True)
 class Figures:
-    """mm, degrees, s. Extents are those of the tip in program coordinates of G54; `cutting` leaves rapids out."""
+    """Extents of the tip in program coordinates of G54, lengths and times of some moves."""
 
-    cutting_extents: Extents
-    all_extents: Extents
-    lengths: dict[str, float]
-    times: dict[str, float]
+    extents_mm: Extents
+    extents_deg: Extents
+    extents_with_rapids_mm: Extents
+    lengths_mm: dict[str, float]
+    times_s: dict[str, float]
 
 
-def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Figures:
+def figures(moves: Moves | None, rapid_feed: float = defaults.RAPID_FEED) -> Figures:
     """Extents, lengths and times of moves; rapids at `rapid_feed`, m/s."""
+    if moves is None:
+        return Figures({}, {}, {}, {}, {})
     cutting = moves.motion != RAPID
     length, duration = move_lengths(moves), move_durations(moves, rapid_feed)
-    lengths = {
-        "cutting": mm_from_m(float(length[cutting].sum())),
-        "rapid": mm_from_m(float(length[~cutting].sum())),
-    }
-    times = {
-        "cutting": float(duration[cutting].sum()),
-        "rapid": float(duration[~cutting].sum()),
-        "dwell": float(moves.dwell.sum()),
-    }
+    parts = (("cutting", cutting), ("rapid", ~cutting))
+    lengths = {name: mm_from_m(float(length[rows].sum())) for name, rows in parts}
+    times = {name: float(duration[rows].sum()) for name, rows in parts} | {"dwell": float(moves.dwell.sum())}
+    cuts, everything = extents(moves.take(cutting)), extents(moves)
     return Figures(
-        extents(moves.take(cutting)),
-        extents(moves),
+        {axis: cuts[axis] for axis in "xyz" if cuts},
+        {axis: cuts[axis] for axis in "abc" if cuts},
+        {axis: everything[axis] for axis in "xyz" if everything},
         {**lengths, "total": sum(lengths.values())},
         {**times, "total": sum(times.values())},
     )
-
-
-def figures_of_parts(
-    moves: Moves,
-    of_move: IntArray,
-    count: int,
-    rapid_feed: float = defaults.RAPID_FEED,
-    whole: Figures | None = None,
-) -> list[Figures]:
-    """The same of moves in `count` parts, each in the part that `of_move` (n,) says; `whole`: of all of them."""
-    if count == 1 and whole is not None:
-        return [whole]
-    order = np.argsort(of_move, kind="stable")
-    ends = np.searchsorted(of_move[order], np.arange(count + 1))
-    return [figures(moves.take(order[ends[part] : ends[part + 1]]), rapid_feed) for part in range(count)]
 
 
 def extents(moves: Moves) -> Extents:
@@ -101,59 +87,31 @@ def extents(moves: Moves) -> Extents:
 
 def _arc_extremes(arcs: Moves) -> FloatArray:
     """(m, 3) m, points of arcs where a coordinate turns; climbs and growing radii as far along as the angle is."""
-    if not len(arcs):
-        return np.empty((0, 3))
-    normal = arcs.arc_normal
-    outward = arcs.start[:, :3] - arcs.arc_center
-    outward = outward - np.einsum("ni,ni->n", outward, normal)[:, None] * normal
-    leave = arcs.end[:, :3] - arcs.arc_center
-    climb = np.einsum("ni,ni->n", arcs.end[:, :3] - arcs.start[:, :3], normal)
-    lift = np.einsum("ni,ni->n", arcs.start[:, :3] - arcs.arc_center, normal)
-    leave = leave - np.einsum("ni,ni->n", leave, normal)[:, None] * normal
-    first, last = np.linalg.norm(outward, axis=1), np.linalg.norm(leave, axis=1)
-    e1 = outward / first[:, None]
-    e2 = np.cross(normal, e1) * np.sign(arcs.arc_sweep)[:, None]  # along the motion: angles count up
-    sweep = np.abs(arcs.arc_sweep)
-    points = []
+    row = np.arange(len(arcs))
+    frame, sweep = arc_frame(arcs, row), np.abs(arcs.arc_sweep)
+    points = [np.empty((0, 3))]
     for axis in range(3):
-        turning = np.arctan2(e2[:, axis], e1[:, axis])
+        turning = np.arctan2(frame.e2[:, axis] * np.sign(arcs.arc_sweep), frame.e1[:, axis])
         for opposite in (0.0, np.pi):
             angle = np.mod(turning + opposite, 2.0 * np.pi)
             last_turn = angle + 2.0 * np.pi * np.floor(np.maximum(sweep - angle, 0.0) / (2.0 * np.pi))
             for at in (angle, last_turn):
                 inside = at < sweep
-                u = (at / sweep)[inside, None]
-                radius = first[inside, None] + u * (last - first)[inside, None]
-                circle = np.cos(at[inside, None]) * e1[inside] + np.sin(at[inside, None]) * e2[inside]
-                height = lift[inside, None] + u * climb[inside, None]
-                points.append(arcs.arc_center[inside] + radius * circle + height * normal[inside])
+                points.append(points_along(arcs, row[inside], (at / sweep)[inside])[0])
     return np.concatenate(points)
 
 
 def radii_findings(moves: Moves) -> list[Finding]:
     """Arcs whose end lies off the circle of their start by more than rounding."""
     arcs = moves.take(moves.arc_sweep != 0.0)
-    if not len(arcs):
-        return []
-    radii = []
-    for ends in (arcs.start, arcs.end):
-        out = ends[:, :3] - arcs.arc_center
-        radii.append(
-            np.linalg.norm(out - np.einsum("ni,ni->n", out, arcs.arc_normal)[:, None] * arcs.arc_normal, axis=1)
-        )
-    apart = np.abs(radii[1] - radii[0])
-    bad = apart > RADII_APART
-    return [
-        Finding(
-            int(arcs.line[i]),
-            0,
-            "arc radii",
-            f"the arc's radius is {mm_from_m(float(radii[0][i])):.4f} mm at its start and "
-            f"{mm_from_m(float(radii[1][i])):.4f} mm at its end",
-            WARNING,
-        )
-        for i in np.flatnonzero(bad)[:MOST_NAMED]
-    ] + _rest("arc radii", int(bad.sum()))
+    frame = arc_frame(arcs, np.arange(len(arcs)))
+    bad = np.flatnonzero(np.abs(frame.radius_end - frame.radius_start) > RADII_APART)
+    findings = []
+    for i in bad[:MOST_NAMED]:
+        first, last = mm_from_m(float(frame.radius_start[i])), mm_from_m(float(frame.radius_end[i]))
+        text = f"the arc's radius is {first:.4f} mm at its start and {last:.4f} mm at its end"
+        findings.append(Finding(int(arcs.line[i]), 0, "arc radii", text, WARNING))
+    return findings + _rest("arc radii", len(bad))
 
 
 def machine_findings(
@@ -209,7 +167,7 @@ def machine_findings(
 
 def _struts_and_reach(machine: Machine, samples: Samples) -> tuple[FloatArray, Reach]:
     """(n, 6) m strut lengths of n samples, and their reach; block by block, as work arrays of a long path are large."""
-    other = _other_poses(samples)
+    other = other_poses(samples.position, samples.abc, samples.tool_length)
     poses, of_sample = np.flatnonzero(other), np.cumsum(other) - 1
     n = len(poses)
     lengths = np.empty((n, 6))
@@ -223,17 +181,6 @@ def _struts_and_reach(machine: Machine, samples: Samples) -> tuple[FloatArray, R
         lengths[here] = struts.lengths
         margin[here], limit[here], value[here] = within.margin, within.limit, within.value
     return lengths[of_sample], Reach(margin[of_sample], limit[of_sample], value[of_sample], machine_limits(machine))
-
-
-def _other_poses(samples: Samples) -> BoolArray:
-    """(n,) whether a sample is at another pose than the one before: a move begins where the last one has ended."""
-    other = np.ones(len(samples), dtype=bool)
-    length = samples.tool_length
-    same = (length[1:] == length[:-1]) | (np.isnan(length[1:]) & np.isnan(length[:-1]))
-    for values in (samples.position, samples.abc):
-        same &= (values[1:] == values[:-1]).all(axis=1)
-    other[1:] = ~same
-    return other
 
 
 def _rest(code: str, count: int) -> list[Finding]:
@@ -335,16 +282,15 @@ def check_program(
         interpreter, lines, name, origin=origin, default_origin=default, block_delete=block_delete, **run
     )
     findings: list[Finding] = list(checked.findings)
-    found: Figures | None = None
     speed: dict[str, float] = {}
     rapid_feed = machine.rapid_feed if machine else defaults.RAPID_FEED
+    whole = figures(checked.moves, rapid_feed)
     if checked.moves is not None:
-        found = figures(checked.moves, rapid_feed)
         findings += radii_findings(checked.moves)
         if machine is not None:
             more, speed = machine_findings(checked, machine, checked.origin, step, strut_speed)
             findings += more
-    tools, operations = check_parts(checked, lines, name, rapid_feed, found)
+    tools, operations = check_parts(checked, lines, name, rapid_feed, whole)
     posted = controller.kinematics if checked.dialect in ("", "linuxcnc") else None
     return ProgramCheck(
         {
@@ -356,7 +302,7 @@ def check_program(
             "used": [asdict(code) for code in checked.used],
             "unsupported": [asdict(word) for word in checked.unsupported],
             "findings": [asdict(finding) for finding in sorted(findings, key=lambda one: (one.line, one.column))],
-            **figure_rows(found or Figures({}, {}, {}, {})),
+            **asdict(whole),
             "tools": tools,
             "operations": operations,
             "fastest_strut": speed,
@@ -390,32 +336,18 @@ def check_parts(
     if moves is None:
         return [], []
     numbers, first, of_move = np.unique(moves.tool, return_index=True, return_inverse=True)
-    found = figures_of_parts(moves, of_move, len(numbers), rapid_feed, whole)
+    operations = find_operations(lines, moves, name, checked.remarks, checked.marks, checked.jumps)
+
+    def rows(of_move: IntArray, count: int) -> list[dict[str, Any]]:
+        """The figures of moves in `count` parts, each in the part that `of_move` (n,) says."""
+        if count == 1 and whole is not None:
+            return [asdict(whole)]
+        return [asdict(figures(moves.take(part), rapid_feed)) for part in rows_of_parts(of_move, count)]
+
+    by_tool = rows(of_move, len(numbers))
     tools = [
-        {"tool": int(numbers[i]), "remark": checked.remarks.get(int(numbers[i]), ""), **figure_rows(found[i])}
+        {"tool": int(numbers[i]), "remark": checked.remarks.get(int(numbers[i]), ""), **by_tool[i]}
         for i in np.argsort(first).tolist()
     ]
-    operations = find_operations(lines, moves, name, checked.remarks, checked.marks, checked.jumps)
-    parts = figures_of_parts(moves, operations.of_move, len(operations.rows), rapid_feed, whole)
-    return tools, [
-        {
-            "operation": row.number,
-            "name": row.name,
-            "tool": row.tool,
-            "first_line": row.first_line,
-            "last_line": row.last_line,
-            **figure_rows(part),
-        }
-        for row, part in zip(operations.rows, parts, strict=True)
-    ]
-
-
-def figure_rows(found: Figures) -> dict[str, Any]:
-    """Figures under the names that `--json` gives them."""
-    return {
-        "extents_mm": {axis: found.cutting_extents[axis] for axis in "xyz" if found.cutting_extents},
-        "extents_deg": {axis: found.cutting_extents[axis] for axis in "abc" if found.cutting_extents},
-        "extents_with_rapids_mm": {axis: found.all_extents[axis] for axis in "xyz" if found.all_extents},
-        "lengths_mm": found.lengths,
-        "times_s": found.times,
-    }
+    by_operation = zip(operations.rows, rows(operations.of_move, len(operations.rows)), strict=True)
+    return tools, [operation_heading(operation) | part for operation, part in by_operation]

@@ -19,10 +19,7 @@ from toolpath_stiff.analysis.document import (
 )
 from toolpath_stiff.analysis.evaluation import Evaluation, Progress, evaluate
 from toolpath_stiff.analysis.loads import Load, parse_load
-from toolpath_stiff.analysis.statistics import (
-    EvaluatedPath,
-    sample_columns,
-)
+from toolpath_stiff.analysis.statistics import EvaluatedPath, sample_columns
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.documents import without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
@@ -32,11 +29,7 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.path import Samples, place, sample_moves
 from toolpath_stiff.results import FolderResult
-from toolpath_stiff.stiffness.model import (
-    StiffnessModel,
-    build_model,
-    condition_warnings,
-)
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model, condition_warnings
 from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
@@ -84,11 +77,6 @@ class Analysis(EvaluatedPath, FolderResult):
     inputs: tuple[str, ...] = ()
 
     @property
-    def path(self) -> EvaluatedPath:
-        """The samples and what was found at each, as arrays in SI."""
-        return self
-
-    @property
     def moves(self) -> Moves:
         """The moves in machine coordinates; made anew each time, for a long program is a fifth of all memory."""
         return place(self.program.moves, self.origin)
@@ -101,17 +89,18 @@ class Analysis(EvaluatedPath, FolderResult):
     @property
     def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
         """Mean stiffness over the length of the cuts, plunges along the tool axis left out; nan without any."""
-        return _number(self.figures["mean_N_per_mm"])
+        return float(self.figures["mean_N_per_mm"] or np.nan)
 
     @property
     def min_N_per_mm(self) -> float:  # noqa: N802
         """The smallest stiffness of these cuts."""
-        return _number(self.figures["min_N_per_mm"])
+        return float(self.figures["min_N_per_mm"] or np.nan)
 
     @property
     def range_N_per_mm(self) -> float:  # noqa: N802
         """The largest less the smallest."""
-        return _number(self.figures["range_N_per_mm"])
+        span = self.figures["range_N_per_mm"]
+        return float("nan") if span is None else float(span)
 
     @property
     def weakest(self) -> dict[str, Any]:
@@ -180,10 +169,6 @@ class Analysis(EvaluatedPath, FolderResult):
         return files
 
 
-def _number(figure: float | None) -> float:
-    return float("nan") if figure is None else figure
-
-
 def analyze(
     machine: Machine | StiffnessModel,
     program: ReadProgram,
@@ -250,12 +235,11 @@ def analyze(
 
 def _effective_origin(machine: Machine, program: ReadProgram, origin: Pose | None) -> tuple[Pose, str]:
     """The option, else the program's own word, else the machine's default."""
+    chosen, source = program.origin, program.origin_source
     if origin is not None:
         chosen, source = origin, "option"
-    elif program.origin_source == "default":
-        chosen, source = machine.default_origin, "default"
-    else:
-        chosen, source = program.origin, program.origin_source
+    elif source == "default":
+        chosen = machine.default_origin
     if program.moves.from_machine.any() and not np.allclose(chosen, program.origin, rtol=0.0, atol=1e-12):
         raise ProgramError(
             "moves in machine coordinates (G53, G28, G30) depend on where program zero sits",
@@ -267,22 +251,22 @@ def _effective_origin(machine: Machine, program: ReadProgram, origin: Pose | Non
 
 def _warnings(samples: Samples, at: Evaluation) -> list[str]:
     """What the evaluation itself has to say."""
-    found = []
+    warnings = []
     rapids = ~samples.cutting & ~at.reachable
     if rapids.any():
         first = int(np.argmax(rapids))
-        found.append(
+        warnings.append(
             f"line {samples.line[first]}: {int(rapids.sum())} samples of rapid moves are out of reach, first "
             f"{describe_pose(samples, first)}: {at.reach.describe(first)}"
         )
     swapped = samples.cutting & at.substituted
     if swapped.any():
         lines = np.unique(samples.line[swapped])
-        found.append(
+        warnings.append(
             f"{_lines(lines)}: the load direction does not exist there (rotary axes alone, or a move along "
             "the tool axis); the softest direction stands in"
         )
-    return found
+    return warnings
 
 
 def _lines(lines: IntArray, most: int = 5) -> str:
@@ -294,10 +278,9 @@ def _lines(lines: IntArray, most: int = 5) -> str:
 
 def describe_pose(samples: Samples, i: int) -> str:
     """The pose of sample i as a control would show it, machine coordinates."""
-    x, y, z = (mm_from_m(float(v)) for v in samples.position[i])
-    a, b, c = (deg_from_rad(float(v)) for v in samples.abc[i])
-    text = f"at X{x:.3f} Y{y:.3f} Z{z:.3f}"
-    return text + (f" A{a:.3f} B{b:.3f} C{c:.3f}" if a or b or c else "") + " (machine coordinates, mm)"
+    values = [*mm_from_m(samples.position[i]), *deg_from_rad(samples.abc[i])]
+    words = [f"{axis}{value:.3f}" for axis, value in zip("XYZABC", values, strict=True)]
+    return f"at {' '.join(words if samples.abc[i].any() else words[:3])} (machine coordinates, mm)"
 
 
 def _check_reach(analysis: Analysis, partial: bool) -> None:
@@ -311,9 +294,8 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     if not bad.any() or (partial and not bad[samples.cutting].all()):
         return
     first = int(np.argmax(bad))
-    hint = f"place the work elsewhere with {both_names('--origin')}, or keep the reachable part with --partial"
-    if partial:
-        hint = f"place the work elsewhere with {both_names('--origin')}"
+    hint = f"place the work elsewhere with {both_names('--origin')}"
+    hint += "" if partial else ", or keep the reachable part with --partial"
     if words_turn_the_platform(analysis.program):
         hint += "; if the program was posted for another machine, name it with [kinematics] in a controller file"
     raise UnreachableError(

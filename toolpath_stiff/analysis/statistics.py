@@ -1,31 +1,25 @@
-"""Figures and tables of a path: length-weighted mean, extremes, the weakest places, tool by tool; sample by sample.
-
-How far the uncertainty of a machine's fitted parameters reaches into them is a linear propagation (JCGM 100:2008,
-Guide to the expression of uncertainty in measurement, equation 13): the covariance of the parameters between two
-slopes of the stiffness, which are differences of whole evaluations.
-"""
+"""Figures and tables of a path: length-weighted mean, extremes, the weakest places, tool by tool; sample by sample."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from toolpath_stiff import defaults
-from toolpath_stiff.analysis.evaluation import Evaluation, evaluate
+from toolpath_stiff.analysis.evaluation import Evaluation
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, follows_motion, headline_of, headline_words
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
+from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
-from toolpath_stiff.nc.operations import Operations, operations
+from toolpath_stiff.nc.operations import Operation, Operations, operations
 from toolpath_stiff.path import PATH_COLUMNS, Samples, path_columns
-from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
+from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
@@ -42,7 +36,6 @@ COLUMNS: dict[str, int | None] = {
 }
 
 FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
-STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -88,7 +81,7 @@ class EvaluatedPath:
     @cached_property
     def parameter_band(self) -> ParameterBand | None:
         """What the uncertainty of the machine's fitted parameters does to the stiffness; None if none is known."""
-        return parameter_band(self, self.model)
+        return parameter_band(self.model, self.samples, self.load, self.force, self.at.stiffness)
 
     @cached_property
     def counted(self) -> BoolArray:
@@ -229,47 +222,42 @@ def class_figures(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
     `rows` (m,) are rows of samples, in order; only those in the statistics count. `plunges` is None without any.
     """
     counted, plunging = path.counted[rows], path.plunging[rows]
-    about = rows[headline_of(counted, plunging)]
+    plunges, samples = rows[plunging], path.samples
+
+    def about(some: IntArray) -> dict[str, Any]:
+        stiffness = path.at.stiffness[some]
+        weakest = describe_sample(path, int(some[np.argmin(stiffness)])) if len(some) else None
+        return {**weighted_figures(stiffness, samples.weight[some], path.force), "weakest": weakest}
+
+    beside = {
+        "samples": len(plunges),
+        "moves": 1 + int(np.count_nonzero(np.diff(samples.move[plunges]))),  # they rise along the path
+        "length_mm": mm_from_m(float(samples.weight[plunges].sum())),
+        **about(plunges),
+    }
     return {
         "headline": headline_words(path.load, counted, plunging),
-        **_figures_and_weakest(path, about),
-        "plunges": _plunges(path, rows[plunging]) if plunging.any() else None,
+        **about(rows[headline_of(counted, plunging)]),
+        "plunges": beside if len(plunges) else None,
     }
 
 
-def _plunges(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
-    samples = path.samples
+def operation_heading(operation: Operation) -> dict[str, Any]:
+    """Number, name, tool and lines of an operation, as its row begins."""
     return {
-        "samples": len(rows),
-        "moves": 1 + int(np.count_nonzero(np.diff(samples.move[rows]))),  # they rise along the path
-        "length_mm": mm_from_m(float(samples.weight[rows].sum())),
-        **_figures_and_weakest(path, rows),
-    }
-
-
-def _figures_and_weakest(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
-    stiffness = path.at.stiffness[rows]
-    return {
-        **weighted_figures(stiffness, path.samples.weight[rows], path.force),
-        "weakest": describe_sample(path, int(rows[np.argmin(stiffness)])) if len(rows) else None,
+        "operation": operation.number,
+        "name": operation.name,
+        "tool": operation.tool,
+        "first_line": operation.first_line,
+        "last_line": operation.last_line,
     }
 
 
 def per_operation(path: EvaluatedPath) -> list[dict[str, Any]]:
     """The figures of each operation, in the order of the run; their lengths, times and samples add up to the whole."""
     operations = path.operations
-    parts = _Parts(path, operations.of_move, len(operations.rows))
-    return [
-        {
-            "operation": operation.number,
-            "name": operation.name,
-            "tool": operation.tool,
-            "first_line": operation.first_line,
-            "last_line": operation.last_line,
-            **parts.row(part),
-        }
-        for part, operation in enumerate(operations.rows)
-    ]
+    parts = _parts(path, operations.of_move, range(len(operations.rows)))
+    return [operation_heading(row) | part for row, part in zip(operations.rows, parts, strict=True)]
 
 
 def per_tool(path: EvaluatedPath) -> list[dict[str, Any]]:
@@ -285,188 +273,83 @@ def per_tool(path: EvaluatedPath) -> list[dict[str, Any]]:
     of_move = tool * many + length
     used, first = np.unique(of_move[moves.motion != RAPID], return_index=True)
     order = used[np.argsort(first)].tolist()
-    first_of_tool: dict[int, int] = {}
-    for part in order:
-        first_of_tool.setdefault(part // many, part)
+    first_of_tool = {part // many: part for part in reversed(order)}
     counts_with = [
         part if part in order else first_of_tool.get(part // many, part) for part in range(len(tools) * many)
     ]
-    parts = _Parts(path, np.array(counts_with)[of_move], len(counts_with))
     rows = []
-    for part in order:
+    for part, figures in zip(order, _parts(path, np.array(counts_with)[of_move], order), strict=True):
         number, tool_length = int(tools[part // many]), float(lengths[part % many])
         about = {
             "tool": number,
             "remark": remarks.get(number, ""),
             "length_mm": None if math.isnan(tool_length) else mm_from_m(tool_length),
         }
-        rows.append({**about, **parts.row(part)})
+        rows.append(about | figures)
     return rows
 
 
-class _Parts:
-    """A path in parts, each move in one of them: `of_move` (n_moves,) says in which of `count`."""
+def _parts(path: EvaluatedPath, of_move: IntArray, wanted: Sequence[int]) -> list[dict[str, Any]]:
+    """Length, time, figures, weakest place and nearest limit of parts of a path; (n_moves,) says which each move is."""
+    samples, moves = path.samples, path.program.moves
+    count = int(of_move.max(initial=0)) + 1
+    first = np.searchsorted(samples.move, np.arange(len(moves)))
+    last = np.append(first[1:], len(samples)) - 1
+    length, cutting = samples.s[last] - samples.s[first], moves.motion != RAPID
+    duration = np.diff(np.append(samples.t[first], samples.t[-1]))  # with the dwell after each move but the last
+    cutting_length = np.bincount(of_move, np.where(cutting, length, 0.0), count)
+    rapid_length = np.bincount(of_move, np.where(cutting, 0.0, length), count)
+    time = np.bincount(of_move, duration, count)
+    margin = np.where(samples.cutting & path.at.reachable, path.at.margin, np.inf)
+    rows_of = rows_of_parts(of_move[samples.move], count)
+    parts = []
+    for part in wanted:
+        rows = rows_of[part]
+        nearest = int(rows[np.argmin(margin[rows])])
+        known = bool(np.isfinite(margin[nearest]))
+        parts.append(
+            {
+                "cutting_length_mm": mm_from_m(float(cutting_length[part])),
+                "rapid_length_mm": mm_from_m(float(rapid_length[part])),
+                "time_s": float(time[part]),
+                **(path.figures if len(rows) == len(samples) else class_figures(path, rows)),
+                "min_margin": float(margin[nearest]) if known else None,
+                "min_margin_limit": path.at.reach.describe(nearest) if known else None,
+                "min_margin_line": int(samples.line[nearest]) if known else None,
+                "out_of_reach_samples": int(path.out_of_reach[rows].sum()),
+            }
+        )
+    return parts
 
-    def __init__(self, path: EvaluatedPath, of_move: IntArray, count: int) -> None:
-        self.path = path
-        samples, moves = path.samples, path.program.moves
-        first = np.searchsorted(samples.move, np.arange(len(moves)))
-        last = np.append(first[1:], len(samples)) - 1
-        length, cutting = samples.s[last] - samples.s[first], moves.motion != RAPID
-        time = np.diff(np.append(samples.t[first], samples.t[-1]))  # with the dwell after each move but the last
-        self.cutting_length = np.bincount(of_move, np.where(cutting, length, 0.0), count)
-        self.rapid_length = np.bincount(of_move, np.where(cutting, 0.0, length), count)
-        self.time = np.bincount(of_move, time, count)
-        self.out_of_reach = path.out_of_reach
-        self.margin = np.where(samples.cutting & path.at.reachable, path.at.margin, np.inf)
-        self.rows = _rows_of_parts(of_move[samples.move], count)
 
-    def row(self, part: int) -> dict[str, Any]:
-        """Length, time, figures, weakest place and nearest limit of one part."""
-        path, rows = self.path, self.rows[part]
-        nearest = int(rows[np.argmin(self.margin[rows])])
-        known = bool(np.isfinite(self.margin[nearest]))
-        return {
-            "cutting_length_mm": mm_from_m(float(self.cutting_length[part])),
-            "rapid_length_mm": mm_from_m(float(self.rapid_length[part])),
-            "time_s": float(self.time[part]),
-            **(path.figures if len(rows) == len(path.samples) else class_figures(path, rows)),
-            "min_margin": float(self.margin[nearest]) if known else None,
-            "min_margin_limit": path.at.reach.describe(nearest) if known else None,
-            "min_margin_line": int(path.samples.line[nearest]) if known else None,
-            "out_of_reach_samples": int(self.out_of_reach[rows].sum()),
-        }
-
-
-def _rows_of_parts(part: IntArray, count: int) -> list[IntArray]:
+def rows_of_parts(part: IntArray, count: int) -> list[IntArray]:
     """The rows of each of `count` parts, in order; `part` (n,) says in which each row is."""
     if count == 1:
         return [np.arange(len(part))]
     order = np.argsort(part, kind="stable")
-    ends = np.searchsorted(part[order], np.arange(count + 1))
-    return [order[ends[one] : ends[one + 1]] for one in range(count)]
+    return np.split(order, np.searchsorted(part[order], np.arange(1, count)))[:count]
 
 
 def describe_sample(path: EvaluatedPath, row: int) -> dict[str, Any]:
     """Line, source text, position and stiffness of one sample."""
-    samples = path.samples
+    samples, source = path.samples, path.program.source
     line = int(samples.line[row])
-    x, y, z = (mm_from_m(float(v)) for v in samples.position[row])
-    a, b, c = (deg_from_rad(float(v)) for v in samples.abc[row])
-    source = path.program.source
+    position, angles = mm_from_m(samples.position[row]).tolist(), deg_from_rad(samples.abc[row]).tolist()
     return {
         "line": line,
         "text": source[line - 1].strip() if 0 < line <= len(source) else "",
         "s_mm": mm_from_m(float(samples.s[row])),
-        "x_mm": x,
-        "y_mm": y,
-        "z_mm": z,
-        "a_deg": a,
-        "b_deg": b,
-        "c_deg": c,
+        **{f"{axis}_mm": value for axis, value in zip("xyz", position, strict=True)},
+        **{f"{axis}_deg": value for axis, value in zip("abc", angles, strict=True)},
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(float(path.at.stiffness[row])),
     }
-
-
-@dataclass(frozen=True)
-class ParameterBand:
-    """Uncertainty of the stiffness of n samples that comes from p fitted parameters.
-
-    Attributes
-    ----------
-    names
-        Of the parameters, as in machine files.
-    slopes
-        (n, p) N/m by which the stiffness changes with one standard deviation of each; nan out of reach.
-    correlation
-        (p, p) of the parameters.
-    """
-
-    names: tuple[str, ...]
-    slopes: FloatArray
-    correlation: FloatArray
-
-    @property
-    def deviation(self) -> FloatArray:
-        """(n,) N/m, standard deviation of the stiffness of each sample."""
-        squared = np.einsum("ni,ij,nj->n", self.slopes, self.correlation, self.slopes)
-        return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
-
-    def deviation_of_mean(self, weight: FloatArray) -> float:
-        """N/m, standard deviation of the mean stiffness of samples with weights (n,); the errors do not average out."""
-        slope: FloatArray = weight[weight > 0.0] @ self.slopes[weight > 0.0] / weight.sum()
-        return float(np.sqrt(max(float(slope @ self.correlation @ slope), 0.0)))
-
-
-def parameter_band(path: EvaluatedPath, model: StiffnessModel) -> ParameterBand | None:
-    """The band of a path; None where the machine file has no `[uncertainty]`, or none of what acts on the machine."""
-    given = model.given
-    uncertainty = given.uncertainty if given is not None else None
-    if uncertainty is None:
-        return None
-    idle = {active.effect.name for active in model.instruments}
-    idle |= {one.effect for one in idle_effects(model)}
-    kept = [
-        i
-        for i, (name, sd) in enumerate(zip(uncertainty.names, uncertainty.sd, strict=True))
-        if sd > 0.0 and name.partition(".")[0] not in idle
-    ]
-    if not kept:
-        return None
-    slopes = [_slope(path, model, uncertainty.names[i], float(uncertainty.sd[i])) for i in kept]
-    return ParameterBand(
-        tuple(uncertainty.names[i] for i in kept),
-        np.stack(slopes, axis=1),
-        np.asarray(uncertainty.correlation[np.ix_(kept, kept)]),
-    )
-
-
-def _slope(path: EvaluatedPath, model: StiffnessModel, name: str, sd: float) -> FloatArray:
-    """(n,) N/m per standard deviation of one parameter, away from a bound that is near."""
-    for step in (STEP, -STEP):
-        try:
-            moved = with_parameter_moved(model, name, step * sd)
-        except InputError:
-            continue
-        return np.asarray((_stiffness(path, moved) - path.at.stiffness) / step)
-    raise InputError(f"[uncertainty]: {name} has no room between its bounds for a standard deviation of {sd:g}")
-
-
-def _stiffness(path: EvaluatedPath, model: StiffnessModel) -> FloatArray:
-    samples = path.samples
-    at = evaluate(model, samples.position, samples.abc, samples.tangent, samples.tool_length, path.load, path.force)
-    return at.stiffness
-
-
-def band_figures(path: EvaluatedPath, band: ParameterBand) -> dict[str, Any] | None:
-    """Headline figures of the band: standard deviations and 95 % intervals in N/mm; None where nothing counts."""
-    about = path.headline
-    if not about.any():
-        return None
-    stiffness, weight = path.at.stiffness, np.where(about, path.samples.weight, 0.0)
-    relative = np.where(about, band.deviation / stiffness, 0.0)
-    mean, mean_sd = float(np.average(stiffness[about], weights=weight[about])), band.deviation_of_mean(weight)
-    row = int(np.argmin(np.where(about, stiffness, np.inf)))
-    widest = int(np.argmax(relative))
-    return {
-        "parameters": list(band.names),
-        "mean_sd_N_per_mm": n_per_mm_from_n_per_m(mean_sd),
-        "mean_95_N_per_mm": _interval(mean, mean_sd),
-        "min_sd_N_per_mm": n_per_mm_from_n_per_m(float(band.deviation[row])),
-        "min_95_N_per_mm": _interval(float(stiffness[row]), float(band.deviation[row])),
-        "largest_sd_percent": 100.0 * float(relative[widest]),
-        "largest_sd_line": int(path.samples.line[widest]),
-    }
-
-
-def _interval(value: float, sd: float) -> list[float]:
-    return [n_per_mm_from_n_per_m(value + sign * defaults.NORMAL_95 * sd) for sign in (-1.0, 1.0)]
 
 
 def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, AnyArray]:
     """Column name -> values in the shop's units, for some rows."""
     at = path.at
     names = np.array([limit.name for limit in at.limits] or ["none"])
+    moving = (path.samples.motion[rows] != RAPID) & path.samples.tangent[rows].any(axis=1)
     return {
         **path_columns(path.samples, rows),
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(at.stiffness[rows]),
@@ -475,14 +358,8 @@ def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, 
         "margin": at.margin[rows],
         "margin_limit": names[at.limit[rows]],
         "operation": path.operations.of_move[path.samples.move[rows]] + 1,
-        "cut": _cut(path, rows),
+        "cut": np.where(moving, np.where(path.along_axis[rows], "plunge", "across"), ""),  # whatever the load
     }
-
-
-def _cut(path: EvaluatedPath, rows: slice) -> TextArray:
-    """(n,) "across" or "plunge", whatever the load; "" on rapids and where the tip does not move."""
-    moving = (path.samples.motion[rows] != RAPID) & path.samples.tangent[rows].any(axis=1)
-    return np.where(moving, np.where(path.along_axis[rows], "plunge", "across"), "")
 
 
 def samples_csv(path: EvaluatedPath) -> Iterator[bytes]:

@@ -5,56 +5,31 @@ from __future__ import annotations
 import json
 import pickle
 import textwrap
-import threading
-import uuid
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pebble import ProcessExpired
-
-from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step
+from toolpath_stiff.api.hand_out import Run, Task, answers
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.programs import (
-    JOBS,
-    Compared,
-    Partial,
-    RequiredStiffness,
-    ShowPlunges,
-    Table,
-    analyze,
-    path_options,
-)
-from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
-from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.api.programs import JOBS, ShowPlunges, Table, analyze, check_options
+from toolpath_stiff.defaults import job_count
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.program import Program
-from toolpath_stiff.options import checked
-from toolpath_stiff.processes import ProcessPool, death
+from toolpath_stiff.options import arguments_of, checked
 from toolpath_stiff.report.analysis.summary import check_table
 from toolpath_stiff.report.batch.index import files, names
-from toolpath_stiff.report.batch.programs import (
-    Found,
-    Listed,
-    Outcome,
-    columns_of,
-    figures_of,
-    find_programs,
-    report_folders,
-    terminal_summary,
-)
+from toolpath_stiff.report.batch.outcomes import Outcome, columns_of, terminal_summary
+from toolpath_stiff.report.batch.programs import Found, Listed, find_programs, report_folders
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, Result
-from toolpath_stiff.results_folder import Rules, check_folder, clear_up, write_folder
+from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Machines = tuple[Machine, Machine | None]  # the machine, and the one to compare with
-_ALONE = threading.Lock()  # a process analyzes one program at a time, however many threads an executor has
 
 
 class ManyAnalyses(Result):
@@ -78,37 +53,37 @@ class ManyAnalyses(Result):
     @property
     def failed(self) -> list[Outcome]:
         """The programs that have no report, each with its reason."""
-        return [one for one in self.outcomes if one.status == "failed"]
+        return [outcome for outcome in self.outcomes if outcome.status == "failed"]
 
     @property
     def complete(self) -> bool:
         """Whether no program failed and no sample was left out."""
-        return all(one.status == "done" for one in self.outcomes)
+        return all(outcome.status == "done" for outcome in self.outcomes)
 
     @property
     def below_required(self) -> list[Outcome]:
         """The programs with a cut below what was required."""
-        return [one for one in self.outcomes if (one.figures or {}).get("lines_below_required")]
+        return [outcome for outcome in self.outcomes if outcome.figure("lines_below_required")]
 
     @cached_property
     def _document(self) -> list[dict[str, Any]]:
-        return [self._entry(one) for one in self.outcomes]
+        return [self._entry(outcome) for outcome in self.outcomes]
 
     def to_dict(self) -> list[dict[str, Any]]:  # type: ignore[override]  # the command prints a list
         """The JSON document of the command, a list: each program's summary, its file and its report; or the error."""
         return self._document
 
-    def _entry(self, one: Outcome) -> dict[str, Any]:
-        if one.reason:
-            return {"program": Path(one.file).name, "file": one.file, "error": one.reason}
-        report = self.folder / one.opens
+    def _entry(self, outcome: Outcome) -> dict[str, Any]:
+        if outcome.reason:
+            return {"program": Path(outcome.file).name, "file": outcome.file, "error": outcome.reason}
+        report = self.folder / outcome.opens
         summary = json.loads((report.parent / "summary.json").read_text(encoding="utf-8"))
-        return {**summary, "file": one.file, "report": str(report)}
+        return {**summary, "file": outcome.file, "report": str(report)}
 
     def json_pieces(self) -> Iterator[str]:
         """`to_dict()` as text, one program a piece: together they may be large."""
-        for i, one in enumerate(self.outcomes):
-            entry = json.dumps(self._entry(one), indent=2)  # names need not be UTF-8, so escaped
+        for i, outcome in enumerate(self.outcomes):
+            entry = json.dumps(self._entry(outcome), indent=2)  # names need not be UTF-8, so escaped
             yield ("[\n" if i == 0 else ",\n") + textwrap.indent(entry, "  ")
         yield "\n]\n"
 
@@ -141,15 +116,8 @@ def analyze_many(
     table: Table = "csv",
     show_plunges: ShowPlunges = False,
     replace: bool = False,
-    origin_mm_deg: Origin = None,
-    load: LoadDirection = LOAD,
-    step_mm: Step = 1.0,
-    force_N: Force = FORCE,
-    partial: Partial = False,
-    require_N_per_mm: RequiredStiffness = None,
-    compare_with: Compared = None,
     progress: Progress | None = None,
-    **reading: Any,
+    **options: Any,
 ) -> ManyAnalyses:
     r"""Stiffness along the path of many programs: each gets its report, all get one overview.
 
@@ -173,13 +141,12 @@ def analyze_many(
         available CPU.
     plots, table, show_plunges, replace
         As of `Analysis.save`.
-    origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm, compare_with
-        As of `analyze`.
     progress
         Called with the program that is done, programs done, programs in all; first with 0 done, when all arguments
         have been found right.
-    **reading
-        How files are read: the options of `Program.read`.
+    **options
+        Those of `analyze` (origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm, compare_with) and of
+        `Program.read`.
 
     Raises
     ------
@@ -207,108 +174,57 @@ def analyze_many(
     ['done', 'failed']
     """
     on = machine_from(machine)
-    other = None
-    if compare_with is not None:
-        other = compare_with if isinstance(compare_with, Machine) else on.like(compare_with)
-    options: dict[str, Any] = {
-        "origin_mm_deg": origin_mm_deg, "load": load, "step_mm": step_mm, "force_N": force_N, "partial": partial,
-        "require_N_per_mm": require_N_per_mm,
-    }  # fmt: skip
-    path_options(**options)  # a mistake in them is one error
+    own = {name: options.pop(name) for name in arguments_of(analyze) if name in options}
+    compared = own.pop("compare_with", None)
+    other = on.like(compared) if isinstance(compared, str | Path) else compared
+    check_options(**own)  # a mistake in them is one error
     check_table(table)
-    found, given = _found(programs)
-    example = Program.from_text("", **reading)
-    _check_shared(on, other, [example, *given.values()])
-    job_count(jobs, 1)
-    read = (*(one.file for one in found), *(file for one in (example, *given.values()) for file in one.inputs))
-    inputs = (*read, *on.inputs, *(other.inputs if other else ()))
-    run = Run(
-        out=Path(folder),
-        rules=Rules(inputs=inputs, replace=replace),
-        options=options,
-        saving={"plots": plots, "table": table, "show_plunges": show_plunges},
-        machines=(on, other),
-    )
-    check_folder(run.out, names(), run.rules)
-    listed = report_folders(found)
-    with _folders_for(run.out, listed):
+    listed, given = _listed(programs)
+    example = Program.from_text("", **options)
+    each = [example, *given.values()]
+    _check_shared(on, other, each)
+    count = job_count(jobs, len(listed))
+    files_read = (*(program.file for program in listed), *(file for program in each for file in program.inputs))
+    rules = Rules(inputs=(*files_read, *on.inputs, *(other.inputs if other else ())), replace=replace)
+    out = Path(folder)
+    check_folder(out, names(), rules)
+    run = Run(out.absolute(), str(out), pickle.dumps((on, other)), own, plots, table, show_plunges, replace)
+    reports = report_folders(listed)
+    with _folders_for(out, reports):
         # The overview of an earlier run goes, as its reports do from now on, one after the other.
-        write_folder(run.out, {}, command="analyze", rules=run.rules, unfinished=True)
-        tasks = _tasks(run, listed, given, example)
-        outcomes = _outcomes(tasks, run, executor, jobs, progress)
-        written = write_folder(run.out, files(outcomes), command="analyze", rules=run.rules)
-    return ManyAnalyses(run.out, outcomes, written)
+        write_folder(out, {}, command="analyze", rules=rules, unfinished=True)
+        tasks = _tasks(run, reports, given, example, _file_ids(rules.inputs))
+        outcomes = dict.fromkeys(range(len(tasks)), Outcome("", ""))
+        if progress is not None:
+            progress(f"{count} at a time" if executor is None else type(executor).__name__, 0, len(tasks))
+        for done, (place, outcome) in enumerate(answers(tasks, executor, count), 1):
+            outcomes[place] = outcome
+            if progress is not None:
+                progress(f"{outcome.name}{': failed' if outcome.reason else ''}", done, len(tasks))
+        written = write_folder(out, files([*outcomes.values()]), command="analyze", rules=rules)
+    return ManyAnalyses(out, [*outcomes.values()], written)
 
 
-@dataclass(frozen=True)
-class Run:
-    """What all programs share, in this process."""
-
-    out: Path
-    rules: Rules
-    options: dict[str, Any]
-    saving: dict[str, Any]
-    machines: Machines
-
-
-@dataclass(frozen=True)
-class Task:
-    """One program, with all that a process needs for it: small, picklable, paths absolute.
-
-    Attributes
-    ----------
-    program, listed
-        What is read; its file as named, its name, its report's folder.
-    out, shown
-        The folder of all reports, and as the caller named it.
-    machines
-        Pickled once for all programs: a process unpacks it once.
-    options, saving
-        Of `analyze` and of `Analysis.save`.
-    inputs, replace
-        Files that lie where the report goes and are read by the run, and whether they may be replaced.
-    version, run
-        Of the package; a name that no other run has, for executors that know a call again by its arguments.
-    """
-
-    program: Program
-    listed: Listed
-    out: Path
-    shown: str
-    machines: bytes
-    options: dict[str, Any]
-    saving: dict[str, Any]
-    inputs: tuple[str, ...]
-    replace: bool
-    version: str = VERSION
-    run: str = ""
-
-    @property
-    def folder(self) -> Path:
-        """The folder of its report."""
-        return self.out / self.listed.folder
-
-
-def _found(programs: Iterable[str | Path | Program | Found]) -> tuple[list[Found], dict[str, Program]]:
+def _listed(programs: Iterable[str | Path | Program | Found]) -> tuple[list[Found], dict[str, Program]]:
     """The programs, each once, and the `Program` objects among them by file, or by name where they have none."""
     given: dict[str, Program] = {}
-    asked: list[str | Found] = []
-    for one in [programs] if isinstance(programs, str | Path | Program) else programs:
-        if isinstance(one, Program):
-            found = Found(one.file or one.name, Path(Path(one.file or one.name).name))
-            if found.file in given:
-                raise InputError(f"two programs are named {found.file!r}", hint="give each a name of its own")
-            given[found.file] = one
-            asked.append(found)
+    arguments: list[str | Found] = []
+    for program in [programs] if isinstance(programs, str | Path | Program) else programs:
+        if isinstance(program, Program):
+            file = program.file or program.name
+            if file in given:
+                raise InputError(f"two programs are named {file!r}", hint="give each a name of its own")
+            given[file] = program
+            arguments.append(Found(file, Path(Path(file).name)))
         else:
-            asked.append(one if isinstance(one, Found) else str(one))
-    programs_found, _ = find_programs(asked)
-    missing = given.keys() - {one.file for one in programs_found}
+            arguments.append(program if isinstance(program, Found) else str(program))
+    listed, _ = find_programs(arguments)
+    missing = given.keys() - {program.file for program in listed}
     if missing:
         raise InputError(f"{min(missing)!r} is named twice", hint="name it once, as a file or as a Program")
-    if not programs_found:
+    if not listed:
         raise InputError("no programs", expected="files, folders or Program objects")
-    return programs_found, given
+    return listed, given
 
 
 def _check_shared(on: Machine, other: Machine | None, programs: Iterable[Program]) -> None:
@@ -321,43 +237,30 @@ def _check_shared(on: Machine, other: Machine | None, programs: Iterable[Program
             find_rs274(program.options["rs274"], program.options["unconfined"])
 
 
-def _tasks(run: Run, listed: Sequence[Listed], given: dict[str, Program], example: Program) -> list[Task]:
-    out, known = run.out.absolute(), _file_ids(run.rules.inputs)
-    shared: dict[str, Any] = {
-        "out": out,
-        "shown": str(run.out),
-        "machines": pickle.dumps(run.machines),
-        "options": run.options,
-        "saving": run.saving,
-    }
-    name = uuid.uuid4().hex
+def _tasks(
+    run: Run, reports: Sequence[Listed], given: dict[str, Program], example: Program, inputs: dict[tuple[int, int], str]
+) -> list[Task]:
+    """A task for each program; with it the inputs of any that lie in its folder: of thousands, hardly ever one."""
     tasks = []
-    for one in listed:
-        program = given.get(one.file) or replace(example, name=Path(one.file).name, file=one.file, text=None)
+    for listed in reports:
+        program = given.get(listed.file) or replace(example, name=Path(listed.file).name, file=listed.file, text=None)
         file = program.file and str(Path(program.file).absolute())
-        inputs = _inputs_in(out / one.folder, known)
-        sent = replace(program, file=file, _last={})
-        tasks.append(Task(sent, one, inputs=inputs, replace=run.rules.replace, run=name, **shared))
+        there: dict[tuple[int, int], str] = {}
+        with suppress(OSError):  # no such folder yet, the usual case
+            there = _file_ids((run.out / listed.folder).iterdir())
+        within = tuple(inputs[key] for key in there if key in inputs)
+        tasks.append(Task(replace(program, file=file, _last={}), listed, within, run))
     return tasks
 
 
-def _file_ids(inputs: Iterable[str | Path]) -> dict[tuple[int, int], str]:
+def _file_ids(files: Iterable[str | Path]) -> dict[tuple[int, int], str]:
     """Device and inode of each file that is there."""
-    found = {}
-    for file in map(Path, inputs):
+    ids = {}
+    for file in map(Path, files):
         with suppress(OSError):
             state = file.stat()
-            found[state.st_dev, state.st_ino] = str(file.absolute())
-    return found
-
-
-def _inputs_in(folder: Path, known: dict[tuple[int, int], str]) -> tuple[str, ...]:
-    """Inputs of any program that lie in a report's folder, by that name or another: of thousands, hardly ever one."""
-    try:
-        there = _file_ids(folder.iterdir())
-    except OSError:  # no such folder yet, the usual case
-        return ()
-    return tuple(known[one] for one in there if one in known)
+            ids[state.st_dev, state.st_ino] = str(file.absolute())
+    return ids
 
 
 @contextmanager
@@ -377,139 +280,3 @@ def _folders_for(out: Path, programs: Sequence[Listed]) -> Iterator[None]:
         for folder in reversed(made):
             with suppress(OSError):  # not empty, the usual case
                 folder.rmdir()
-
-
-def _outcomes(
-    tasks: Sequence[Task], run: Run, executor: Executor | None, jobs: int | None, progress: Progress | None
-) -> list[Outcome]:
-    """What became of each program, in the order given."""
-    outcomes: list[Outcome | None] = [None] * len(tasks)
-    count = job_count(jobs, len(tasks))
-    if progress is not None:
-        progress(f"{count} at a time" if executor is None else type(executor).__name__, 0, len(tasks))
-    for done, (place, outcome) in enumerate(_answers(tasks, run, executor, count), 1):
-        outcomes[place] = outcome
-        if progress is not None:
-            progress(f"{outcome.name}{': failed' if outcome.reason else ''}", done, len(tasks))
-    return [one for one in outcomes if one is not None]
-
-
-def _answers(tasks: Sequence[Task], run: Run, executor: Executor | None, jobs: int) -> Iterator[tuple[int, Outcome]]:
-    """Position and outcome of each task, as they come."""
-    if executor is None and jobs == 1:
-        for place, task in enumerate(tasks):
-            yield place, analyze_task(task, run.machines)
-        return
-    try:
-        if executor is not None:
-            yield from _from_executor(tasks, executor)
-        else:
-            with ProcessPool(jobs) as pool:
-                yield from _from_executor(tasks, pool)
-    finally:  # of processes that died, wherever they were
-        clear_up(task.folder for task in tasks)
-
-
-def _from_executor(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[int, Outcome]]:
-    # The largest first, so that no process is left alone with one at the end.
-    order = sorted(range(len(tasks)), key=lambda i: -_size(tasks[i].program))
-    futures = {_submit(executor, tasks[i]): i for i in order}
-    suspects = []
-    try:
-        for future in as_completed(futures):
-            place = futures[future]
-            if _worker_died(future):
-                suspects.append(place)
-            else:
-                yield place, _answer(tasks[place], future)
-        # Dask gives a worker its next tasks early and, when it dies, cannot tell which of them it died of: each alone.
-        for place in suspects:
-            futures = {_submit(executor, tasks[place]): place}
-            yield place, _answer(tasks[place], next(as_completed(futures)))
-    finally:
-        for future in futures:
-            future.cancel()
-
-
-def _worker_died(future: Future[Outcome]) -> bool:
-    """Whether a Dask cluster gave a call up because its workers died; by name, as Dask need not be installed."""
-    return not future.cancelled() and type(future.exception()).__name__ == "KilledWorker"
-
-
-def _submit(executor: Executor, task: Task) -> Future[Outcome]:
-    try:
-        return executor.submit(analyze_task, task)
-    except RuntimeError as error:  # it has been shut down, or it broke
-        failed: Future[Outcome] = Future()
-        failed.set_exception(error)
-        return failed
-
-
-def _size(program: Program) -> int:
-    if program.file is None:
-        return len(program.text or "")
-    try:
-        return Path(program.file).stat().st_size
-    except OSError:  # it fails later, with a better message
-        return 0
-
-
-def _answer(task: Task, future: Future[Outcome]) -> Outcome:
-    """What became of a program, also where its process gave no answer."""
-    if future.cancelled():
-        return _failed(task, "was cancelled: the executor was shut down, or lost its workers")
-    error = future.exception()
-    if error is None:
-        return future.result()
-    if isinstance(error, ProcessExpired):
-        return _failed(task, death(error))
-    if _worker_died(future):
-        tried, last = error.args[2] + 1, error.args[1].address
-        return _failed(task, f"{tried} workers died of it, the last at {last} (out of memory? their logs may say)")
-    return _failed(task, f"no process could do it: {_named(error)}")
-
-
-def _failed(task: Task, told: str) -> Outcome:
-    """A failure: a sentence in one line that begins with the file as named; errors know its last name alone."""
-    file = task.listed.file
-    line = "; ".join(told.splitlines())
-    line = line.replace(task.program.file or file, file).replace(str(task.out), task.shown)
-    last = Path(file).name
-    if line.startswith(f"{last}:"):
-        line = file + line[len(last) :]
-    return Outcome(task.listed.name, file, line if file in line else f"{file}: {line}")
-
-
-def _named(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())
-
-
-def analyze_task(task: Task, machines: Machines | None = None) -> Outcome:
-    """Analyse a program and write its report: what an executor is handed, in whatever process."""
-    if task.version != VERSION:
-        return _failed(task, f"its process runs toolpath_stiff {VERSION}, the caller {task.version}")
-    if not task.out.is_dir():
-        return _failed(
-            task, f"its process does not see {task.out}: reports need a file system that all processes share"
-        )
-    try:
-        with _ALONE:
-            on, other = machines or _unpacked(task.machines)
-            found = analyze(task.program, on, compare_with=other, **task.options)
-            found.save(task.folder, rules=Rules(inputs=task.inputs, replace=task.replace), **task.saving)
-    except TpsError as error:
-        return _failed(task, str(error))
-    except MemoryError:
-        return _failed(task, "out of memory; try fewer --jobs")
-    except Exception as error:  # a defect of ours: it must not stop the other programs
-        return _failed(task, f"{_named(error)} (a defect; analyze it alone to see where)")
-    opens = "report.html" if task.saving["plots"] else "summary.json"
-    report = (task.listed.folder / opens).as_posix()
-    return Outcome(task.listed.name, task.listed.file, "", report, figures_of(found.to_dict()))
-
-
-@lru_cache(maxsize=2)
-def _unpacked(machines: bytes) -> Machines:
-    """Once a process."""
-    found: Machines = pickle.loads(machines)
-    return found

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any
 
 from toolpath_stiff.nc.cutter_location import cycles, modes, motion
@@ -95,12 +94,12 @@ def refused(
 
 
 def no_shift(statement: Statement) -> bool:
-    """Whether a statement shifts by nothing."""
+    """True for a statement that shifts by nothing."""
     return len(statement.words) == 3 and all(is_number(word) and not number(word) for word in statement.words)
 
 
 def no_turn(statement: Statement) -> bool:
-    """Whether a rotary axis turns by nothing, or goes to 0."""
+    """True for a rotary axis that turns by nothing, or goes to 0."""
     angles = [number(word) for word in statement.words if is_number(word)]
     return bool(angles) and not any(angles)
 
@@ -239,7 +238,7 @@ def look_up(name: str) -> Word | None:
 
 
 def meaning_of(name: str) -> str:
-    """What a word is taken for, for a list of the words used."""
+    """The meaning of a word, for a list of the words used."""
     word = look_up(name)
     if word is None:
         return UNKNOWN
@@ -265,24 +264,3 @@ def execute(state: State, statement: Statement) -> None:
             f"{statement.shown}: {name} {UNKNOWN}, and may move the tool", GEOMETRY, "take the line out if it does not"
         )
     state.note(f"{name} {UNKNOWN}, and not acted upon", doubtful=True)
-
-
-def words_table() -> str:
-    r"""The words as a Markdown table, as it stands in docs/nc.md: neighbours with the same meaning share a row.
-
-    Examples
-    --------
-    >>> print("\n".join(words_table().splitlines()[:3]))
-    | words | taken for | | written by | source |
-    | --- | --- | --- | --- | --- |
-    | `GOTO/x,y,z[,i,j,k]` | the tool moves to a point | read | all | ISO 4343 |
-    """
-    lines = ["| words | taken for | | written by | source |", "| --- | --- | --- | --- | --- |"]
-    order = (READ, LISTED, DOUBTFUL, REFUSED)
-    words = sorted(WORDS.values(), key=lambda word: order.index(word.kind))
-    for (kind, meaning, by, source), group in groupby(
-        words, lambda word: (word.kind, word.meaning, word.written_by, word.source)
-    ):
-        names = " ".join(f"`{word.name}{word.form}`" for word in group)
-        lines.append(f"| {names} | {meaning} | {kind} | {by} | {source} |")
-    return "\n".join(lines) + "\n"

@@ -1,0 +1,123 @@
+"""How far the uncertainty of a machine's fitted parameters reaches into the stiffness along a path.
+
+A linear propagation (JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation 13): the covariance
+of the parameters between two slopes of the stiffness, which are differences of whole evaluations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpath_stiff import defaults
+from toolpath_stiff.analysis.evaluation import evaluate
+from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.path import Samples
+from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
+from toolpath_stiff.units import n_per_mm_from_n_per_m
+
+STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
+
+
+@dataclass(frozen=True)
+class ParameterBand:
+    """Uncertainty of the stiffness of n samples that comes from p fitted parameters.
+
+    Attributes
+    ----------
+    names
+        Of the parameters, as in machine files.
+    slopes
+        (n, p) N/m by which the stiffness changes with one standard deviation of each; nan out of reach.
+    correlation
+        (p, p) of the parameters.
+    """
+
+    names: tuple[str, ...]
+    slopes: FloatArray
+    correlation: FloatArray
+
+    @property
+    def deviation(self) -> FloatArray:
+        """(n,) N/m, standard deviation of the stiffness of each sample."""
+        squared = np.einsum("ni,ij,nj->n", self.slopes, self.correlation, self.slopes)
+        return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+
+    def deviation_of_mean(self, weight: FloatArray) -> float:
+        """N/m, standard deviation of the mean stiffness of samples with weights (n,); the errors do not average out."""
+        slope: FloatArray = weight[weight > 0.0] @ self.slopes[weight > 0.0] / weight.sum()
+        return float(np.sqrt(max(float(slope @ self.correlation @ slope), 0.0)))
+
+
+@dataclass(frozen=True)
+class BandFigures:
+    """Standard deviations and 95 % intervals of mean and smallest stiffness, and where the band is widest."""
+
+    parameters: tuple[str, ...]
+    mean_sd_N_per_mm: float  # noqa: N815  (newton)
+    mean_95_N_per_mm: list[float]  # noqa: N815
+    min_sd_N_per_mm: float  # noqa: N815  (newton)
+    min_95_N_per_mm: list[float]  # noqa: N815
+    largest_sd_percent: float
+    largest_sd_line: int
+
+
+def parameter_band(
+    model: StiffnessModel, samples: Samples, load: Load, force: float, stiffness: FloatArray
+) -> ParameterBand | None:
+    """The band of a path, given its stiffness (n,); None where the machine file states no uncertainty of what acts."""
+    uncertainty = model.given.uncertainty if model.given is not None else None
+    if uncertainty is None:
+        return None
+    idle = {active.effect.name for active in model.instruments} | {effect.effect for effect in idle_effects(model)}
+    kept = [
+        i
+        for i, (name, sd) in enumerate(zip(uncertainty.names, uncertainty.sd, strict=True))
+        if sd > 0.0 and name.partition(".")[0] not in idle
+    ]
+    if not kept:
+        return None
+
+    def slope(name: str, sd: float) -> FloatArray:
+        """(n,) N/m per standard deviation of one parameter, away from a bound that is near."""
+        for step in (STEP, -STEP):
+            try:
+                moved = with_parameter_moved(model, name, step * sd)
+            except InputError:
+                continue
+            path = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+            return np.asarray((evaluate(moved, *path, load, force).stiffness - stiffness) / step)
+        raise InputError(f"[uncertainty]: {name} has no room between its bounds for a standard deviation of {sd:g}")
+
+    return ParameterBand(
+        tuple(uncertainty.names[i] for i in kept),
+        np.stack([slope(uncertainty.names[i], float(uncertainty.sd[i])) for i in kept], axis=1),
+        np.asarray(uncertainty.correlation[np.ix_(kept, kept)]),
+    )
+
+
+def band_figures(band: ParameterBand, samples: Samples, stiffness: FloatArray, rows: BoolArray) -> BandFigures | None:
+    """The figures of a band over some samples (n,); None where there are none."""
+    if not rows.any():
+        return None
+    weight = np.where(rows, samples.weight, 0.0)
+    relative = np.where(rows, band.deviation / stiffness, 0.0)
+    mean, mean_sd = float(np.average(stiffness[rows], weights=weight[rows])), band.deviation_of_mean(weight)
+    low, widest = int(np.argmin(np.where(rows, stiffness, np.inf))), int(np.argmax(relative))
+    low_sd = float(band.deviation[low])
+    return BandFigures(
+        parameters=band.names,
+        mean_sd_N_per_mm=n_per_mm_from_n_per_m(mean_sd),
+        mean_95_N_per_mm=_interval(mean, mean_sd),
+        min_sd_N_per_mm=n_per_mm_from_n_per_m(low_sd),
+        min_95_N_per_mm=_interval(float(stiffness[low]), low_sd),
+        largest_sd_percent=100.0 * float(relative[widest]),
+        largest_sd_line=int(samples.line[widest]),
+    )
+
+
+def _interval(value: float, sd: float) -> list[float]:
+    return [n_per_mm_from_n_per_m(value + sign * defaults.NORMAL_95 * sd) for sign in (-1.0, 1.0)]
