@@ -13,7 +13,7 @@ from benchmarks.pages import table
 Record = dict[str, Any]
 
 NORMAL_95 = NormalDist().inv_cdf(0.975)
-# Detectability of the smallest effects that the rig draws (`toolpath_stiff.rig.effects.DETECTABLE`); one whose largest
+# Detectability of the smallest effects that the rig draws (`toolpath_stiff.rig.sizes.DETECTABLE`); one whose largest
 # size of 30 % stays below cannot be seen in the layout.
 JUST_SEEN = 3.9
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.case import Case, clamp_of, rows_of
-from toolpath_stiff.rig.effects import Covariance, scale_of, with_effect
+from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
+from toolpath_stiff.rig.sizes import Covariance, scale_of
 
 STEP = 0.05  # relative change of a parameter, for differences
 

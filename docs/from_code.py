@@ -11,6 +11,7 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ if __name__ == "__main__":
 import toolpath_stiff
 from toolpath_stiff.nc.codes.code import EVERYWHERE, Code, holds_anyway
 from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED
-from toolpath_stiff.nc.cutter_location.vocabulary import words_table
+from toolpath_stiff.nc.cutter_location.vocabulary import DOUBTFUL, LISTED, READ, WORDS
+from toolpath_stiff.nc.cutter_location.vocabulary import REFUSED as REFUSED_WORD
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.stiffness.catalogue import packaged_effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect, Parameter
@@ -99,6 +101,16 @@ def _controls(names: tuple[str, ...]) -> str:
 
 
 # Effects
+
+
+def words_table() -> str:
+    """The words of cutter-location files as a Markdown table: neighbours with the same meaning share a row."""
+    order = (READ, LISTED, DOUBTFUL, REFUSED_WORD)
+    words = sorted(WORDS.values(), key=lambda word: order.index(word.kind))
+    table = [("words", "taken for", "", "written by", "source")]
+    for cells, group in groupby(words, lambda word: (word.meaning, word.kind, word.written_by, word.source)):
+        table.append((" ".join(f"`{word.name}{word.form}`" for word in group), *cells))
+    return "\n".join([*rows(*table), ""])
 
 
 def effects_table() -> str:

@@ -20,8 +20,9 @@ from benchmarks.several_cases import GROUPS, make_jobs, noise_remarks, suspects_
 from benchmarks.several_seen import shows_beside
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.case import clamp_of, draw_case, rows_of
-from toolpath_stiff.rig.effects import scale_of, with_effect
+from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
+from toolpath_stiff.rig.sizes import scale_of
 
 
 def record(truth: dict[str, float], verdict: str, plausible: list[str], **more: Any) -> dict[str, Any]:

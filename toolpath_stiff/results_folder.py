@@ -215,8 +215,7 @@ def _refused(target: Path, names: Iterable[str], rules: Rules) -> list[Path]:
         return list(dict.fromkeys([*in_the_way, *(target / name for name in names if _told(target, name, old, rules))]))
     if holds_others(target, rules.of):
         raise FileError(
-            f"{str(target)!r} holds the results of {', '.join(map(repr, old.of))} (seen from there)",
-            hint=_OTHER_FOLDER,
+            f"{str(target)!r} holds the results of {', '.join(map(repr, old.of))} (seen from there)", hint=_OTHER_FOLDER
         )
     for name in names:
         if told := _told(target, name, old, rules):

@@ -10,10 +10,11 @@ import pytest
 from tests.conftest import seeds
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.case import clamp_of, draw_case, effects_of_layout, make_case, rows_of
-from toolpath_stiff.rig.effects import CATALOGUE, Covariance
+from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import OUTSIDE, Nuisances, disturb_readings
 from toolpath_stiff.rig.nominal import load_nominal, reachable
+from toolpath_stiff.rig.sizes import Covariance
 
 NIST = load_nominal("nist")
 

@@ -1,4 +1,4 @@
-"""Where the work should sit: the search, any placement tried, the program written for a placement."""
+"""Placements of the work: the search, any placement tried, the program written for a placement."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ def _keep_out(text: str) -> KeepOut:
 def _bounds(
     machine: MachineModel, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
 ) -> Bounds:
-    """What may vary, in SI; where nothing is said, the machine's workspace."""
+    """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     import numpy as np
 
     from toolpath_stiff.placement.goals import Bounds
@@ -246,7 +246,7 @@ def try_placement(
     step_mm: Step = 1.0,
     force_N: Force = FORCE,
 ) -> PlacementTrial:
-    r"""What a program does wherever it is put: read and sampled once, then the figures of any placement at once.
+    r"""A program that can be put anywhere: read and sampled once, then the figures of any placement at once.
 
     The figures are those of `place` and of `analyze` with the same step. Arguments and errors as of `analyze`.
 

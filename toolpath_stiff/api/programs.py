@@ -117,8 +117,8 @@ def analyze(
     first, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
     second = first.like(compare_with) if isinstance(compare_with, str | Path) else compare_with
 
-    def on(one: Machine, other: Machine | None, progress: Callable[[int, int], None] | None) -> Analysis:
-        model = one.running(part, [other] if other else [])
+    def on(machine: Machine, other: Machine | None, progress: Callable[[int, int], None] | None) -> Analysis:
+        model = machine.running(part, [other] if other else [])
         read = part.moves(origin, model.machine.default_origin)
         step = m_from_mm(step_mm)
         return analyze(

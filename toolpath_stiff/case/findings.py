@@ -23,14 +23,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.placement.result import Placement
     from toolpath_stiff.planning.result import Plan
 
-PLACE = (
-    "x_mm",
-    "y_mm",
-    "z_mm",
-    "tilt_a_deg",
-    "tilt_b_deg",
-    "rotate_deg",
-)  # as of an origin
+PLACE = ("x_mm", "y_mm", "z_mm", "tilt_a_deg", "tilt_b_deg", "rotate_deg")  # as of an origin
 
 
 def words_of(function: Any, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -57,10 +57,7 @@ def table_1() -> tuple[FloatArray, FloatArray]:
 
 
 def machine_of(
-    lengths: FloatArray,
-    hexagon_twist: float = 0.0,
-    law: StrutLaw | None = None,
-    scale: float = 1.0,
+    lengths: FloatArray, hexagon_twist: float = 0.0, law: StrutLaw | None = None, scale: float = 1.0
 ) -> Machine:
     """The machine of six lengths (m, as `UNKNOWNS`).
 

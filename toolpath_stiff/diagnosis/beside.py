@@ -18,10 +18,13 @@ def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
     """What is neither shown nor excluded, and where an indicator would tell; "" where there is nothing."""
     if not unexcluded:
         return ""
-    told, more = unexcluded[:MOST_BESIDE], len(unexcluded) - MOST_BESIDE
-    effects = [f"{one.effect.name} ({_up_to(one)}, {100.0 * one.rms:.2g} % of the tip's stiffness)" for one in told]
+    named, more = unexcluded[:MOST_BESIDE], len(unexcluded) - MOST_BESIDE
+    effects = [
+        f"{hidden.effect.name} ({_up_to(hidden)}, {100.0 * hidden.rms:.2g} % of the tip's stiffness)"
+        for hidden in named
+    ]
     effects += [f"{more} more"] if more > 0 else []
-    places = dict.fromkeys(INDICATORS[one.effect.link].split(":")[0] for one in told)
+    places = dict.fromkeys(INDICATORS[hidden.effect.link].split(":")[0] for hidden in named)
     tells = " or ".join(place for place in places if place != "none")
     words = f"{joined(effects)}: the readings neither show nor exclude {'it' if len(unexcluded) == 1 else 'them'}"
     return f"{words}; an indicator {tells} would tell" if tells else words

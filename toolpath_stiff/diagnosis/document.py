@@ -26,27 +26,29 @@ ERRORS = (
 )  # fmt: skip
 
 
-def document_of(found: Examination, rows: Rows) -> dict[str, Any]:
+def document_of(diagnosis: Examination, rows: Rows) -> dict[str, Any]:
     """Everything that `diagnose.json` holds."""
-    main, alike, noise = found.main, found.alike, found.noise
-    drawn = found.unconfirmed or main.drawn
+    main, alike, noise = diagnosis.main, diagnosis.alike, diagnosis.noise
+    drawn = diagnosis.unconfirmed or main.drawn
     links = {family.name: family.effect.link for family in main.families}
     return {
-        "verdict": found.verdict,
-        "text": verdict_text(found),
+        "verdict": diagnosis.verdict,
+        "text": verdict_text(diagnosis),
         "question": main.question,
         "draft_status": None if drawn is None else drawn.document,
-        "baseline": _baseline(found, rows),
+        "baseline": _baseline(diagnosis, rows),
         "candidates": [_candidate(row, links[row.name]) for row in rows.candidates],
         "pairs": [_pair(row) for row in rows.pairs],
-        "plausible": found.plausible,
-        "explanations": list(found.explanations),
-        "best": found.best,
-        "why": why(found),
-        "cannot_test": [{"effect": name, "missing": list(lacks)} for name, lacks in sorted(found.cannot_test.items())],
-        "next_measurements": list(found.next_measurements),
-        "next": next_steps(found),
-        "by_noise": {name: _in_short(judgement) for name, judgement in found.judgements.items()},
+        "plausible": diagnosis.plausible,
+        "explanations": list(diagnosis.explanations),
+        "best": diagnosis.best,
+        "why": why(diagnosis),
+        "cannot_test": [
+            {"effect": name, "missing": list(lacks)} for name, lacks in sorted(diagnosis.cannot_test.items())
+        ],
+        "next_measurements": list(diagnosis.next_measurements),
+        "next": next_steps(diagnosis),
+        "by_noise": {name: _in_short(judgement) for name, judgement in diagnosis.judgements.items()},
         "noise": {
             "name": noise.name,
             "repeat_percent": percent_of(noise.typical_repeat, 4),
@@ -56,50 +58,50 @@ def document_of(found: Examination, rows: Rows) -> dict[str, Any]:
             "origin": noise.origin,
         },
         "gates": _gates(main),
-        "detectable": [_detectable(smallest) for smallest in found.detectable],
+        "detectable": [_detectable(smallest) for smallest in diagnosis.detectable],
         "confounding": {
-            "effects": list(found.confounding.names),
-            "matrix": found.confounding.rounded,
-            "sets": [list(group) for group in found.confounding.sets],
+            "effects": list(diagnosis.confounding.names),
+            "matrix": diagnosis.confounding.rounded,
+            "sets": [list(group) for group in diagnosis.confounding.sets],
             "threshold": CONFOUNDED,
         },
-        "path": found.path,
-        "portrait": None if found.portrait is None else portrait_entry(found.portrait),
-        "looks_the_same": None if alike is None else alike_entry(found.explanations[0], alike),
-        "not_excluded": [_not_excluded(hidden) for hidden in found.unexcluded],
-        "not_excluded_text": beside_text(found.unexcluded),
-        "assumptions": assumptions(found),
-        "warnings": list(found.predictor.data.warnings),
-        "notes": [*found.data.notes, *doubts(found)],
-        "suspect_rows": to_dict(found.suspects),
+        "path": diagnosis.path,
+        "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
+        "looks_the_same": None if alike is None else alike_entry(diagnosis.explanations[0], alike),
+        "not_excluded": [_not_excluded(hidden) for hidden in diagnosis.unexcluded],
+        "not_excluded_text": beside_text(diagnosis.unexcluded),
+        "assumptions": assumptions(diagnosis),
+        "warnings": list(diagnosis.predictor.data.warnings),
+        "notes": [*diagnosis.data.notes, *doubts(diagnosis)],
+        "suspect_rows": to_dict(diagnosis.suspects),
         "detectable_slips": [
-            {"column": slip.column, "unit": slip.unit, "size": json_number(slip.size, 2)} for slip in found.slips
+            {"column": slip.column, "unit": slip.unit, "size": json_number(slip.size, 2)} for slip in diagnosis.slips
         ],
-        "seed": found.seed,
-        "machine": found.machine.name,
-        "effects": found.predictor.effects_that_act,
-        "data": list(found.names),
-        "readings": len(found.data),
-        "loops": certain(to_dict(found.loops)),
-        "command": found.line,
+        "seed": diagnosis.seed,
+        "machine": diagnosis.machine.name,
+        "effects": diagnosis.predictor.effects_that_act,
+        "data": list(diagnosis.names),
+        "readings": len(diagnosis.data),
+        "loops": certain(to_dict(diagnosis.loops)),
+        "command": diagnosis.line,
     }
 
 
-def _baseline(found: Examination, rows: Rows) -> Document:
+def _baseline(diagnosis: Examination, rows: Rows) -> Document:
     """The model as given, and with its strut law refitted."""
-    law, row = found.machine.strut_law, rows.refitted
+    law, row = diagnosis.machine.strut_law, rows.refitted
     count = len(law.parameters)  # of a constant law one, which belongs to no length
-    factors, deviations = np.exp(found.base.law[:count]), np.sqrt(np.diag(found.base.covariance)[:count])
+    factors, deviations = np.exp(diagnosis.base.law[:count]), np.sqrt(np.diag(diagnosis.base.covariance)[:count])
     ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))[:count]
     return {
-        **rounded_errors(found.base.residual),
+        **rounded_errors(diagnosis.base.residual),
         **_part(row, ERRORS[2:4]),
-        "noise_percent": percent_of(found.noise.typical),
-        "noise_floor_percent": json_number(found.noise.floor_percent),
+        "noise_percent": percent_of(diagnosis.noise.typical),
+        "noise_floor_percent": json_number(diagnosis.noise.floor_percent),
         "probability": row.probability,
         "probability_outside": rows.outside.probability,
         **_part(row, ("adequate", "words")),
-        "as_given": {**rounded_errors(found.before), **_part(rows.as_given, ERRORS[2:3])},
+        "as_given": {**rounded_errors(diagnosis.before), **_part(rows.as_given, ERRORS[2:3])},
         "law": [
             {
                 "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),

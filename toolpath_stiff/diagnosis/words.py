@@ -21,67 +21,67 @@ from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
 
 
-def verdict_text(found: Examination) -> str:
+def verdict_text(diagnosis: Examination) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
-    same = [] if found.alike is None else [alike_text(found.explanations[0], found.alike)]
-    return " ".join([_verdict_text(found), *same, *(f"{_capital(doubt)}." for doubt in doubts(found))])
+    same = [] if diagnosis.alike is None else [alike_text(diagnosis.explanations[0], diagnosis.alike)]
+    return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(doubt)}." for doubt in doubts(diagnosis))])
 
 
-def doubts(found: Examination) -> list[str]:
+def doubts(diagnosis: Examination) -> list[str]:
     """What may be wrong with the data instead of the machine: the stated noise, single rows."""
-    noise = dict.fromkeys(judgement.doubt for judgement in found.judgements.values() if judgement.doubt)
-    return [*noise, *(suspect.words for suspect in found.suspects)]
+    noise = dict.fromkeys(judgement.doubt for judgement in diagnosis.judgements.values() if judgement.doubt)
+    return [*noise, *(suspect.words for suspect in diagnosis.suspects)]
 
 
-def _verdict_text(found: Examination) -> str:
-    if found.verdict == "adequate":
-        names = [name for name in found.explanations if name != NONE]
+def _verdict_text(diagnosis: Examination) -> str:
+    if diagnosis.verdict == "adequate":
+        names = [name for name in diagnosis.explanations if name != NONE]
         chance = f" Not ruled out either, but no more than chance would show: {joined(names)}." if names else ""
-        return f"Nothing is missing that these data could show: what is left is scatter.{_hidden(found)}{chance}"
-    if found.verdict in ("identified", "described"):
-        best, drawn = found.explanations[0], found.unconfirmed
+        return f"Nothing is missing that these data could show: what is left is scatter.{_hidden(diagnosis)}{chance}"
+    if diagnosis.verdict in ("identified", "described"):
+        best, drawn = diagnosis.explanations[0], diagnosis.unconfirmed
         only = (
             ""
-            if found.verdict == "identified" or drawn is None
+            if diagnosis.verdict == "identified" or drawn is None
             else f"This describes the readings, and does not explain them yet: {drawn.reason}. "
         )
-        return f"{_capital(_cause(found, best))}. {only}Mean error: {_errors(found, best)}."
-    if found.verdict == "ambiguous":
-        if len({(judgement.verdict, judgement.explanations) for judgement in found.judgements.values()}) == 1:
-            return _rivals(found)
+        return f"{_capital(_cause(diagnosis, best))}. {only}Mean error: {_errors(diagnosis, best)}."
+    if diagnosis.verdict == "ambiguous":
+        if len({(judgement.verdict, judgement.explanations) for judgement in diagnosis.judgements.values()}) == 1:
+            return _rivals(diagnosis)
         parts = [
             f"{judgement.noise.name} noise ({100 * judgement.noise.typical:.2g} %): {judgement.verdict}"
             + (f" ({joined(list(judgement.explanations))})" if judgement.explanations else "")
-            for judgement in found.judgements.values()
+            for judgement in diagnosis.judgements.values()
         ]
         return "The verdict depends on the noise, which these data do not tell. " + "; ".join(parts) + "."
-    main, noise = found.main, found.noise
+    main, noise = diagnosis.main, diagnosis.noise
     if main.question:
-        return f"{main.question} Mean error: {_errors(found)}."
+        return f"{main.question} Mean error: {_errors(diagnosis)}."
     noisy = f"; or nothing is missing, and the readings scatter {main.noise_factor:.2g} times as much as stated"
-    scatter = scatter_text(noise.floor_percent, 100.0 * float(found.base.errors.mean()), noise.guess)
-    named = {name: chance for name, chance in main.probability.items() if name in found.fits}
+    scatter = scatter_text(noise.floor_percent, 100.0 * float(diagnosis.base.errors.mean()), noise.guess)
+    named = {name: chance for name, chance in main.probability.items() if name in diagnosis.fits}
     best = max(named, key=lambda name: named[name], default="")
     outside = _percent(main.probability.get(OUTSIDE, 0.0))
     return (
         "Something is missing, and nothing in the catalogue accounts for it"
-        f"{noisy if main.noise_factor > 1.0 else ''}. Mean error: {_errors(found)}; {scatter}."
+        f"{noisy if main.noise_factor > 1.0 else ''}. Mean error: {_errors(diagnosis)}; {scatter}."
         + (f" What is left forms a pattern {main.form}." if main.form else "")
         # What of the catalogue would explain them, were nothing outside it as likely.
         + (
-            f" Closest: {_cause(found, best)}, but {outside} remain for something else."
+            f" Closest: {_cause(diagnosis, best)}, but {outside} remain for something else."
             if best and named[best] >= STANDS
             else ""
         )
     )
 
 
-def _cause(found: Examination, name: str) -> str:
+def _cause(diagnosis: Examination, name: str) -> str:
     """An explanation as an engineer says it, its effects and its probability after it."""
-    chance = _percent(found.main.probability.get(name, 0.0))
+    chance = _percent(diagnosis.main.probability.get(name, 0.0))
     if name == NONE:
         return f"nothing is missing (probability {chance})"
-    finding = f"{joined(found.fits[name].findings)} " if name in found.fits else ""
+    finding = f"{joined(diagnosis.fits[name].findings)} " if name in diagnosis.fits else ""
     return f"{finding}({name}, probability {chance})"
 
 
@@ -93,55 +93,55 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _rivals(found: Examination) -> str:
+def _rivals(diagnosis: Examination) -> str:
     """Explanations that stand beside each other."""
-    causes = [_cause(found, name) for name in found.explanations]
+    causes = [_cause(diagnosis, name) for name in diagnosis.explanations]
     if len(causes) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
-    first, second = (found.main.probability.get(name, 0.0) for name in found.explanations[:2])
+    first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
     if first < POSITIVE * second:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
     return f"Most likely {causes[0]}; not ruled out: {'; '.join(causes[1:])}."
 
 
-def _hidden(found: Examination) -> str:
+def _hidden(diagnosis: Examination) -> str:
     """Of an adequate model whose noise is a guess: what such a noise would hide."""
-    if not found.noise.guess:
+    if not diagnosis.noise.guess:
         return ""
-    shown = [smallest.rms for smallest in found.detectable if smallest.seen]
-    law = NORMAL_95 * np.sqrt(np.diag(found.base.covariance)[: len(found.machine.strut_law.parameters)].max())
+    shown = [smallest.rms for smallest in diagnosis.detectable if smallest.seen]
+    law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
     change = f"a missing effect that changes the stiffness by less than {100.0 * min(shown):.2g} % (rms) and "
     return (
-        f" But how far these readings scatter is only guessed: {100.0 * found.noise.typical:.2g} % a reading would "
+        f" But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading would "
         f"hide {change if shown else 'every effect and '}struts that are off by up to {100.0 * law:.2g} %."
     )
 
 
-def _errors(found: Examination, name: str = "") -> str:
+def _errors(diagnosis: Examination, name: str = "") -> str:
     """Mean errors as given, with the strut law refitted, with an explanation."""
-    rest = [(f"with {name}", 100.0 * float(found.fits[name].errors.mean()))] if name else []
-    return errors_text(*_mean_errors(found), rest)
+    rest = [(f"with {name}", 100.0 * float(diagnosis.fits[name].errors.mean()))] if name else []
+    return errors_text(*_mean_errors(diagnosis), rest)
 
 
-def _mean_errors(found: Examination) -> tuple[float, float]:
+def _mean_errors(diagnosis: Examination) -> tuple[float, float]:
     """Of the machine file as given and with its strut law refitted, %."""
-    return 100.0 * float(found.as_given.errors.mean()), 100.0 * float(found.base.errors.mean())
+    return 100.0 * float(diagnosis.as_given.errors.mean()), 100.0 * float(diagnosis.base.errors.mean())
 
 
-def why(found: Examination) -> list[str]:
+def why(diagnosis: Examination) -> list[str]:
     """The reasons, most important first."""
-    main, several = found.main, len(found.judgements) > 1
-    reasons = [_base_text(judgement, several) for judgement in found.judgements.values()]
-    if found.verdict == "identified" and main.drawn is not None:
+    main, several = diagnosis.main, len(diagnosis.judgements) > 1
+    reasons = [_base_text(judgement, several) for judgement in diagnosis.judgements.values()]
+    if diagnosis.verdict == "identified" and main.drawn is not None:
         reasons.append(main.drawn.reason)
-    if found.verdict == "ambiguous":
-        reasons += [*_confounded(found), *_drawn_from_these(found)]
-    if found.verdict == "unexplained" and not main.question:
+    if diagnosis.verdict == "ambiguous":
+        reasons += [*_confounded(diagnosis), *_drawn_from_these(diagnosis)]
+    if diagnosis.verdict == "unexplained" and not main.question:
         tested = [f"{name} (p = {gate.probability:.2g})" for name, gate in list(main.gates.items())[:4]]
         reasons += [f"the best of the catalogue leave more than noise would: {', '.join(tested)}"] if tested else []
         reasons += [main.doubt] if main.noise_factor > 1.0 else []
-    raised = "" if main.question else raised_text(*_mean_errors(found))
-    return [*reasons, *([raised] if raised else []), *found.remarks]
+    raised = "" if main.question else raised_text(*_mean_errors(diagnosis))
+    return [*reasons, *([raised] if raised else []), *diagnosis.remarks]
 
 
 def _base_text(judgement: Judgement, several: bool) -> str:
@@ -162,14 +162,14 @@ def _base_text(judgement: Judgement, several: bool) -> str:
     )
 
 
-def _confounded(found: Examination) -> list[str]:
+def _confounded(diagnosis: Examination) -> list[str]:
     """Why the plausible effects cannot be told apart."""
-    names, reasons = list(found.confounding.names), []
-    sets = [set(name.split(" + ")) for name in found.explanations]
-    plausible = [name for name in found.plausible if name in names]
+    names, reasons = list(diagnosis.confounding.names), []
+    sets = [set(name.split(" + ")) for name in diagnosis.explanations]
+    plausible = [name for name in diagnosis.plausible if name in names]
     for i, first in enumerate(plausible):
         for second in plausible[:i]:
-            value = float(found.confounding.matrix[names.index(first), names.index(second)])
+            value = float(diagnosis.confounding.matrix[names.index(first), names.index(second)])
             if not all(any(a in s and b not in s for s in sets) for a, b in ((first, second), (second, first))):
                 continue
             if value > CONFOUNDED:
@@ -182,62 +182,66 @@ def _confounded(found: Examination) -> list[str]:
                     f"{second} and {first} resemble each other here (correlation {value:.2f}): the effect is too small "
                     "for the rest to show"
                 )
-    return [*reasons, "chance alone is not excluded either"] if NONE in found.plausible else reasons
+    return [*reasons, "chance alone is not excluded either"] if NONE in diagnosis.plausible else reasons
 
 
-def _drawn_from_these(found: Examination) -> list[str]:
+def _drawn_from_these(diagnosis: Examination) -> list[str]:
     """Of plausible effects: those whose form was read off some of these readings."""
-    plausible = [family.effect for family in found.main.families if family.name in found.plausible]
-    seen = {effect.name: int(seen_readings([effect], found.data).sum()) for effect in plausible}
+    plausible = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
+    seen = {effect.name: int(seen_readings([effect], diagnosis.data).sum()) for effect in plausible}
     return [
-        f"the form of {name} was read off {count} of these {len(found.data)} readings: its probability is too high"
+        f"the form of {name} was read off {count} of these {len(diagnosis.data)} readings: its probability is too high"
         for name, count in seen.items()
         if count
     ]
 
 
-def next_steps(found: Examination, asked: Asked | None = None) -> list[str]:
+def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str]:
     """What to do next, as hints: commands run as they stand."""
-    asked = asked or found.asked or Asked(found.names)
+    request = request or diagnosis.asked or Asked(diagnosis.names)
     repeat = f"repeat a few readings, re-clamped, or state {both_names('--noise')}"
-    if found.verdict in ("identified", "described"):
-        names = found.explanations[0].split(" + ")
-        update = asked.command("update", *options(add=names), "-o", asked.updated_machine)
-    if found.verdict == "identified":
-        bounded = found.fits[found.explanations[0]].at_upper_bound()
+    if diagnosis.verdict in ("identified", "described"):
+        names = diagnosis.explanations[0].split(" + ")
+        update = request.command("update", *options(add=names), "-o", request.updated_machine)
+    if diagnosis.verdict == "identified":
+        bounded = diagnosis.fits[diagnosis.explanations[0]].at_upper_bound()
         if bounded:  # an update would refuse it
-            return [hint(f"{joined(bounded)} ends at its bound: measure more before adding it", asked.command("plan"))]
+            return [
+                hint(f"{joined(bounded)} ends at its bound: measure more before adding it", request.command("plan"))
+            ]
         return [hint("add it" if len(names) == 1 else "add them", update)]
     # Where there is no plan, the remark says why.
-    planned = found.verdict in ("described", "ambiguous") and (found.next_measurements or not found.remarks)
-    if found.verdict == "described":
-        measure = hint("measure where it would show, or fail", asked.command("plan")) if planned else found.remarks[0]
+    planned = diagnosis.verdict in ("described", "ambiguous") and (diagnosis.next_measurements or not diagnosis.remarks)
+    if diagnosis.verdict == "described":
+        measure = (
+            hint("measure where it would show, or fail", request.command("plan")) if planned else diagnosis.remarks[0]
+        )
         return [measure, hint("add it all the same, as described", update)]
-    if found.verdict == "ambiguous":
-        measure = hint("measure what tells them apart", asked.command("plan")) if planned else found.remarks[0]
-        depends = [f"{repeat}: the verdict depends on the scatter"] if len(found.judgements) > 1 else []
+    if diagnosis.verdict == "ambiguous":
+        measure = hint("measure what tells them apart", request.command("plan")) if planned else diagnosis.remarks[0]
+        depends = [f"{repeat}: the verdict depends on the scatter"] if len(diagnosis.judgements) > 1 else []
         return [*depends, measure]
-    if found.main.question:
+    if diagnosis.main.question:
         return [
             "check that machine file, poses and units are those of the readings: stiffness in N/mm, lengths in mm",
-            hint("see which readings are how far off", asked.command("compare")),
+            hint("see which readings are how far off", request.command("compare")),
         ]
-    if found.verdict == "unexplained":
-        if found.portrait is not None and any(sized.term.acts for sized in found.portrait.terms):
-            file = asked.new_effect("missing", ".toml")
-            write = hint("write what it looks like as an effect to edit", asked.command("effects draft", "-o", file))
+    if diagnosis.verdict == "unexplained":
+        if diagnosis.portrait is not None and any(sized.term.acts for sized in diagnosis.portrait.terms):
+            file = request.new_effect("missing", ".toml")
+            write = hint("write what it looks like as an effect to edit", request.command("effects draft", "-o", file))
         else:
-            file = asked.new_effect()
+            file = request.new_effect()
             write = hint("write the effect that you suspect as one file", command_line("effects", "new", file))
-        look = hint("look where the residuals lie", asked.command("compare"))
-        return [look, write, hint("and try it", asked.command("diagnose", effects=[file]))]
+        look = hint("look where the residuals lie", request.command("compare"))
+        return [look, write, hint("and try it", request.command("diagnose", effects=[file]))]
     use = "use the model; `detectable` lists what could still be there unseen"
-    return [repeat, use] if found.noise.guess else [use]
+    return [repeat, use] if diagnosis.noise.guess else [use]
 
 
-def assumptions(found: Examination) -> list[str]:
+def assumptions(diagnosis: Examination) -> list[str]:
     """What was assumed, in sentences."""
-    noise = found.noise
+    noise = diagnosis.noise
     sentences = [
         f"noise: {noise.origin}",
         f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
@@ -252,6 +256,6 @@ def assumptions(found: Examination) -> list[str]:
         f"the plausible set holds {100 * HELD:g} %",
         f"a further effect matters from {100 * MATTERS:g} % of the tip's stiffness on",
     ]
-    if "force_N" in found.data.missing:
+    if "force_N" in diagnosis.data.missing:
         sentences.append(f"load of every reading: {defaults.FORCE:g} N, assumed because force_N is missing")
     return sentences

@@ -46,39 +46,28 @@ def detectable_sizes(problem: Problem, families: Sequence[Family], gain_threshol
 
     Of an effect with choices the choice that is hardest to see counts. Only the parameter itself differs from neutral.
     """
-    wanted = np.sqrt(gain_threshold) + POWER_80
-    found = []
+    wanted = float(np.sqrt(gain_threshold)) + POWER_80
+    detectable = []
     for family in sorted(families, key=lambda family: family.name):
-        for j, component in enumerate(family.tables[0].candidate.components):
+        for j in range(len(family.tables[0].candidate.components)):
             worst: Detectable | None = None
             for table in family.tables:
-                for sign in component.signs:
-                    if table.knots and sign not in table.knots:
-                        continue
-                    one = _smallest(problem, table, j, sign, float(wanted))
+                for sign in problem.prior(table, j).log_sizes:
+                    smallest = _smallest(problem, table, j, sign, wanted)
                     # Hardest to see: not at all, else by the largest change; of two alike the first.
-                    if worst is None or _harder(one, worst):
-                        worst = one
-            if worst is not None:
-                found.append(worst)
-    return found
-
-
-def _harder(one: Detectable, other: Detectable) -> bool:
-    return one.rms > (1.0 + TIED) * other.rms if one.seen == other.seen else not one.seen
+                    if worst is None or (
+                        smallest.rms > (1.0 + TIED) * worst.rms if smallest.seen == worst.seen else not smallest.seen
+                    ):
+                        worst = smallest
+            detectable += [worst] if worst else []
+    return detectable
 
 
 def _smallest(problem: Problem, table: Table, j: int, sign: float, wanted: float) -> Detectable:
-    component = table.candidate.components[j]
-    prior = problem.prior(table, j)
-    sizes = np.zeros((len(prior.log_sizes[sign]), len(table.candidate.components)))
-    sizes[:, j] = sign * np.exp(prior.log_sizes[sign])
-    change = problem.sight.change(table.delta(sizes))
-    lengths = np.maximum.accumulate(problem.sight.length(change))
-    rms = np.sqrt(np.mean(change**2, axis=1))
-    name, parameter = table.candidate.name, component.parameter
+    name, component, prior = table.candidate.name, table.candidate.components[j], problem.prior(table, j)
+    logs, rms, lengths = prior.log_sizes[sign], prior.rms[sign], np.maximum.accumulate(prior.lengths[sign])
     if lengths[-1] < wanted:
-        return Detectable(name, parameter, float("nan"), float(rms[-1]), seen=False)
-    log_size = float(np.interp(wanted, lengths, prior.log_sizes[sign]))
-    at = float(np.interp(log_size, prior.log_sizes[sign], rms))
-    return Detectable(name, parameter, component.value(sign * float(np.exp(log_size))), at, seen=True)
+        return Detectable(name, component.parameter, float("nan"), float(rms[-1]), seen=False)
+    log_size = float(np.interp(wanted, lengths, logs))
+    change = float(np.interp(log_size, logs, rms))
+    return Detectable(name, component.parameter, component.value(sign * float(np.exp(log_size))), change, seen=True)

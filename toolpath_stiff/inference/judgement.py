@@ -144,7 +144,7 @@ class Judgement:
     @property
     def plausible(self) -> tuple[str, ...]:
         """Names of the effects in `explanations`, each once."""
-        return tuple(dict.fromkeys(name for one in self.explanations for name in one.split(" + ")))
+        return tuple(dict.fromkeys(name for explanation in self.explanations for name in explanation.split(" + ")))
 
     @property
     def likely(self) -> list[tuple[str, float]]:
@@ -180,16 +180,16 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     fits = Fits(problem)
     gates = apply_gates(problem, noise, candidates, fits, seed)
     weighed = weigh(problem, noise, candidates, gates)
-    asked = question(problem.predictor)
-    verdict, explanations = ("unexplained", ()) if asked else decide(gates, weighed)
-    doubt, factor = ("", 1.0) if asked else noise_doubt(problem, noise, gates.base, verdict, seed)
+    doubtful = question(problem.predictor)
+    verdict, explanations = ("unexplained", ()) if doubtful else decide(gates, weighed)
+    doubt, factor = ("", 1.0) if doubtful else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
         described = drawn(fits.made[explanations[0]], {NONE: candidates.base, **fits.made}, problem.predictor.data)
         verdict = verdict if described is None or described.confirmed else "described"
     return Judgement(
         verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
-        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked, noise.remark or doubt, factor, described,
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form, doubtful, noise.remark or doubt, factor, described,
     )  # fmt: skip
 
 
@@ -232,10 +232,10 @@ class Fits:
     problem: Problem
     made: dict[str, Fit] = field(default_factory=dict)
 
-    def of(self, name: str, found: Fit) -> Fit:
+    def of(self, name: str, fit: Fit) -> Fit:
         """The final fit of a hypothesis from what the search has found."""
         if name not in self.made:
-            self.made[name] = refine(self.problem, found)
+            self.made[name] = refine(self.problem, fit)
         return self.made[name]
 
 
@@ -282,8 +282,8 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
         return Gates(alone, none_stands=True)
     by_name: dict[str, Gate] = {}
 
-    def passes(name: str, found: Fit) -> bool:
-        fit = fits.of(name, found)
+    def passes(name: str, fit: Fit) -> bool:
+        fit = fits.of(name, fit)
         by_name[name] = absolute_gate(problem, fit.residual, fit.jacobian, draws, forms)
         return by_name[name].probability > ADEQUATE
 
@@ -297,7 +297,9 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
     evidence: dict[tuple[str, ...], float] = {(f.name,): f.log_evidence for f in families}
     tried, search = search_pairs(problem, families, base)
     pairs, tried = _standing(tried, evidence, fits, passes)
-    least = singles[0].log_evidence + _price_of_a_second(families) if singles else -np.inf
+    # What an effect beside another must add to be considered: its prior, and odds of 3 to 1.
+    price = float(np.log(POSITIVE * _prior(families, 1) / _prior(families, 2)))
+    least = singles[0].log_evidence + price if singles else -np.inf
     if not singles or any(pair.log_evidence > least for pair in pairs):
         # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
         evidence |= {pair.names: pair.log_evidence for pair in tried}
@@ -309,7 +311,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
 
 
 def _standing(
-    found: Sequence[Combination],
+    combinations: Sequence[Combination],
     evidence: Mapping[tuple[str, ...], float],
     fits: Fits,
     passes: Callable[[str, Fit], bool],
@@ -318,17 +320,17 @@ def _standing(
 
     What two effects do to each other is not in their tables: the final fit says how much more likely it makes the data.
     """
-    standing, tried = [], list(found)
-    for k, one in enumerate(found[:TESTED]):
-        parts = [log for names, log in evidence.items() if set(names) < set(one.names)]
-        if one.log_evidence <= max(parts) + SURVIVES:
+    standing, tried = [], list(combinations)
+    for k, combination in enumerate(combinations[:TESTED]):
+        parts = [log for names, log in evidence.items() if set(names) < set(combination.names)]
+        if combination.log_evidence <= max(parts) + SURVIVES:
             continue
-        passed = passes(one.name, one.score)
-        more = fits.made[one.name].log_posterior - one.score.log_posterior
-        tried[k] = replace(one, log_evidence=one.log_evidence + more)
+        passed = passes(combination.name, combination.score)
+        more = fits.made[combination.name].log_posterior - combination.score.log_posterior
+        tried[k] = replace(combination, log_evidence=combination.log_evidence + more)
         if passed:
             standing.append(tried[k])
-    return standing, sorted(tried, key=lambda one: (-one.log_evidence, one.names))
+    return standing, sorted(tried, key=lambda combination: (-combination.log_evidence, combination.names))
 
 
 @dataclass(frozen=True)
@@ -355,27 +357,27 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
     def posterior(standing: Sequence[Combination]) -> dict[str, float]:
         if gates.singles:
             return _posterior(problem, noise, candidates, gates.none_stands, gates.singles, standing)
-        evidences = {OUTSIDE: outside} | {one.name: one.log_evidence for one in standing}
-        prior = {OUTSIDE: PRIOR_OUTSIDE} | {one.name: _prior(families, len(one.names)) for one in standing}
+        evidences = {OUTSIDE: outside} | {several.name: several.log_evidence for several in standing}
+        prior = {OUTSIDE: PRIOR_OUTSIDE} | {several.name: _prior(families, len(several.names)) for several in standing}
         return probabilities(evidences, prior)
 
-    found = _sparing(gates, posterior)
-    if gates.pairs and found.get(OUTSIDE, 1.0) < STANDS:  # ruled out
-        del found[OUTSIDE]
-    return Probabilities(found, form)
+    posteriors = _sparing(gates, posterior)
+    if gates.pairs and posteriors.get(OUTSIDE, 1.0) < STANDS:  # ruled out
+        del posteriors[OUTSIDE]
+    return Probabilities(posteriors, form)
 
 
 def _sparing(gates: Gates, posterior: Callable[[Sequence[Combination]], dict[str, float]]) -> dict[str, float]:
     """Probabilities without triples that are not likelier enough than the best pair, and pairs than the best effect."""
     standing: Sequence[Combination] = gates.pairs
-    found = posterior(standing)
+    weights = posterior(standing)
     for count in (2, 1):
-        fewer = gates.singles if count == 1 else [one.name for one in standing if len(one.names) == count]
-        more = sum(found[one.name] for one in standing if len(one.names) > count)
-        if fewer and more < POSITIVE * max(found[name] for name in fewer):
-            standing = [one for one in standing if len(one.names) <= count]
-            found = posterior(standing)
-    return found
+        fewer = gates.singles if count == 1 else [several.name for several in standing if len(several.names) == count]
+        more = sum(weights[several.name] for several in standing if len(several.names) > count)
+        if fewer and more < POSITIVE * max(weights[name] for name in fewer):
+            standing = [several for several in standing if len(several.names) <= count]
+            weights = posterior(standing)
+    return weights
 
 
 def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
@@ -385,12 +387,13 @@ def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
     effects, and it may be any of them: who picks the best of fifteen without that price makes the unknown too likely.
     """
     beside = PRIOR_PAIRS / PRIOR_SINGLES / max(len(candidates.families), 1)
-    found = [discrepancy_evidence(problem, candidates.base, candidates.forms)]
+    evidences = [discrepancy_evidence(problem, candidates.base, candidates.forms)]
     for family in candidates.offered[:2]:
         assert family.best is not None
         evidence, words = discrepancy_evidence(problem, family.best, candidates.forms)
-        found.append((evidence + float(np.log(beside)), words))
-    return float(np.logaddexp.reduce([evidence for evidence, _ in found])), max(found, key=lambda one: one[0])[1]
+        evidences.append((evidence + float(np.log(beside)), words))
+    _, likeliest = max(evidences, key=lambda pair: pair[0])
+    return float(np.logaddexp.reduce([evidence for evidence, _ in evidences])), likeliest
 
 
 def _posterior(
@@ -407,23 +410,18 @@ def _posterior(
     def evidence(log_evidence: float, fit: Fit) -> float:
         return _with_unknown_noise(problem, noise, log_evidence, fit)
 
-    found = {f.name: evidence(f.log_evidence, f.best or base) for f in families}
-    found |= {pair.name: evidence(pair.log_evidence, pair.score) for pair in pairs}
+    evidences = {f.name: evidence(f.log_evidence, f.best or base) for f in families}
+    evidences |= {pair.name: evidence(pair.log_evidence, pair.score) for pair in pairs}
     prior = {name: _prior(families, 1) for name in names}
     prior |= {pair.name: _prior(families, len(pair.names)) for pair in pairs}
     return probabilities(
-        {NONE: evidence(base.log_evidence, base)} | found, prior | ({NONE: PRIOR_NONE} if none else {})
+        {NONE: evidence(base.log_evidence, base)} | evidences, prior | ({NONE: PRIOR_NONE} if none else {})
     )
 
 
 def _prior(families: Sequence[Family], count: int) -> float:
     """Prior probability of one effect, pair or triple of effects."""
     return {1: PRIOR_SINGLES, 2: PRIOR_PAIRS, 3: PRIOR_TRIPLES}[count] / max(comb(len(families), count), 1)
-
-
-def _price_of_a_second(families: Sequence[Family]) -> float:
-    """Log evidence that an effect beside another must add to be considered: its prior, and odds of 3 to 1."""
-    return float(np.log(POSITIVE * _prior(families, 1) / _prior(families, 2)))
 
 
 def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:
@@ -468,14 +466,10 @@ def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
         return ()
     count = 0 if name == NONE else len(name.split(" + "))
     families = judgement.families
-    odds = (
-        _prior(families, 1) / PRIOR_NONE
-        if not count
-        else _prior(families, min(count + 1, 3)) / _prior(families, min(count, 2))
-    )
-    fit = judgement.base if name == NONE else judgement.fits[name]
-    found = not_excluded(judgement.problem, families, fit, odds)
-    return tuple(one for one in found if one.effect.name not in judgement.plausible)
+    before = _prior(families, min(count, 2)) if count else PRIOR_NONE
+    odds, fit = _prior(families, min(count + 1, 3)) / before, judgement.fits.get(name, judgement.base)
+    hidden = not_excluded(judgement.problem, families, fit, odds)
+    return tuple(effect for effect in hidden if effect.effect.name not in judgement.plausible)
 
 
 def _smallest_set(posterior: dict[str, float], named: float = NAMED) -> tuple[str, ...]:
@@ -483,11 +477,11 @@ def _smallest_set(posterior: dict[str, float], named: float = NAMED) -> tuple[st
     ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
     if ranked and ranked[0][1] >= named:
         return (ranked[0][0],)
-    found: list[str] = []
+    names: list[str] = []
     held = 0.0
     for name, weight in ranked:
         if held >= HELD or weight <= 0.0:
             break
-        found.append(name)
+        names.append(name)
         held += weight
-    return tuple(found)
+    return tuple(names)

@@ -107,7 +107,7 @@ def from_repeats(data: Measurements) -> Repeats | None:
     for _ in range(MOST_TRIMS):
         if not kept.any():
             break
-        contrasts = _Contrasts.of(data.select(kept), groups[kept])
+        contrasts = _Contrasts(data.select(kept), groups[kept])
         if contrasts.count < FEWEST_CONTRASTS:
             break
         repeat, clamping, found = _maximum_likelihood(contrasts)
@@ -120,7 +120,7 @@ def from_repeats(data: Measurements) -> Repeats | None:
         kept &= np.bincount(groups, weights=kept, minlength=groups.max() + 1)[groups] > 1
     if result is None:
         return None
-    whole = _Contrasts.of(data.select(every), groups[every])
+    whole = _Contrasts(data.select(every), groups[every])
     factor, share = _mixture(whole.deviations(result.repeat, result.clamping), np.bincount(groups)[groups[every]])
     return replace(result, repeat=factor * result.repeat, wild=share)
 
@@ -147,7 +147,6 @@ def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, fl
     return float(np.exp(of_factor @ np.log(FACTORS))), float(np.exp(of_share @ np.log(SHARES)))
 
 
-@dataclass(frozen=True)
 class _Contrasts:
     """Differences between repeats: what is left of n ln readings y beside group means, time and order, M y.
 
@@ -162,50 +161,38 @@ class _Contrasts:
     reached, values
         (n, k) M Z E for eigenvectors E of Z^T M Z, and its eigenvalues (k,) that are not 0. None where every reading
         was clamped by itself, which cannot be told from repeat noise, or where all repeats are of one clamping.
+    loads
+        (k,) squared shares of M y along the eigenvectors.
     count
         Rank of M: degrees of freedom.
     alone
         Whether every reading was clamped by itself: the differences then hold clamping too.
     """
 
-    left: FloatArray
-    own: FloatArray
-    reached: FloatArray
-    values: FloatArray
-    count: int
-    alone: bool
-
-    @classmethod
-    def of(cls, data: Measurements, groups: NDArray[np.int64]) -> _Contrasts:
-        """Of readings in groups (n,) of repeats."""
+    def __init__(self, data: Measurements, groups: NDArray[np.int64]) -> None:
         means, clamps = Groups.by(groups), Groups.by(data.clamp)
+        sizes = np.bincount(means.of)
 
         def centred(columns: FloatArray) -> FloatArray:
-            sizes = np.bincount(means.of)
             return np.asarray(columns - (means.sums(columns.T) / sizes)[:, means.of].T)
 
         logs = np.log(data.stiffness)[:, None]
         axes, size, _ = np.linalg.svd(centred(_drifts(data, np.exp(logs - centred(logs))[:, 0])), full_matrices=False)
-        fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(np.bincount(means.of).max()))]
+        fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(sizes.max()))]
 
         def left(columns: FloatArray) -> FloatArray:
-            found = centred(columns)
-            return np.asarray(found - fixed @ (fixed.T @ found))
+            rest = centred(columns)
+            return np.asarray(rest - fixed @ (fixed.T @ rest))
 
-        n, count = len(groups), len(groups) - means.count - fixed.shape[1]
+        n, self.alone = len(groups), clamps.alone
         clamped = np.zeros((n, 0)) if clamps.alone else left((clamps.of[:, None] == np.arange(clamps.count)) * 1.0)
         values, vectors = np.linalg.eigh(clamped.T @ clamped)
         largest = np.bincount(clamps.of).max(initial=0)  # of the eigenvalues, if nothing were projected out
         kept = values > largest * n * np.finfo(float).eps
-        own = 1.0 - 1.0 / np.bincount(means.of)[means.of] - (fixed**2).sum(axis=1)
-        return cls(
-            left(logs)[:, 0],
-            own,
-            clamped @ vectors[:, kept],
-            values[kept],
-            count,
-            clamps.alone,
-        )
+        self.left, self.reached, self.values = left(logs)[:, 0], clamped @ vectors[:, kept], values[kept]
+        self.own = 1.0 - 1.0 / sizes[means.of] - (fixed**2).sum(axis=1)
+        self.loads = (self.left @ self.reached) ** 2 / self.values
+        self.count = int(n - means.count - fixed.shape[1])
 
     @property
     def tells(self) -> bool:
@@ -213,11 +200,6 @@ class _Contrasts:
         rank = len(self.values)
         spread = float(np.ptp(self.values)) if rank == self.count else float(self.values.max(initial=0.0))
         return spread > 1e-6 and rank >= 3
-
-    @property
-    def loads(self) -> FloatArray:
-        """(k,) squared shares of M y along the eigenvectors."""
-        return np.asarray((self.left @ self.reached) ** 2 / self.values)
 
     def deviations(self, repeat: float, clamping: float) -> FloatArray:
         """(n,) how far each reading is off, in standard deviations, where it is left out itself."""
@@ -254,9 +236,8 @@ def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
 
     def minus_log_likelihood(root: float) -> float:
         ratio = root**2
-        return contrasts.count * float(np.log(max(repeat_at(ratio), 1e-12))) + 0.5 * float(
-            np.log1p(ratio * values).sum()
-        )
+        volume = 0.5 * float(np.log1p(ratio * values).sum())
+        return contrasts.count * float(np.log(max(repeat_at(ratio), 1e-12))) + volume
 
     if not contrasts.tells:
         return repeat_at(0.0), 0.0, False

@@ -51,13 +51,6 @@ class Sight:
         return np.asarray(np.sqrt(np.maximum(self.projected.squares(change), 0.0)))
 
 
-def _log_visible(lengths: FloatArray, longest: float) -> FloatArray:
-    """Log weight of sizes whose signatures have these lengths; all alike if even the longest is not visible."""
-    if longest < VISIBLE:
-        return np.zeros(len(lengths))
-    return np.asarray(-0.5 * (np.maximum(VISIBLE - lengths, 0.0) / FADES) ** 2)
-
-
 def log_expected(rms: FloatArray) -> FloatArray:
     """Log prior density of ln rms change, not normalised: flat between `EXPECTED`, normal tails."""
     logs = np.log(np.maximum(rms, 1e-9))
@@ -92,16 +85,20 @@ class SizePrior:
     ----------
     log_sizes, log_density
         Sign -> (g,) logarithms of sizes, and of the density over the logarithm of the size, normalised over all signs.
+    rms, lengths
+        Sign -> (g,) rms change of ln stiffness by these sizes, and its whitened length beside the strut law.
     """
 
     log_sizes: dict[float, FloatArray]
     log_density: dict[float, FloatArray]
+    rms: dict[float, FloatArray]
+    lengths: dict[float, FloatArray]
 
     @classmethod
     def of(cls, table: Table, j: int, sight: Sight) -> SizePrior:
         """Of component `j` of a table."""
         component = table.candidate.components[j]
-        logs, density, lengths = {}, {}, {}
+        logs, density, rms, lengths = {}, {}, {}, {}
         for sign in component.signs:
             if table.knots and sign not in table.knots:
                 continue
@@ -109,13 +106,16 @@ class SizePrior:
             sizes = np.zeros((len(logs[sign]), len(table.candidate.components)))
             sizes[:, j] = sign * np.exp(logs[sign])
             change = sight.change(table.delta(sizes))
-            rms = np.sqrt(np.mean(change**2, axis=1))
-            lengths[sign] = sight.length(change)
-            density[sign] = log_expected(rms) + log_usual(sizes[:, j], component.typical())
-        longest = max(float(found.max()) for found in lengths.values())
-        density = {sign: density[sign] + _log_visible(lengths[sign], longest) for sign in logs}
-        mass = sum(_trapezoid(logs[sign], density[sign]) for sign in logs)
-        return cls(logs, {sign: density[sign] - np.log(max(mass, 1e-300)) for sign in logs})
+            rms[sign], lengths[sign] = np.sqrt(np.mean(change**2, axis=1)), sight.length(change)
+            density[sign] = log_expected(rms[sign]) + log_usual(sizes[:, j], component.typical())
+        longest = max(float(length.max()) for length in lengths.values())
+        if longest >= VISIBLE:  # else all sizes are alike: even the longest is not visible
+            for sign, length in lengths.items():
+                density[sign] = density[sign] - 0.5 * (np.maximum(VISIBLE - length, 0.0) / FADES) ** 2
+        weights = {sign: np.exp(density[sign]) for sign in logs}
+        pieces = (0.5 * (w[1:] + w[:-1]) * np.abs(np.diff(logs[sign])) for sign, w in weights.items())
+        mass = max(sum(float(piece.sum()) for piece in pieces), 1e-300)
+        return cls(logs, {sign: density[sign] - np.log(mass) for sign in logs}, rms, lengths)
 
     def log_at(self, sizes: FloatArray) -> FloatArray:
         """(g,) log density of the size itself."""
@@ -185,8 +185,3 @@ def _sizes(table: Table, j: int, sign: float, sight: Sight) -> FloatArray:
     largest = min(20.0 * EXPECTED[1] / max(scale, 1e-300), table.candidate.components[j].reach(sign))
     smallest = min(0.05 * EXPECTED[0] / max(scale, 1e-300), 0.1 * largest)
     return np.geomspace(smallest, largest, 160)
-
-
-def _trapezoid(x: FloatArray, logs: FloatArray) -> float:
-    weights = np.exp(logs)
-    return float((0.5 * (weights[1:] + weights[:-1]) * np.abs(np.diff(x))).sum())

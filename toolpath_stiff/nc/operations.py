@@ -16,7 +16,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -75,18 +74,17 @@ def headings(lines: Sequence[str]) -> list[Heading]:
     >>> [(heading.line, heading.name) for heading in headings(("G21", "(FACE)", "G1 X1"))]
     [(2, 'FACE')]
     """
-    comments = []  # number and text of lines that hold comments alone
+    blocks: list[tuple[int, list[str]]] = []  # the first line of each, and its comments
+    last = -1
     for number, text in enumerate(lines, 1):
         if ("(" in text or ";" in text) and BEGINS.match(text):
             code, comment = split_comments(text)
             if NO_WORDS.fullmatch(code):
-                comments.append((number, comment))
-    # Successive lines are as far ahead of their place in this list.
-    blocks = groupby(enumerate(comments), lambda item: item[1][0] - item[0])
-    named = []
-    for _, block in blocks:
-        numbers, texts = zip(*(comment for _, comment in block), strict=True)
-        named.append(heading_of(texts, numbers[0]))
+                if number != last + 1:
+                    blocks.append((number, []))
+                blocks[-1][1].append(comment)
+                last = number
+    named = (heading_of(comments, first) for first, comments in blocks)
     return [heading for heading in named if heading is not None]
 
 

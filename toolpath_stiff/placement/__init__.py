@@ -1,1 +1,1 @@
-"""Where the work should sit: the search, the front, the placement chosen and what is said about it."""
+"""Placements of the work: the search, the front, the placement chosen and the advice about it."""

@@ -43,14 +43,14 @@ def climbed(search: Search, candidates: FloatArray, figures: PlacementFigures) -
 
 
 def _falls(search: Search, placements: FloatArray, floors: FloatArray) -> bool:
-    """Whether each of some placements is worse in something than the floors."""
+    """True where each of some placements is worse in something than the floors."""
     return bool((Goal(ENDS[0].weights, floors).worsening(search.whole.figures(placements)) > 0.0).all())
 
 
 def _climbed_to(
     search: Search, candidates: FloatArray, figures: PlacementFigures, goals: Sequence[Goal], starts: Sequence[int]
 ) -> list[FloatArray]:
-    """Where climbs from the best candidates to each goal end: many on few samples, few on more, one on the whole path.
+    """Ends of climbs from the best candidates to each goal: many on few samples, few on more, one on the whole path.
 
     `figures` are those of the candidates on few samples. There are several hills, and a slope that few samples show is
     not always the whole path's. All climb together, each to its own goal.
@@ -82,7 +82,7 @@ def _climbed_to(
 
 
 def _exchanged(search: Search, tops: list[FloatArray], goals: Sequence[Goal]) -> list[FloatArray]:
-    """Where climbs on more samples end, to which what decides at their ends is added until they miss nothing there."""
+    """Ends of climbs on more samples, to which what decides at these ends is added until they miss nothing there."""
     for _ in range(EXCHANGES):
         search.heed(np.vstack([placements[:1] for placements in tops]))
         climber = search.climber("middle")
@@ -96,7 +96,7 @@ def _exchanged(search: Search, tops: list[FloatArray], goals: Sequence[Goal]) ->
 
 
 def _together(climber: Climber, first: list[FloatArray], goals: Sequence[Goal], steps: int) -> list[FloatArray]:
-    """Where climbs from placements (k, 6) to each goal end."""
+    """Ends of climbs from placements (k, 6) to each goal."""
     each = [goal for goal, placements in zip(goals, first, strict=True) for _ in placements]
     ends = climber.climb(np.vstack(first), each, steps)
     return np.split(ends, np.cumsum([len(placements) for placements in first])[:-1])

@@ -86,7 +86,7 @@ class CaseStudy(FolderResult):
 
     @property
     def is_own(self) -> bool:
-        """Whether path or regions are a user's; the packaged ones come with non-planar variants."""
+        """True where path or regions are a user's; the packaged ones come with non-planar variants."""
         return not self.summary["non_planar"]
 
     def to_dict(self) -> dict[str, Any]:
@@ -300,7 +300,7 @@ def conclusions(regions: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def _in_plane(regions: Sequence[Row]) -> list[tuple[Row, Row]]:
-    """Of each height with several regions the two whose means are farthest apart."""
+    """The two regions of each height whose means are farthest apart."""
     beside: dict[float, list[Row]] = {}
     for row in regions:
         beside.setdefault(row["z_mm"], []).append(row)

@@ -56,7 +56,7 @@ class _Climb:
         self.here, self.rows, self.merit, self.gradient = there, rows, merit, None
 
     def bent(self, tried: PlacedRows) -> PlacedRows:
-        """What the programme has to start from to foretell what was found after the step: the second-order correction.
+        """Rows from which the programme would have foretold those after the step: the second-order correction.
 
         A kink along which the figures are curved else lets only ever smaller steps pass (Fletcher 1987, section 14.4).
         """
@@ -145,7 +145,7 @@ class Climber:
         return missed
 
     def _judged(self, rows: PlacedRows, goals: Sequence[Goal], scale: float) -> list[tuple[float, Rank]]:
-        """Of each placement the merit for its goal, value less penalties in units of `scale` (N/m), and its rank."""
+        """The merit of each placement for its goal, value less penalties in units of `scale` (N/m), and its rank."""
         figures = self.evaluator.summary(rows)
         ranks = np.empty((len(goals), 3))
         ranks[:, 0] = -self.rules.violation(figures)
@@ -247,7 +247,7 @@ class Climber:
         return blocks
 
     def _floors(self, goal: Goal, scale: float, slope: FloatArray, k: FloatArray) -> list[_Block]:
-        """What must not get worse: by the slack, or by the common surplus t where that is the goal."""
+        """Constraints on what must not get worse: by the slack, or by the common surplus t where that is the goal."""
         floors = (goal.floors / scale) + (0.0 if goal.weights is None else INSIDE)
         soft = (1.0, 0.0) if goal.weights is None else (0.0, -1.0)
         blocks: list[_Block] = [

@@ -66,7 +66,7 @@ class PlacementFigures(Columns):
 
 @dataclass(frozen=True)
 class PlacedRows(Columns):
-    """What k placements do at each sample: rigid samples first (m), then the anchored rapids (q). SI.
+    """Rows of k placements, a column a sample: rigid samples first (m), then the anchored rapids (q). SI.
 
     `stiffness` (k, m), nan but at headline samples; `law` (k, m) m, how far the struts are inside the lengths of their
     law; `margin` (k, m + q); `clearance` (k, m + q) m, inf without keep-outs.
@@ -78,7 +78,7 @@ class PlacedRows(Columns):
     clearance: FloatArray
 
     def combined(self, formula: Callable[..., FloatArray], other: PlacedRows) -> PlacedRows:
-        """What a formula makes of each column and the same one of others."""
+        """Columns that a formula makes of these and of the same ones of others."""
         with np.errstate(invalid="ignore"):
             return PlacedRows(*(formula(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)))
 
@@ -124,7 +124,7 @@ class Evaluator:
             yield self.rows(placements[start : start + group])
 
     def rows(self, placements: FloatArray) -> PlacedRows:
-        """What each sample does at placements (k, 6) m and rad; all in memory at once."""
+        """Rows of placements (k, 6) m and rad; all in memory at once."""
         path, k = self.path, len(placements)
         m, n = len(path), len(self)
         self.poses += k * n

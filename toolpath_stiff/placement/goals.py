@@ -1,4 +1,4 @@
-"""What a search may vary, what a placement has to keep, what is to be raised."""
+"""Bounds of a search, rules that a placement has to keep, goals that are to be raised."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from toolpath_stiff.placement.keep_out import KeepOut
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the search may vary. SI.
+    """Bounds of the search. SI.
 
     `low`, `high` (6,): x, y, z in m, A, B, C in rad; equal where fixed. `heights`: the only z allowed, or empty.
     """
@@ -54,7 +54,7 @@ class Bounds:
         return np.asarray((placements[:, free] - self.low[free]) / (self.high - self.low)[free])
 
     def holds(self, placement: FloatArray) -> bool:
-        """Whether a placement (6,) lies within; the turn counts modulo a whole one."""
+        """True for a placement (6,) within; the turn counts modulo a whole one."""
         apart = np.mod(placement[5] - self.low[5] + 1e-9, 2.0 * np.pi) - 1e-9
         inside = (placement >= self.low - 1e-9) & (placement <= self.high + 1e-9)
         inside[5] = apart <= self.high[5] - self.low[5] + 1e-9
@@ -64,7 +64,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Rules:
-    """What a placement has to keep.
+    """Rules that a placement has to keep.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class Goal:
-    """What is to be raised: `weights` . (mean, -range, weakest), N/m, none of them below `floors`.
+    """A figure that is to be raised: `weights` . (mean, -range, weakest), N/m, none of them below `floors`.
 
     `weights` None: the smallest surplus over the floors, which may be negative.
     """
@@ -112,7 +112,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class SearchRules:
-    """What the user asks of a placement.
+    """Rules and wishes of the user.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ Programme = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]  #
 
 
 def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
-    """Of each programme the x (n,) of least `cost` . x with `matrix` x <= `right` and `low` <= x <= `high`, all finite.
+    """The x (n,) of least `cost` . x of each programme, with `matrix` x <= `right` and `low` <= x <= `high`, finite.
 
     The dual simplex method in the form of a working set: n rows that hold as equations, at first the bounds that the
     cost leans on; the row that is broken most comes in, the one whose multiplier reaches zero first goes out (Nocedal

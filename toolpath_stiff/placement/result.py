@@ -56,7 +56,7 @@ class Written:
 
 @dataclass(frozen=True)
 class Refused:
-    """Why the program could not be written for the placement."""
+    """The reason why the program could not be written for the placement."""
 
     file: str
     refused: str
@@ -130,7 +130,7 @@ class Placement(FolderResult, SearchedFront):
 
     @property
     def objective(self) -> str:
-        """What the recommended placement is best at."""
+        """The objective of the recommended placement."""
         return self.task.rules.objective
 
     @property
@@ -140,7 +140,7 @@ class Placement(FolderResult, SearchedFront):
 
     @cached_property
     def worse(self) -> list[Worsening]:
-        """What is worse there than at the present placement, and by how much."""
+        """Figures that are worse there than at the present placement, and by how much."""
         if self.present is None:
             return []
         worse = []
@@ -153,7 +153,7 @@ class Placement(FolderResult, SearchedFront):
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What deserves a look, what gets worse first."""
+        """Sentences that deserve a look, what gets worse first."""
         warnings = [nothing_better_words(self.search)] if self.search.nothing_better else []
         warnings += [self._worse_words(worse) for worse in self.worse]
         if self.worse and not self.picked:
@@ -205,17 +205,17 @@ class Placement(FolderResult, SearchedFront):
 
     @property
     def refusal(self) -> str:
-        """Why the program could not be written for the placement, "" unless that is so."""
+        """The reason why the program could not be written for the placement, "" unless that is so."""
         return self.written.refused if isinstance(self.written, Refused) else ""
 
     @property
     def offsets(self) -> OffsetBlocks:
-        """What to key in at the control."""
+        """Offsets to key in at the control."""
         return offset_blocks(self.program, self.best.origin)
 
     @property
     def trade_offs(self) -> dict[str, dict[str, float]]:
-        """What the choice costs in each objective: the best on the front beside it."""
+        """The cost of the choice in each objective: the best on the front beside it."""
         return {
             name: {
                 "chosen_N_per_mm": getattr(self.chosen, key),
@@ -288,7 +288,7 @@ class Placement(FolderResult, SearchedFront):
 
 
 def nothing_better_words(search: SearchRecord) -> str:
-    """That the front is the present placement alone, and how hard another was looked for."""
+    """A sentence: the front is the present placement alone, and how hard another was looked for."""
     return (
         f"nothing better than the present placement was found within the bounds, in {search.searches} searches from "
         f"the beginning, {search.pose_evaluations} poses evaluated"
@@ -296,7 +296,7 @@ def nothing_better_words(search: SearchRecord) -> str:
 
 
 def _present_words(margin: float, present: PlacementFigures) -> list[str]:
-    """What the present placement itself does not keep."""
+    """Rules that the present placement itself does not keep, in sentences."""
     words = []
     if present.rapid_margin[0] < 0.0:
         words.append("at the present placement a rapid is out of reach")
@@ -314,7 +314,7 @@ def _present_words(margin: float, present: PlacementFigures) -> list[str]:
 
 
 def bound_warnings(bounds: Bounds, placement: FloatArray, workspace: FloatArray) -> list[str]:
-    """Which bounds of the search a placement (6,) lies on, with the options that widen them by half."""
+    """Bounds of the search that a placement (6,) lies on, with the options that widen them by half."""
     words = []
     for i in bounds.free:
         if bounds.round[i] or (i == 2 and bounds.heights):

@@ -31,7 +31,7 @@ SAME = 1e-7  # of the mean: figures that differ by less count as equal; the orde
 
 @dataclass(frozen=True)
 class PlacementResult:
-    """What a search found. SI.
+    """A front of placements and the recommended one. SI.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ def _evolved(
 def _survivors(
     search: Search, placements: FloatArray, figures: PlacementFigures
 ) -> tuple[FloatArray, PlacementFigures]:
-    """What nothing dominates, thinned; where too little keeps the rules, the nearest to keeping them as well."""
+    """Placements that none dominates, thinned; where too few keep the rules, the nearest to keeping them as well."""
     violation = search.rules_for("few").violation(figures)
     rows = front_rows(figures, violation == 0.0)
     rows = thin(figures.take(rows).objectives, rows, ARCHIVE) if len(rows) else rows

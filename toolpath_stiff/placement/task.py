@@ -26,7 +26,7 @@ from toolpath_stiff.units import Pose, mm_from_m
 
 @dataclass(frozen=True)
 class Rewriting:
-    """How the program itself is to be written: its file's name, decimals, chords (m), and what it was read with."""
+    """Options of writing the program itself: its file's name, decimals, chords (m), and what it was read with."""
 
     file: str
     decimals: int | None
@@ -103,7 +103,7 @@ def _text_of(file: Path) -> str:
 
 @dataclass(frozen=True)
 class Task:
-    """What is to be placed, and how. SI.
+    """A program to be placed: the machine, the bounds and rules, the load. SI.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class Task:
             )
 
     def fingerprint(self) -> Fingerprint:
-        """What a search of this task rests on."""
+        """The hashes and options that a search of this task rests on."""
         program, rules, bounds = self.program, self.rules, self.bounds
         moves = [getattr(program.moves, f.name).tobytes() for f in fields(program.moves)]
         acting = [(active.effect.name, sorted(active.values.items())) for active in self.model.effects]

@@ -1,4 +1,4 @@
-"""What no placement keeps: anchored rapids, which the search leaves out, and all else, which is an error."""
+"""Rules that no placement keeps: anchored rapids are left out of the search, all else is an error."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _roomiest(search: Search, evaluator: Evaluator, placements: FloatArray) -> t
 
 
 def _breaks(search: Search, rapid: WorkPath, placement: FloatArray) -> str:
-    """What the worst sample of an anchored rapid breaks at a placement, in words."""
+    """The rule that the worst sample of an anchored rapid breaks at a placement, in words."""
     position, stand = _stand(search, rapid, placement)
     worst = int(np.argmin(stand.margin))
     if stand.margin[worst] < search.rules.margin:

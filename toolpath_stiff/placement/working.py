@@ -1,4 +1,4 @@
-"""What a search works with: evaluators of the whole path and of the samples that stand for it, bounds and rules."""
+"""The means of a search: evaluators of the whole path and of the samples that stand for it, bounds and rules."""
 
 from __future__ import annotations
 
@@ -90,12 +90,12 @@ class Search:
 
     @property
     def whole(self) -> Evaluator:
-        """Of the whole path."""
+        """The evaluator of the whole path."""
         return self.evaluators["whole"]
 
     @property
     def few(self) -> Evaluator:
-        """Of the few samples that stand for it."""
+        """The evaluator of the few samples that stand for it."""
         return self.evaluators["few"]
 
     @property

@@ -1,1 +1,1 @@
-"""What to measure next, or first."""
+"""Plans of what to measure next, or first."""

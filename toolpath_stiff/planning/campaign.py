@@ -82,7 +82,7 @@ class Campaign:
 
     @property
     def why(self) -> tuple[str, ...]:
-        """What each is for."""
+        """The purpose of each."""
         return self.kinds
 
     @property
@@ -101,7 +101,7 @@ class Campaign:
 
     @property
     def sentences(self) -> list[str]:
-        """What it takes, and what it would not show."""
+        """Sentences on what it takes, and what it would not show."""
         hidden = ", ".join(name for name, gap in self.sees.items() if gap < SHOWS)
         lines = [
             f"{self.poses} poses at {len(np.unique(np.round(self.visits.pose[:, 2], 9)))} heights, {len(self.visits)} "
@@ -113,12 +113,12 @@ class Campaign:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was assumed."""
+        """Assumptions."""
         return (f"seen or not: at a noise of {self._noise_words}, each effect alone at its usual size",)
 
     @property
     def _noise_words(self) -> str:
-        """As "2 %"; of a reading and of a clamping, "2 % and 1 %"."""
+        """The noise, "2 %"; of a reading and of a clamping, "2 % and 1 %"."""
         parts = self.noise if isinstance(self.noise, tuple) else (self.noise,)
         return " and ".join(f"{100 * part:g} %" for part in parts)
 
@@ -239,7 +239,7 @@ def _spread(chosen: FloatArray, pool: FloatArray, count: int, scale: FloatArray)
 
 
 def _stops(machine: Machine, poses: FloatArray, menu: Menu) -> list[_Stop]:
-    """What is done at which pose."""
+    """Stops at the poses: with longer tools, in other set-ups, clamped anew."""
     n, tool, setup = len(poses), menu.tool_extensions[0], menu.setups[0]
     stops = []
     for k, pose in enumerate(poses):

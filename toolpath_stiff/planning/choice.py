@@ -1,4 +1,4 @@
-"""Which visits to choose: those that set rivals apart most per minute of work."""
+"""The choice of visits: those that set rivals apart most per minute of work."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def in_order(visits: Visits, chosen: Sequence[int], seed: int) -> tuple[int, ...
 
 
 def why_of(visits: Visits, visit: int, shares: Mapping[Pair, GapShares]) -> str:
-    """What the visit is for, a sentence."""
+    """The purpose of a visit, a sentence."""
     pair, gap = max(((pair, share.gap([visit])) for pair, share in shares.items()), key=lambda entry: entry[1])
     tilt, extension, wait, rows = visits.tilt(visit), visits.extension[visit], visits.wait[visit], visits.rows(visit)
     parts = [f"tilted {np.degrees(tilt):.3g} deg" if tilt > 1e-6 else "vertical"]

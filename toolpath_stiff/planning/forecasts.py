@@ -1,4 +1,4 @@
-"""What rivals expect of readings: the mean of each, and how they vary together."""
+"""Forecasts of rivals: the mean of each reading, and how they vary together."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class Forecast:
-    """What a rival expects of m readings: mean (m,) of ln k, and a factor (m, q) of its own covariance."""
+    """A rival's forecast of m readings: mean (m,) of ln k, and a factor (m, q) of its own covariance."""
 
     name: str
     weight: float

@@ -1,4 +1,4 @@
-"""How far one visit would set the two likeliest rivals apart, over the workspace."""
+"""A map of how far one visit would set the two likeliest rivals apart, over the workspace."""
 
 from __future__ import annotations
 

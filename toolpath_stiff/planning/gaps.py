@@ -1,4 +1,4 @@
-"""How far visits would set rivals apart."""
+"""Gaps: how far visits would set rivals apart."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def repeat_and_clamping(relative: float | tuple[float, float]) -> tuple[float, f
 
 @dataclass(frozen=True)
 class GapShares:
-    """What each of v visits adds to the gap of a pair: a (v,), h (v, q), M (v, q, q)."""
+    """Shares of v visits in the gap of a pair: a (v,), h (v, q), M (v, q, q)."""
 
     a: FloatArray
     h: FloatArray
@@ -88,7 +88,7 @@ def _summed_products(columns: FloatArray, counts: IntArray) -> FloatArray:
 
 
 def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: ReadingNoise) -> GapShares:
-    """What every visit adds to the gap of two rivals."""
+    """Shares of the visits in the gap of two rivals."""
     difference = first.mean - second.mean
     F = np.concatenate([first.factor, second.factor, np.sqrt(2.0) * noise.machine], axis=1)
     columns = np.concatenate([difference[:, None], F], axis=1)[visits.members]

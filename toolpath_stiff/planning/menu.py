@@ -1,4 +1,4 @@
-"""What a plan may vary, and what work costs."""
+"""The menu of a plan: what may vary, and what work costs."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Costs:
 
 @dataclass(frozen=True)
 class Menu:
-    """What a plan may vary. Defaults are assumed; each is an option of `tps plan`.
+    """The menu of a plan: what may vary, and what it costs. Defaults are assumed; each is an option of `tps plan`.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Which pose next, at the machine: a plan's tables, and the readings taken so far, without the model.
+"""The next pose, at the machine: from a plan's tables and the readings taken so far, without the model.
 
 Readings change what a plan has worked out (`tables`) in closed form, by Bayes' rule: the probabilities of the rivals,
 their means, their factors (Gaussian conditioning; Rasmussen and Williams 2006, Gaussian Processes for Machine
@@ -51,7 +51,7 @@ class Taken(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NextVisit(Result):
-    """Where a plan stands, and the visit to make next.
+    """A plan after some readings, and the visit to make next.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class NextVisit(Result):
 
     @property
     def settled(self) -> bool:
-        """Whether one of them has 95 %."""
+        """True where one of them has 95 %."""
         return not self.unlike and max(self.weights.values()) >= SETTLED
 
     @cached_property
@@ -104,7 +104,7 @@ class NextVisit(Result):
 
     @property
     def sentences(self) -> list[str]:
-        """Where the plan stands, and what is next."""
+        """Sentences on where the plan stands, and what is next."""
         chances = ", ".join(f"{name} {_percent(weight)}" for name, weight in self.weights.items())
         lines = [f"after {len(self.taken.rows)} readings of this plan: {chances}"]
         if self.unlike:
@@ -163,7 +163,7 @@ def _percent(share: float) -> str:
 def next_visit(
     folder: str | Path, data: Sequence[str | Path] | str | Path = (), *, columns: Mapped = None
 ) -> NextVisit:
-    """Which pose of a plan to go to next, after the readings so far.
+    """The pose of a plan to go to next, after the readings so far.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ def _taken(tables: Tables, files: tuple[str, ...], columns: Mapped) -> tuple[Tak
 
 
 def _key(numbers: Sequence[float], setup: str, loop: str) -> Key:
-    """Of position, angles, direction, force and tool; the force to a millinewton."""
+    """The key of position, angles, direction, force and tool; the force to a millinewton."""
     *lengths, force, tool = numbers
     return (*(round(float(value), 6) + 0.0 for value in (*lengths, 1e-3 * force, tool)), setup, loop)
 

@@ -1,8 +1,7 @@
-"""What is to be expected of visits: readings simulated under every rival, judged by Bayes' rule."""
+"""The outlook of visits: readings simulated under every rival, judged by Bayes' rule."""
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,16 +11,14 @@ from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.planning.forecasts import Forecast
 from toolpath_stiff.planning.gaps import ReadingNoise
-from toolpath_stiff.planning.visits import Visits
 
 SETTLED = 0.95  # probability of one rival at which visits are enough: on the safe side of a diagnosis's `NAMED`
-MOST_REPEATS = 64
 DRAWS = 400  # simulated results a rival
 
 
 @dataclass(frozen=True)
 class Expectation:
-    """What is to be expected of readings.
+    """Expected outcome of readings.
 
     Attributes
     ----------
@@ -82,38 +79,3 @@ def expected_outcome(
         truth += weight * float(probability[:, i].mean())
         settled.append(float((probability.max(axis=1) >= NAMED).mean()))
     return Expectation(truth, float(weights @ settled), tuple(settled))
-
-
-@dataclass(frozen=True)
-class Outlook:
-    """What visits promise, in the order in which they were picked."""
-
-    visits: Visits
-    picked: Sequence[int]
-    forecasts: Sequence[Forecast]
-    noise: ReadingNoise
-    seed: int
-
-    def after(self, count: int | None = None, repeats: int = 1) -> Expectation:
-        """What is to be expected of the first visits (None: all), each made so often."""
-        rows = [self.visits.rows(visit) for visit in self.picked[:count]]
-        visit_of = np.repeat(np.arange(len(rows)), [len(some) for some in rows])
-        noise = self.noise.shared_out(repeats)
-        return expected_outcome(self.forecasts, np.concatenate(rows), visit_of, noise, self.seed)
-
-    def enough(self) -> int | None:
-        """How many of the visits, the first ones, should settle the question; None: not all of them."""
-        counts = range(1, len(self.picked) + 1)
-        return next((count for count in counts if self.after(count).truth >= SETTLED), None)
-
-    def repeats_needed(self) -> int | None:
-        """How often each visit must be made, clamped anew, to settle the question; None: not `MOST_REPEATS` times."""
-
-        def settles(repeats: int) -> bool:
-            return self.after(repeats=repeats).truth >= SETTLED
-
-        if settles(1):
-            return 1
-        if not settles(MOST_REPEATS):
-            return None
-        return bisect_left(range(MOST_REPEATS + 1), True, lo=1, hi=MOST_REPEATS, key=settles)

@@ -1,4 +1,4 @@
-"""What to measure next, or first: which measurements would tell rival explanations apart, per minute of work.
+"""Plans between rivals: the measurements that would tell rival explanations apart, per minute of work.
 
 Visits are chosen one after another. Each lowers the bound on the chance of taking one rival for another,
 
@@ -11,6 +11,7 @@ has been told apart counts no more; one that cannot be told apart takes nothing 
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -31,11 +32,11 @@ from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all
 from toolpath_stiff.planning.gaps import GapShares, ReadingNoise, pair_shares, repeat_and_clamping
 from toolpath_stiff.planning.indicators import loops_between, with_indicators
 from toolpath_stiff.planning.menu import Menu
-from toolpath_stiff.planning.outlook import MOST_REPEATS, SETTLED, Expectation, Outlook
+from toolpath_stiff.planning.outlook import SETTLED, Expectation, expected_outcome
 from toolpath_stiff.planning.visits import Matters, Visits, possible_visits
 
 MOST_RIVALS = 6  # a plan that separates more would separate none well
-MOST_VISITS = 200
+MOST_VISITS, MOST_REPEATS = 200, 64
 LEAST_GAP = 1.0  # standard deviations after all visits: below, tip stiffness cannot tell the two apart
 LEAST_GAIN = 0.01  # of a probability that is printed in whole per cent: less is no reason to measure
 # Where an indicator reads a link's own deflection.
@@ -53,7 +54,7 @@ INDICATORS = {
 
 @dataclass(frozen=True)
 class PairGap:
-    """How far two rivals are apart.
+    """The gap between two rivals.
 
     Attributes
     ----------
@@ -117,12 +118,12 @@ class RivalPlan:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What each chosen visit changes, one word or two."""
+        """The change that each chosen visit brings, one word or two."""
         return tuple(self.visits.kind(visit) for visit in self.chosen)
 
     @property
     def why(self) -> tuple[str, ...]:
-        """What each chosen visit is for, a sentence."""
+        """The purpose of each chosen visit, a sentence."""
         return tuple(why_of(self.visits, visit, self.shares) for visit in self.chosen)
 
     @property
@@ -145,37 +146,49 @@ class RivalPlan:
 
     @property
     def separable(self) -> bool:
-        """Whether any pair can be told apart by tip stiffness."""
+        """True where any pair can be told apart by tip stiffness."""
         return any(pair.separable for pair in self.pairs)
 
-    @property
-    def _outlook(self) -> Outlook:
-        return Outlook(self.visits, self.picked, self.forecasts, self.scatter, self.seed)
+    def expected(self, count: int | None = None, repeats: int = 1) -> Expectation:
+        """The expected outcome of the best visits (None: all), each made so often."""
+        rows = [self.visits.rows(visit) for visit in self.picked[:count]]
+        visit_of = np.repeat(np.arange(len(rows)), [len(some) for some in rows])
+        noise = self.scatter.shared_out(repeats)
+        return expected_outcome(self.forecasts, np.concatenate(rows), visit_of, noise, self.seed)
 
     @property
     def before(self) -> Expectation:
-        """What is known: the probabilities of the truth and of a settled verdict."""
+        """The probabilities of the truth and of a settled verdict as they are now."""
         weights = [forecast.weight for forecast in self.forecasts]
         return Expectation(float(np.square(weights).sum()), float(max(weights) >= NAMED))
 
     @cached_property
     def after(self) -> Expectation:
         """The same after the plan, to be expected."""
-        return self._outlook.after()
+        return self.expected()
 
     @cached_property
     def enough(self) -> int | None:
-        """How many of the poses, the best ones, should bring the truth a probability of `SETTLED`; None: not all."""
-        return self._outlook.enough()
+        """The number of poses, the best ones, that should bring the truth a probability of `SETTLED`; None: not all."""
+        counts = range(1, len(self.picked) + 1)
+        return next((count for count in counts if self.expected(count).truth >= SETTLED), None)
 
     @cached_property
     def repeats(self) -> int | None:
-        """How often each visit must be repeated, clamped anew, for that; None: not even `MOST_REPEATS` times."""
-        return self._outlook.repeats_needed()
+        """The repeats of each visit, clamped anew, that this takes; None: not even `MOST_REPEATS` do."""
+
+        def settles(repeats: int) -> bool:
+            return self.expected(repeats=repeats).truth >= SETTLED
+
+        if self.after.truth >= SETTLED:
+            return 1
+        if not settles(MOST_REPEATS):
+            return None
+        return bisect_left(range(MOST_REPEATS + 1), True, lo=1, hi=MOST_REPEATS, key=settles)
 
     @property
     def gains(self) -> bool:
-        """Whether the truth becomes likelier, or the verdict settled, on average, and more of it would go on so."""
+        """True where the truth becomes likelier, or the verdict settled, on average, and more of it would go on so."""
         rises = (self.after.truth - self.before.truth, self.after.settled - self.before.settled)
         return bool(max(rises) >= LEAST_GAIN and (self.separable or self.repeats is not None))
 
@@ -192,7 +205,7 @@ class RivalPlan:
 
     @property
     def sentences(self) -> list[str]:
-        """What the plan promises."""
+        """The promises of the plan."""
         lines = [
             f"{self._work}: the probability of the right explanation is expected to rise {self._rise}, "
             f"and the verdict to be settled in {_percent(self.after.settled)} of cases"
@@ -221,7 +234,7 @@ class RivalPlan:
 
     @property
     def nothing_gained(self) -> str:
-        """That a plan is not worth its minutes, and what would tell its two likeliest rivals apart instead."""
+        """A sentence: the plan is not worth its minutes, and what would tell its two likeliest rivals apart instead."""
         first, second = (rival.name for rival in self.rivals[:2])
         pair = next(pair for pair in self.pairs if {first, second} == set(pair.effects))
         beside = bool((self.visits.readings.loop != "").any())  # indicators take part already
@@ -341,7 +354,7 @@ def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
 
 
 def matters(rivals: Sequence[Rival]) -> Matters:
-    """What the rivals' answers hang on."""
+    """Columns that the rivals' answers hang on."""
     actives = [active for rival in rivals for active in rival.effects]
     needs = {column for active in actives for column in active.effect.needs}
     # A set-up that an effect acts on is a text among its values.

@@ -37,7 +37,7 @@ CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a p
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(FolderResult):
-    """What to measure next, or first, and what that is expected to show.
+    """A plan of what to measure next, or first, and what that is expected to show.
 
     Attributes
     ----------
@@ -68,12 +68,12 @@ class Plan(FolderResult):
 
     @property
     def sentences(self) -> list[str]:
-        """What the plan promises."""
+        """The promises of the plan."""
         return self.choice.sentences
 
     @property
     def notes(self) -> list[str]:
-        """What was assumed or left out."""
+        """Assumptions, and what was left out."""
         return list(self.choice.notes)
 
     @property
@@ -129,7 +129,7 @@ def plan(
     seed: int = 0,
     judgement: Judgement | None = None,
 ) -> Plan:
-    """What to measure next, after some measurements; or first.
+    """Plan what to measure next, after some measurements; or first.
 
     Parameters
     ----------
@@ -195,12 +195,12 @@ def plan(
 
 
 def usual_menu(data: Measurements | None) -> Menu:
-    """What may vary unless anyone says otherwise: what the data have, before any a bare table and a riser."""
+    """The menu unless anyone says otherwise: what the data have, before any a bare table and a riser."""
     return Menu(setups=(TABLE, RISER)) if data is None else Menu.of(data)
 
 
 def _answered(verdict: str) -> list[str]:
-    """What a plan is for where the diagnosis has an answer."""
+    """The purpose of a plan where the diagnosis has an answer."""
     if verdict == "described":
         return ["the answer is only described: the plan goes where it would show, or fail"]
     if verdict == "ambiguous":

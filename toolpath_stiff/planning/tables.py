@@ -1,4 +1,4 @@
-"""What a plan has worked out, kept beside it: all that the choice of the next visit needs, without the model.
+"""Tables of a plan, kept beside it: all that the choice of the next visit needs, without the model.
 
 A plan's rivals are linear about their fits: each expects ln k of every possible reading as a mean, with a factor of the
 covariance that its parameters and the machine's unknowns leave open.
@@ -92,7 +92,7 @@ def tables_of(plan: RivalPlan) -> bytes:
 
 @dataclass(frozen=True)
 class Tables:
-    """What a plan has worked out: visits, forecasts of all their readings, noise; how indicators are compared."""
+    """Tables of a plan: visits, forecasts of all their readings, noise; how indicators are compared."""
 
     visits: Visits
     usable: BoolArray
@@ -103,7 +103,7 @@ class Tables:
 
     @classmethod
     def read(cls, folder: str | Path) -> Tables:
-        """Of a plan's folder. Raises `InputError` where it holds none, or those of another version."""
+        """The tables in a plan's folder. Raises `InputError` where it holds none, or those of another version."""
         path = Path(folder) / TABLES
         try:
             with np.load(io.BytesIO(read_bytes(path, "the plan's tables")), allow_pickle=False) as file:

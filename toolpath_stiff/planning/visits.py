@@ -1,4 +1,4 @@
-"""What could be measured next: visits to poses, all reachable, and what each costs.
+"""Visits that could be made next: to poses, all reachable, and what each costs.
 
 A visit is one pose with one tool in one set-up, clamped once: the indicator is zeroed and readings are taken along
 some directions under one load or two. Visits are what costs time; further directions and loads at the same visit are
@@ -100,7 +100,7 @@ class Visits:
         )
 
     def kind(self, visit: int) -> str:
-        """What the visit changes, the dearest thing first."""
+        """The dearest thing that the visit changes."""
         if self.setup[visit] != self.menu.setups[0]:
             return "another set-up"
         if self.loop[visit]:
@@ -131,7 +131,7 @@ class Visits:
 
 @dataclass(frozen=True)
 class Matters:
-    """Which columns the rivals' answers hang on; only these are varied."""
+    """Columns that the rivals' answers hang on; only these are varied."""
 
     load: bool = False
     setup: bool = False

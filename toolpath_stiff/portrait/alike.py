@@ -77,21 +77,21 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
     if not entries:
         return None
     terms = [entry.term for entry in entries]
-    found = selection.together(start, terms)
+    sizes = selection.together(start, terms)
     squares = float(start.fit.scatter.precision.squares(named.residual))
     reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2) - _freedom(problem, named)
     prior = np.array([entry.log_prior for entry in entries])
     plainest = float(selection.dictionary.log_prior.max())
-    same = (found.posterior + prior - plainest >= reached - AS_WELL) & (np.abs(found.size[:, -1]) > 0.0)
+    same = (sizes.posterior + prior - plainest >= reached - AS_WELL) & (np.abs(sizes.size[:, -1]) > 0.0)
     change = np.exp(named.residual - problem.observed) - problem.predictor.strut_part(named.law) - problem.rest
     same &= ~_itself(selection.ground, terms, named, change)
     if not same.any():
         return None
     rows = np.flatnonzero(same)
-    logs = found.posterior[rows] / ROUGH + prior[rows]
+    logs = sizes.posterior[rows] / ROUGH + prior[rows]
     weights = np.exp(logs - logs.max())
     order = np.argsort(-weights, kind="stable")
-    sized = tuple(terms[i].sized(_size(selection, terms[i], float(found.size[i, -1]))) for i in rows[order].tolist())
+    sized = tuple(terms[i].sized(_size(selection, terms[i], float(sizes.size[i, -1]))) for i in rows[order].tolist())
     weighed = Weighed(sized, weights[order] / weights.sum(), np.ones(len(rows), dtype=bool))
     return Alike(
         _told(weighed),

@@ -61,10 +61,10 @@ class Weighed:
 
     def summed(self, of: Callable[[Term], str]) -> list[tuple[str, float]]:
         """Name -> probability summed over the terms, the likeliest first."""
-        found: dict[str, float] = {}
+        sums: dict[str, float] = {}
         for term, weight in zip(self.terms, self.weights.tolist(), strict=True):
-            found[of(term)] = found.get(of(term), 0.0) + weight
-        return sorted(found.items(), key=lambda item: (-item[1], item[0]))
+            sums[of(term)] = sums.get(of(term), 0.0) + weight
+        return sorted(sums.items(), key=lambda item: (-item[1], item[0]))
 
 
 @dataclass(frozen=True)
@@ -99,25 +99,27 @@ def choose(selection: Selection) -> tuple[Chosen | None, float]:
     begun = selection.grown(start)
     if chance > LEADS or begun is None:
         return None, chance
-    found = [_completed(selection, begun, threshold)]
-    if _searched(found[0]) > 1:
-        others = _other_beginnings(selection, start, found[0].terms[0])
-        found += [_completed(selection, other, threshold) for other in others]
-    found = _different(sorted(found, key=lambda one: -_worth(one, threshold)))
-    found = [_leading_first(selection, one) for one in found]
-    return Chosen(found[0], chance, weigh(selection, found, threshold), _held(selection, found[0])), chance
+    descriptions = [_completed(selection, begun, threshold)]
+    if _searched(descriptions[0]) > 1:
+        others = _other_beginnings(selection, start, descriptions[0].terms[0])
+        descriptions += [_completed(selection, other, threshold) for other in others]
+    descriptions = _different(sorted(descriptions, key=lambda description: -_worth(description, threshold)))
+    descriptions = [_leading_first(selection, description) for description in descriptions]
+    return Chosen(
+        descriptions[0], chance, weigh(selection, descriptions, threshold), _held(selection, descriptions[0])
+    ), chance
 
 
 def _completed(selection: Selection, begun: Description, threshold: float) -> Description:
     """With further terms as long as they join."""
     points = len(set(selection.problem.predictor.data.point.tolist()))
-    found = _multiplied(selection, begun, 0, threshold)
-    while len(found.terms) < min(MOST_TERMS, points // POINTS_EACH):
-        more = _one_more(selection, found, threshold)
+    description = _multiplied(selection, begun, 0, threshold)
+    while len(description.terms) < min(MOST_TERMS, points // POINTS_EACH):
+        more = _one_more(selection, description, threshold)
         if more is None:
             break
-        found = more
-    return found
+        description = more
+    return description
 
 
 def _one_more(selection: Selection, before: Description, threshold: float) -> Description | None:
@@ -182,11 +184,11 @@ def _searched(description: Description) -> int:
 
 def _different(descriptions: Sequence[Description]) -> list[Description]:
     """The first of those that differ by constants only."""
-    found: dict[frozenset[tuple[object, ...]], Description] = {}
-    for one in descriptions:
-        kinds = frozenset((t.link, t.where, t.direction, t.variables, t.column, t.shape) for t in one.terms)
-        found.setdefault(kinds, one)
-    return list(found.values())
+    kept: dict[frozenset[tuple[object, ...]], Description] = {}
+    for description in descriptions:
+        kinds = frozenset((t.link, t.where, t.direction, t.variables, t.column, t.shape) for t in description.terms)
+        kept.setdefault(kinds, description)
+    return list(kept.values())
 
 
 def _costs(selection: Selection, description: Description) -> FloatArray:
@@ -215,22 +217,24 @@ def temper(selection: Selection, description: Description, gain: float) -> float
 
 def weigh(selection: Selection, descriptions: Sequence[Description], threshold: float) -> Weighed:
     """Posterior probabilities of what may be the leading term, over descriptions, the chosen one first."""
-    costs = [_costs(selection, one) for one in descriptions]
+    costs = [_costs(selection, description) for description in descriptions]
     flat = temper(selection, descriptions[0], float(costs[0].max()))
     terms: list[Term] = []
     logs: list[FloatArray] = []
     chosen: list[NDArray[np.bool_]] = []
-    worths = np.array([one.posterior / flat - 0.5 * threshold * _searched(one) for one in descriptions])
-    for number, (one, cost) in enumerate(zip(descriptions, costs, strict=True)):
+    worths = np.array(
+        [description.posterior / flat - 0.5 * threshold * _searched(description) for description in descriptions]
+    )
+    for number, (description, cost) in enumerate(zip(descriptions, costs, strict=True)):
         leads = np.exp((cost - cost.max()) / flat)
         leads /= leads.sum()
         for k in np.flatnonzero(leads >= FAINT).tolist():
             if np.exp(worths[number] - worths.max()) * leads[k] < FAINT and (number, k) != (0, 0):
                 continue
-            own, log = _in_place(selection, one, k, flat)
-            terms += own
-            logs.append(log - 0.5 * threshold * (_searched(one) - 1) + np.log(leads[k]))
-            chosen.append(np.full(len(own), (number, k) == (0, 0)))
+            terms_here, log = _in_place(selection, description, k, flat)
+            terms += terms_here
+            logs.append(log - 0.5 * threshold * (_searched(description) - 1) + np.log(leads[k]))
+            chosen.append(np.full(len(terms_here), (number, k) == (0, 0)))
     every = np.concatenate(logs)
     weights = np.exp(every - every.max())
     order = np.argsort(-weights, kind="stable")
@@ -244,7 +248,7 @@ def _in_place(selection: Selection, description: Description, k: int, flat: floa
     others = selection.scattered(selection.without(description, k), description)
     entries = selection.finalists(selection.scores(others)) + crossed(description.terms[k], selection.ground)
     entries = list({entry.term: entry for entry in entries}.values())
-    found = selection.together(others, [entry.term for entry in entries])
-    posterior = found.posterior + description.fit.scatter.log_price
+    sizes = selection.together(others, [entry.term for entry in entries])
+    posterior = sizes.posterior + description.fit.scatter.log_price
     logs = posterior / flat + np.array([entry.log_prior for entry in entries])
-    return [entry.term for entry in entries], np.where(np.abs(found.size[:, -1]) > 0.0, logs, -np.inf)
+    return [entry.term for entry in entries], np.where(np.abs(sizes.size[:, -1]) > 0.0, logs, -np.inf)

@@ -120,22 +120,22 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: st
             held_out_rms=held_out(start.fit, points).rms, noise_floor=noise_floor(selection, start),
             before=base.residual, after=start.fit.residual,
         )  # fmt: skip
-    found = chosen.description
-    leading = found.terms[0]
+    description = chosen.description
+    leading = description.terms[0]
     values = selection.ground.values(leading.variable, leading.column)
     return Portrait(
-        terms=tuple(_sized(selection.ground, found, k) for k in range(len(found.terms))),
+        terms=tuple(_sized(selection.ground, description, k) for k in range(len(description.terms))),
         links=_honest(chosen.weighed.summed(lambda term: term.link), MOST_LINKS),
         variables=_honest(chosen.weighed.summed(lambda term: term.variable), MOST_VARIABLES, cut=True),
         alike=_alike(selection, chosen),
-        explained=_explained(selection, start, found),
-        error=float(found.fit.errors.mean()),
+        explained=_explained(selection, start, description),
+        error=float(description.fit.errors.mean()),
         held_out_rms=chosen.held.rms,
-        noise_floor=noise_floor(selection, found),
+        noise_floor=noise_floor(selection, description),
         smooth_rms=smooth,
         look_elsewhere=chosen.chance,
         before=start.fit.residual,
-        after=found.fit.residual,
+        after=description.fit.residual,
         signature=-np.log1p(np.maximum(leading.size * selection.ground.column(leading) / selection.compliance, -0.9)),
         values=None if values.ndim == 2 or leading.variable in ("constant", "direction") else values,
     )
@@ -154,10 +154,10 @@ def _chosen_from_fewer(whole: Selection) -> tuple[Chosen | None, float]:
     chosen, chance = choose(Selection(problem, fewer, noise.select(rows), whole.seed))
     if chosen is None:
         return None, chance
-    found = whole.start
+    description = whole.start
     for term in chosen.description.terms:
-        found = whole.extended(found, term)
-    return replace(chosen, description=found, held=held_out(found.fit, full.data.point)), chance
+        description = whole.extended(description, term)
+    return replace(chosen, description=description, held=held_out(description.fit, full.data.point)), chance
 
 
 def _sized(ground: Ground, description: Description, k: int, probability: float | None = None) -> Sized:
@@ -170,21 +170,21 @@ def _sized(ground: Ground, description: Description, k: int, probability: float 
 
 def _honest(summed: Sequence[tuple[str, float]], most: int, cut: bool = False) -> tuple[tuple[str, float], ...]:
     """The fewest that hold `HELD`; where that takes more than `most`, none, or the first ones if `cut`."""
-    found: list[tuple[str, float]] = []
+    fewest: list[tuple[str, float]] = []
     for name, weight in summed:
-        found.append((name, weight))
-        if sum(w for _, w in found) >= HELD:
+        fewest.append((name, weight))
+        if sum(w for _, w in fewest) >= HELD:
             break
-    if len(found) > most:
-        return tuple(found[:most]) if cut else ()
-    return tuple(found)
+    if len(fewest) > most:
+        return tuple(fewest[:most]) if cut else ()
+    return tuple(fewest)
 
 
 def _alike(selection: Selection, chosen: Chosen) -> tuple[Sized, ...]:
     """Other terms in the place of the leading one, the best of each link, place, direction and variable."""
-    found = chosen.description
-    others = selection.scattered(selection.without(found, 0), found)
-    seen = {_kind(found.terms[0])}
+    description = chosen.description
+    others = selection.scattered(selection.without(description, 0), description)
+    seen = {_kind(description.terms[0])}
     alike: list[Sized] = []
     weighed = chosen.weighed
     for term, weight, here in zip(weighed.terms, weighed.weights.tolist(), weighed.chosen.tolist(), strict=True):
@@ -203,11 +203,11 @@ def _kind(term: Term) -> tuple[object, ...]:
     return term.link, term.where, term.direction, term.variable
 
 
-def _explained(selection: Selection, start: Description, found: Description) -> float:
+def _explained(selection: Selection, start: Description, description: Description) -> float:
     """Under the scatter of the description, so that wild readings count alike."""
-    precision, free = found.fit.scatter.precision, len(selection.compliance) - 2
-    fixed = selection.described((), start.columns, start.scale, start.fit.law, found.fit.scatter)
-    before, after = (float(precision.squares(one.fit.residual)) for one in (fixed, found))
+    precision, free = description.fit.scatter.precision, len(selection.compliance) - 2
+    fixed = selection.described((), start.columns, start.scale, start.fit.law, description.fit.scatter)
+    before, after = (float(precision.squares(fitted.fit.residual)) for fitted in (fixed, description))
     return float(np.clip((before - after) / max(before - free, 1e-9), 0.0, 1.0)) if before > after else 0.0
 
 

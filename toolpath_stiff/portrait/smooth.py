@@ -34,13 +34,13 @@ def smooth_rms(problem: Problem, fit: Fit, form: str) -> float:
             continue
         features = forms[words]
         inner = precision.times(features.T) @ features
-        own, turn = np.linalg.eigh(inner)
+        values, turn = np.linalg.eigh(inner)
         turned = (turn.T @ (features.T @ pull)) ** 2
-        squared = AMPLITUDES[:, None] ** 2 * np.maximum(own, 0.0)
+        squared = AMPLITUDES[:, None] ** 2 * np.maximum(values, 0.0)
         gains = 0.5 * (AMPLITUDES[:, None] ** 2 * turned / (1.0 + squared) - np.log1p(squared)).sum(axis=1)
-        at = int(np.argmax(gains))
-        if best is None or gains[at] > best[0]:
-            best = float(gains[at]), features, float(AMPLITUDES[at])
+        likeliest = int(np.argmax(gains))
+        if best is None or gains[likeliest] > best[0]:
+            best = float(gains[likeliest]), features, float(AMPLITUDES[likeliest])
     if best is None:
         return float("nan")
     _, features, amplitude = best

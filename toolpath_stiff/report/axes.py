@@ -1,4 +1,4 @@
-"""What several pictures share: figures in groups of thousands, a scale of colours, headings."""
+"""Parts that several pictures share: figures in groups of thousands, a scale of colours, headings."""
 
 from __future__ import annotations
 

@@ -72,25 +72,25 @@ def smallest_text(smallest: Detectable) -> str:
     return plain(f"{significant(value)} {smallest.parameter.unit}".rstrip())
 
 
-def floor_text(found: Diagnosis) -> str:
+def floor_text(diagnosis: Diagnosis) -> str:
     """The mean error that scatter alone would leave; a guess says so."""
-    guess = f" ({found.noise.guess} guess)" if found.noise.guess else ""
-    return percent(json_number(found.noise.floor_percent), 2) + guess
+    guess = f" ({diagnosis.noise.guess} guess)" if diagnosis.noise.guess else ""
+    return percent(json_number(diagnosis.noise.floor_percent), 2) + guess
 
 
-def headline(found: Diagnosis) -> str:
+def headline(diagnosis: Diagnosis) -> str:
     """The verdict as one sentence: the cause where one was found."""
-    cause, standing = found.rows.best.finding if found.rows.best else "", found.explanations
-    if found.main.question:
-        return plain(found.main.question)
-    if cause and found.verdict in ("identified", "described"):
-        unconfirmed = " (described, not confirmed)" if found.verdict == "described" else ""
+    cause, standing = diagnosis.rows.best.finding if diagnosis.rows.best else "", diagnosis.explanations
+    if diagnosis.main.question:
+        return plain(diagnosis.main.question)
+    if cause and diagnosis.verdict in ("identified", "described"):
+        unconfirmed = " (described, not confirmed)" if diagnosis.verdict == "described" else ""
         return plain(cause[0].upper() + cause[1:] + unconfirmed)
-    if found.verdict == "ambiguous" and len(standing) == 1:
+    if diagnosis.verdict == "ambiguous" and len(standing) == 1:
         return plain(f"{standing[0]} is likeliest, but something else is not ruled out")
-    if found.verdict == "ambiguous" and len({judged.verdict for judged in found.judgements.values()}) > 1:
+    if diagnosis.verdict == "ambiguous" and len({judged.verdict for judged in diagnosis.judgements.values()}) > 1:
         return "It depends on how much the readings scatter, which these data do not tell"
-    return HEADLINES[found.verdict]
+    return HEADLINES[diagnosis.verdict]
 
 
 def path_text(path: Document | None) -> str:
@@ -114,10 +114,10 @@ def plausible_text(names: Sequence[str]) -> str:
     return ", ".join(words) or "no effect of the catalogue"
 
 
-def data_text(found: Diagnosis) -> list[str]:
+def data_text(diagnosis: Diagnosis) -> list[str]:
     """Number of readings, their files, the machine with what acts on it."""
-    machine = machine_text({"machine": found.machine.name, "effects": found.predictor.effects_that_act})
-    return [counted(len(found.data), "reading"), ", ".join(found.names), f"machine {machine}"]
+    machine = machine_text({"machine": diagnosis.machine.name, "effects": diagnosis.predictor.effects_that_act})
+    return [counted(len(diagnosis.data), "reading"), ", ".join(diagnosis.names), f"machine {machine}"]
 
 
 LABEL = 12  # columns of the left-hand words
@@ -128,36 +128,36 @@ MOST_SIZES = 6
 LONGEST_NAME = 45
 
 
-def text(found: Diagnosis) -> str:
+def text(diagnosis: Diagnosis) -> str:
     """The diagnosis in some 25 lines."""
-    readings, files, machine = data_text(found)
+    readings, files, machine = data_text(diagnosis)
     by_noise = [
-        f"{name} ({percent(percent_of(one.noise.typical, 4))}): {one.verdict} ({plausible_text(one.plausible)})"
-        for name, one in found.judgements.items()
+        f"{name} ({percent(percent_of(under.noise.typical, 4))}): {under.verdict} ({plausible_text(under.plausible)})"
+        for name, under in diagnosis.judgements.items()
     ]
     cannot = [
         f"{name} ({'no ' + ', '.join(lacks) if lacks else 'nothing in these data depends on it'})"
-        for name, lacks in sorted(found.cannot_test.items())
+        for name, lacks in sorted(diagnosis.cannot_test.items())
     ]
     lines = [
         *_listed("data", [f"{readings} of {files}, {machine}"]),
-        *_listed("verdict", [f"{found.verdict.upper()}. {verdict_text(found)}"]),
-        *_listed("why", why(found)),
-        *_listed("portrait", [portrait_text(found.portrait)] if found.portrait else []),
-        *_listed("error", [_error(found)]),
+        *_listed("verdict", [f"{diagnosis.verdict.upper()}. {verdict_text(diagnosis)}"]),
+        *_listed("why", why(diagnosis)),
+        *_listed("portrait", [portrait_text(diagnosis.portrait)] if diagnosis.portrait else []),
+        *_listed("error", [_error(diagnosis)]),
         "",
-        *_table(found),
+        *_table(diagnosis),
         "",
-        *_listed("plausible", [plausible_text(found.explanations)]),
-        *_listed("beside it", [beside_text(found.unexcluded)]),
+        *_listed("plausible", [plausible_text(diagnosis.explanations)]),
+        *_listed("beside it", [beside_text(diagnosis.unexcluded)]),
         *_listed("noise", ["; ".join(by_noise)] if len(by_noise) > 1 else []),
-        *_listed("beside the tip", [loop.text for loop in found.loops.by_loop]),
+        *_listed("beside the tip", [loop.text for loop in diagnosis.loops.by_loop]),
         *_listed("cannot test", ["; ".join(cannot)]),
-        *_listed("would show", [_would_show(found)]),
-        *_listed("path", [path_text(found.path)]),
-        *_hints("next", [*next_steps(found), *_next_readings(found)]),
-        *_listed("assumptions", [f"{len(assumptions(found))}, listed in diagnose.json"]),
-        *_listed("warning", found.predictor.data.warnings),
+        *_listed("would show", [_would_show(diagnosis)]),
+        *_listed("path", [path_text(diagnosis.path)]),
+        *_hints("next", [*next_steps(diagnosis), *_next_readings(diagnosis)]),
+        *_listed("assumptions", [f"{len(assumptions(diagnosis))}, listed in diagnose.json"]),
+        *_listed("warning", diagnosis.predictor.data.warnings),
     ]
     return "\n".join(lines)
 
@@ -177,21 +177,21 @@ def _hints(label: str, hints: Sequence[str]) -> list[str]:
     return lines
 
 
-def _error(found: Diagnosis) -> str:
+def _error(diagnosis: Diagnosis) -> str:
     """The fall of the error in one sentence: in sample, at left-out points, against the noise floor."""
-    rows, floor = found.rows, json_number(found.noise.floor_percent) or 0.0
+    rows, floor = diagnosis.rows, json_number(diagnosis.noise.floor_percent) or 0.0
     steps = [f"{percent(rows.as_given.mean_abs_error_percent, 2)} as given"]
-    best = None if found.verdict == "adequate" else rows.best
+    best = None if diagnosis.verdict == "adequate" else rows.best
     for row, what in ((rows.refitted, "the strut law refitted"), *([(best, plain(best.label))] if best else [])):
         left_out = f"({percent(row.held_out_error_percent, 2)} at points left out)"
         steps.append(f"{percent(row.mean_abs_error_percent, 2)} {left_out} with {what}")
-    scatter = scatter_text(floor, rows.refitted.mean_abs_error_percent or 0.0, found.noise.guess)
+    scatter = scatter_text(floor, rows.refitted.mean_abs_error_percent or 0.0, diagnosis.noise.guess)
     return f"mean {', '.join(steps)}; {scatter}"
 
 
-def _table(found: Diagnosis) -> list[str]:
+def _table(diagnosis: Diagnosis) -> list[str]:
     """As given, strut law refitted, pairs and the best candidates; an asterisk marks what is left standing."""
-    every = found.rows
+    every = diagnosis.rows
     shown = [every.as_given, every.refitted, *every.pairs[:MOST_PAIRS], *every.candidates[:MOST_CANDIDATES]]
     shown += [row for row in every.candidates[MOST_CANDIDATES:] if row.standing]
     cells = [["", "probab.", "error %", "left out %", "gain/SE", "", ""], *map(_cells, shown)]
@@ -218,21 +218,21 @@ def _cells(row: Row) -> list[str]:
     ]
 
 
-def _would_show(found: Diagnosis) -> str:
+def _would_show(diagnosis: Diagnosis) -> str:
     """Of an adequate model: the smallest sizes that these data would have shown, and what they never show."""
-    if found.verdict != "adequate":
+    if diagnosis.verdict != "adequate":
         return ""
-    never = ", ".join(hidden_name(smallest) for smallest in found.detectable if not smallest.seen)
-    seen = [f"{hidden_name(one)} {smallest_text(one)}" for one in found.detectable if one.seen]
+    never = ", ".join(hidden_name(smallest) for smallest in diagnosis.detectable if not smallest.seen)
+    seen = [f"{hidden_name(smallest)} {smallest_text(smallest)}" for smallest in diagnosis.detectable if smallest.seen]
     more = f" and {len(seen) - MOST_SIZES} more in diagnose.json" if len(seen) > MOST_SIZES else ""
     return "; ".join(filter(None, (", ".join(seen[:MOST_SIZES]) + more, f"at no size: {never}" if never else "")))
 
 
-def _next_readings(found: Diagnosis) -> list[str]:
+def _next_readings(diagnosis: Diagnosis) -> list[str]:
     """How many readings are proposed, and what they would settle."""
-    if not found.next_measurements:
+    if not diagnosis.next_measurements:
         return []
-    reasons = list(dict.fromkeys(reading["why"] for reading in found.next_measurements))
+    reasons = list(dict.fromkeys(reading["why"] for reading in diagnosis.next_measurements))
     more = [f"{len(reasons) - FEW_REASONS} more in the file"] if len(reasons) > FEW_REASONS else []
-    proposed = counted(len(found.next_measurements), "reading")
+    proposed = counted(len(diagnosis.next_measurements), "reading")
     return [f"{proposed} proposed in diagnose.json: {'; '.join([*reasons[:FEW_REASONS], *more])}"]

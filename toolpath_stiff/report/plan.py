@@ -112,7 +112,7 @@ def plan_picture(
 
 
 def _numbers(visits: Visits, chosen: Sequence[int]) -> list[str]:
-    """Where each visit stands in measuring order; visits to one pose share a label."""
+    """Labels of the visits, their numbers in measuring order; visits to one pose share a label."""
     poses = [visits.pose[v].tobytes() for v in chosen]
     return [", ".join(str(k + 1) for k, other in enumerate(poses) if other == pose) for pose in poses]
 

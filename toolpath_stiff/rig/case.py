@@ -18,7 +18,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
-from toolpath_stiff.rig.effects import CATALOGUE, scale_of, with_effect
+from toolpath_stiff.rig.effects import CATALOGUE, with_effect
 from toolpath_stiff.rig.hidden import (
     ODDITIES,
     OUTSIDE,
@@ -32,6 +32,7 @@ from toolpath_stiff.rig.hidden import (
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
+from toolpath_stiff.rig.sizes import scale_of
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
@@ -89,7 +90,7 @@ class Case:
         Measurement table in shop units, in measuring order.
     truth
         What was hidden: `hidden` (names; empty if nothing), `kind`, `effects` with parameters in shop units,
-        their `size` (rms change of ln stiffness) and `detectability` (see `effects.DETECTABLE`); of an unknown also
+        their `size` (rms change of ln stiffness) and `detectability` (see `sizes.DETECTABLE`); of an unknown also
         `links` and `variables`, what a description may name.
     nominal, machine, nuisances
         To measure the same machine again.
@@ -108,7 +109,13 @@ def effects_of_layout(layout: str) -> tuple[str, ...]:
     return tuple(name for name in CATALOGUE if name not in lacking)
 
 
-def make_case(
+def make_case(seed: int, *args: Any, **named: Any) -> tuple[Table, dict[str, Any]]:
+    """Rows and truth of the same as `draw_case`."""
+    case = draw_case(seed, *args, **named)
+    return case.rows, case.truth
+
+
+def draw_case(
     seed: int,
     layout: str = "tilted",
     hidden: str | Sequence[str] | None = None,
@@ -117,8 +124,8 @@ def make_case(
     plan: Mapping[str, Any] | None = None,
     size: float | Sequence[float] | None = None,
     nuisances: Nuisances | None = None,
-) -> tuple[Table, dict[str, Any]]:
-    """Rows of a blind campaign and their truth; the same arguments give the same rows.
+) -> Case:
+    """A blind campaign on a machine that hides something; the same arguments give the same rows.
 
     Parameters
     ----------
@@ -146,21 +153,6 @@ def make_case(
     InputError
         Unknown layout, effect or machine; an effect that the layout cannot show.
     """
-    case = draw_case(seed, layout, hidden, noise, machine, plan, size, nuisances)
-    return case.rows, case.truth
-
-
-def draw_case(
-    seed: int,
-    layout: str = "tilted",
-    hidden: str | Sequence[str] | None = None,
-    noise: float = 0.02,
-    machine: str | Nominal = defaults.MACHINE,
-    plan: Mapping[str, Any] | None = None,
-    size: float | Sequence[float] | None = None,
-    nuisances: Nuisances | None = None,
-) -> Case:
-    """As `make_case`, with the machine itself."""
     if seed < 0:
         raise InputError(f"seed {seed}", expected="0 or more")
     if nuisances is None:

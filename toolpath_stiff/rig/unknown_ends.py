@@ -117,10 +117,7 @@ def spindle_thrust(links: Links, state: State, u: Unknown) -> Links:
     thrust = state.rows.force * np.einsum("ni,ni->n", state.rows.direction, tool) * u.shape["side"]
     give = u.size * opened(thrust)
     return _with_ends(
-        links,
-        (state.place.rotation[:, :, 0], give),
-        (state.place.rotation[:, :, 1], give),
-        (tool, 0.5 * give),
+        links, (state.place.rotation[:, :, 0], give), (state.place.rotation[:, :, 1], give), (tool, 0.5 * give)
     )
 
 

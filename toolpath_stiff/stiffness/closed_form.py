@@ -18,14 +18,7 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.machine.kinematics import LENGTH_TOLERANCE, Struts, solve_struts_at
 from toolpath_stiff.machine.model import Machine, StrutLaw
-from toolpath_stiff.stiffness.elimination import (
-    Vector,
-    cross,
-    dot,
-    forces,
-    over_struts,
-    strut,
-)
+from toolpath_stiff.stiffness.elimination import Vector, cross, dot, forces, over_struts, strut
 
 BLOCK = 2048  # poses: some 1 MB of work arrays, which stay in a core's second-level cache
 # Determinants of unit directions lie within 0 and 1. Above this the elimination loses up to seven of sixteen digits:
@@ -114,10 +107,10 @@ class _Block:
         self.directions, moments, self.lengths = strut(vectors, self.arms)
         self.w, first = _inverse([c[:3] for c in self.directions])
         self.rows = dot(self.w[:, :, None], [c[3:] for c in self.directions])  # of t
-        by_strut = np.concatenate(moments).reshape(3, 6, -1).swapaxes(0, 1)
-        self.t, self.moments = self.rows.swapaxes(0, 1), by_strut[:3]
-        s = by_strut[3:].swapaxes(0, 1)
-        s -= dot(self.moments[:, :, None], self.rows[:, None])
+        self.t = self.rows.swapaxes(0, 1)
+        self.moments = np.concatenate([c[:3] for c in moments]).reshape(3, 3, -1).swapaxes(0, 1)
+        taken = dot(self.moments[:, :, None], self.rows[:, None])
+        s = [whole[3:] - part for whole, part in zip(moments, taken, strict=True)]
         self.q, second = _inverse(s)
         self.determinant = np.abs(first * second)
         self.good = well_conditioned(kernel, first, second)
@@ -125,7 +118,8 @@ class _Block:
     def strut_compliances(self) -> tuple[FloatArray, BoolArray]:
         """1 / k(L), (6, m) m/N, and where every strut has a stiffness above zero: beyond, the exact route complains."""
         stiffness = self.kernel.law.stiffness(self.lengths)
-        return 1.0 / stiffness, np.asarray(stiffness.min(axis=0) > 0.0)
+        law_holds = stiffness.min(axis=0) > 0.0
+        return np.divide(1.0, stiffness, out=stiffness), np.asarray(law_holds)
 
     def forces(self, load: Vector) -> Sequence[FloatArray]:
         """Forces in the six struts that balance forces (3, m) at the tip."""
@@ -147,9 +141,10 @@ def _struts(kernel: ClosedForm, position: FloatArray, rotation: FloatArray | Non
         arms = kernel.platform[:, :, None]
         return arms, position[:, None] + (kernel.platform - kernel.frame)[:, :, None]
     arms = kernel.platform[0][:, None] * rotation[:, 0, None]
+    vectors = np.empty_like(arms)
     for d in (1, 2):
-        arms += kernel.platform[d][:, None] * rotation[:, d, None]
-    vectors = arms + position[:, None]
+        arms += np.multiply(kernel.platform[d][:, None], rotation[:, d, None], out=vectors)
+    np.add(arms, position[:, None], out=vectors)
     vectors -= kernel.frame[:, :, None]
     return arms, vectors
 
@@ -196,6 +191,7 @@ def tip_compliance(
             for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
                 out[:, i, j] = out[:, j, i] = (weighted[:, i] * influence[:, j]).sum(axis=0)
             good[rows] = law_holds & block.good & np.isfinite(out[:, 2, 2])
+            del block, influence, weighted, strut_compliance, t, moments, q, unit
     return compliance, good
 
 
@@ -233,6 +229,7 @@ def compliance_along_columns(
                 force = block.forces(load[:, rows])
                 along[rows] = over_struts(force, force, strut_compliance)
                 good[rows] &= np.isfinite(along[rows])
+            del block, force, strut_compliance  # the next block takes their room in the cache
     return compliance if direction.ndim == 3 else compliance[0], determinant, lengths, good
 
 
@@ -254,6 +251,7 @@ def strut_forces_columns(
             struts.arms[rows, order] = block.arms.T
             force[rows, order] = np.array(block.forces(direction[:, rows])).T
             good[rows] = block.good & np.isfinite(force[rows]).all(axis=1)
+            del block
     return force, struts, good
 
 

@@ -3,32 +3,39 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+import toolpath_stiff as tps
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
 
 if TYPE_CHECKING:
-    import toolpath_stiff as tps
+    from toolpath_stiff.case.steps import Step
     from toolpath_stiff.studio.session import Session
+
+Picture = dict[str, Any]  # a part of the document
+
 
 MERIDIANS, PARALLELS = 36, 9  # of the reach boundary
 MOST_LINES = 400_000  # of a program's text in the page
 
 
-def document(session: Session) -> dict[str, Any]:
+def document(session: Session) -> Picture:
     """Everything that a page shows."""
     with session.lock:
         return _document(session) | session.news()
 
 
-def _document(session: Session) -> dict[str, Any]:
+def _document(session: Session) -> Picture:
     case, state = session.case, session.case.state
     has_data = bool(state.data)
     now = session.errors() if has_data else None
     return {
         "case": session.name,
-        "machine": machine(session.machine),
+        "machine": machine(session),
         "readings": readings(session, now) if has_data else None,
         "gauge": gauge(session, now) if now else None,
         "verdict": verdict(session),
@@ -40,58 +47,48 @@ def _document(session: Session) -> dict[str, Any]:
         "program": program(session),
         "placement": placement(session),
         "exercise": {"folder": state.exercise, "reveal": session.reveal(), "measured": bool(case.latest("plan"))},
-        "history": [_step(step) for step in case.history],
-        "undone": [_step(step) for step in case.undone],
+        "history": list(map(_step, case.history)),
+        "undone": list(map(_step, case.undone)),
     }
 
 
-def _step(step: Any) -> dict[str, str]:
+def _step(step: Step) -> dict[str, str]:
     return {name: getattr(step, name) for name in ("kind", "text", "command", "python", "result")}
 
 
-def machine(on: tps.Machine) -> dict[str, Any]:
+def machine(session: Session) -> Picture:
     """What the drawing of the machine needs, and the boundary of its reach with the tool as it stands at rest."""
+    on = session.machine
     return {
         "name": on.name,
         "title": on.title,
         "effects": on.effects,
         "joints": on.joints_mm,
         "origin": list(on.origin_mm_deg),
-        "reach": _reach(on),
+        "reach": session.once("reach", session.data_key[:2], lambda: _boundary(on)),
     }
-
-
-_KEPT: dict[int, Any] = {}
-
-
-def _reach(on: tps.Machine) -> list[list[list[float]]]:
-    if id(on.model) not in _KEPT:
-        _KEPT.clear()
-        _KEPT[id(on.model)] = (on.model, _boundary(on))
-    found: list[list[list[float]]] = _KEPT[id(on.model)][1]
-    return found
 
 
 def _boundary(on: tps.Machine) -> list[list[list[float]]]:
     """(parallels, meridians, 3) mm: how far the tip goes from the default origin along rays."""
     centre = on.origin_mm_deg[:3]
-    heights = [-90.0 + 180.0 * i / (PARALLELS - 1) for i in range(PARALLELS)]
-    rays = [_ray(height, 360.0 * k / MERIDIANS) for height in heights for k in range(MERIDIANS)]
-    lengths = on.reach_mm(centre, rays)
-    points = [
-        [round(c + d * float(length), 1) for c, d in zip(centre, ray, strict=True)]
-        for ray, length in zip(rays, lengths, strict=True)
-    ]
-    return [points[i * MERIDIANS : (i + 1) * MERIDIANS] for i in range(PARALLELS)]
+    heights = np.radians(np.linspace(-90.0, 90.0, PARALLELS))[:, None]
+    azimuths = 2.0 * np.pi * np.arange(MERIDIANS) / MERIDIANS
+    level = np.cos(heights)
+    parts = np.broadcast_arrays(level * np.cos(azimuths), level * np.sin(azimuths), np.sin(heights))
+    rays = np.stack(parts, axis=-1).reshape(-1, 3)
+    lengths = on.reach_mm(centre, rays.tolist())
+    points = np.round(np.array(centre) + np.asarray(lengths)[:, None] * rays, 1)
+    boundary: list[list[list[float]]] = points.reshape(PARALLELS, MERIDIANS, 3).tolist()
+    return boundary
 
 
-@lru_cache(maxsize=1024)
-def _ray(height: float, azimuth: float) -> tuple[float, float, float]:
-    h, a = math.radians(height), math.radians(azimuth)
-    return (math.cos(h) * math.cos(a), math.cos(h) * math.sin(a), math.sin(h))
+def _of(document: Document, *names: str) -> Picture:
+    """Some entries of a document, None for what it has not."""
+    return {name: document.get(name) for name in names}
 
 
-def readings(session: Session, now: dict[str, Any] | None) -> dict[str, Any]:
+def readings(session: Session, now: Picture | None) -> Picture:
     """All readings; deviation and model are None for those that are set aside."""
     found, aside = session.readings(), set(session.case.state.aside)
     out = [f"{file}:{line}" in aside for file, line in zip(found["file"], found["line"], strict=True)]
@@ -104,38 +101,31 @@ def readings(session: Session, now: dict[str, Any] | None) -> dict[str, Any]:
     }
 
 
-def gauge(session: Session, now: dict[str, Any]) -> dict[str, Any]:
+def gauge(session: Session, now: Picture) -> Picture:
     """Mean errors in per cent: as the file stands, refitted, now, at left-out points; the noise floor."""
     hand, on = session.case.preview, session.case.state.on
     key = session.data_key
     base = session.once(
         "base", key, lambda: [hand.at(strut_law=law)["mean_abs_error_percent"] for law in (False, True)]
     )
-    found = session.found("diagnose")
-    diagnosed = found["document"] if found else None
-    fitted = session.found("update") if session.is_fitted else None
+    diagnosed, fitted = session.document("diagnose"), session.document("update") if session.is_fitted else None
     floor = diagnosed["baseline"]["noise_floor_percent"] if diagnosed else None
     left_out = None
     if fitted:
-        last = fitted["document"]["steps"][-1]
-        left_out, floor = last["held_out_error_percent"], fitted["document"]["noise_floor_percent"]
+        left_out, floor = fitted["steps"][-1]["held_out_error_percent"], fitted["noise_floor_percent"]
     elif diagnosed and not on:
         left_out = diagnosed["baseline"]["as_given"]["held_out_error_percent"]
     elif diagnosed and len(on) == 1:
         ((name, keys),) = on.items()
-        same = [one for one in diagnosed["candidates"] if one["effect"] == name and _values(one) == dict(keys)]
+        same = [row for row in diagnosed["candidates"] if row["effect"] == name and _values(row) == dict(keys)]
         left_out = same[0]["held_out_error_percent"] if same else None
-    return {
-        "as_given": base[0],
-        "refitted": base[1],
-        "now": now["mean_abs_error_percent"],
-        "left_out": left_out,
-        "floor": floor,
-    }
+    as_given, refitted = base
+    error = now["mean_abs_error_percent"]
+    return {"as_given": as_given, "refitted": refitted, "now": error, "left_out": left_out, "floor": floor}
 
 
-def _values(candidate: dict[str, Any]) -> dict[str, Any]:
-    return {**candidate["choice"], **{key: one["value"] for key, one in candidate["parameters"].items()}}
+def _values(candidate: Document) -> Picture:
+    return {**candidate["choice"], **{key: size["value"] for key, size in candidate["parameters"].items()}}
 
 
 SENTENCES = {
@@ -147,163 +137,114 @@ SENTENCES = {
 ENDS = {"identified": "nothing else fits", "described": "described, not confirmed: new readings must tell"}
 
 
-def verdict(session: Session) -> dict[str, Any] | None:
+def verdict(session: Session) -> Picture | None:
     """What the diagnosis says; None while there is none for these readings."""
-    found = session.found("diagnose")
-    if not found:
+    diagnosis = session.document("diagnose")
+    if not diagnosis:
         return None
-    said = found["document"]
-    best = next((one for one in said["candidates"] if one["effect"] == said["best"]), None)
-    names = said["plausible"]
-    if said["verdict"] in ENDS and best and best["finding"]:
-        sentence = f"{best['finding'][0].upper()}{best['finding'][1:]}; {ENDS[said['verdict']]}"
-    elif said["verdict"] in SENTENCES:
-        sentence = SENTENCES[said["verdict"]]
+    best = next((row for row in diagnosis["candidates"] if row["effect"] == diagnosis["best"]), None)
+    verdict, names = diagnosis["verdict"], diagnosis["plausible"]
+    if verdict in ENDS and best and best["finding"]:
+        sentence = f"{best['finding'][0].upper()}{best['finding'][1:]}; {ENDS[verdict]}"
+    elif verdict in SENTENCES:
+        sentence = SENTENCES[verdict]
     else:
-        sentence = f"Several explain it: {', '.join(names)}" if len(names) > 1 else said["text"].split(". ")[0]
-    keys = (
-        "verdict",
-        "text",
-        "why",
-        "plausible",
-        "best",
-        "gates",
-        "detectable",
-        "confounding",
-        "assumptions",
-        "warnings",
-        "notes",
-        "noise",
-        "cannot_test",
-        "readings",
-        "portrait",
-    )
-    kept = {key: said[key] for key in keys}
+        sentence = f"Several explain it: {', '.join(names)}" if len(names) > 1 else diagnosis["text"].split(". ")[0]
+    kept = _of(
+        diagnosis, "verdict", "text", "why", "plausible", "best", "gates", "detectable", "confounding", "assumptions",
+        "warnings", "notes", "noise", "cannot_test", "readings", "portrait",
+    )  # fmt: skip
     kept["gates"] = {name: value for name, value in kept["gates"].items() if name != "simulated_squares"}
     return {"sentence": sentence, **kept}
 
 
-def effects(session: Session) -> list[dict[str, Any]]:
+def effects(session: Session) -> list[Picture]:
     """The catalogue with what a diagnosis says of each, the likeliest first."""
-    found, on = session.found("diagnose"), session.case.state.on
-    candidates = found["document"]["candidates"] if found else []
-    rank = {one["effect"]: (n, one) for n, one in enumerate(candidates)}
+    diagnosis, on = session.document("diagnose"), session.case.state.on
+    rank = {row["effect"]: (n, row) for n, row in enumerate(diagnosis["candidates"] if diagnosis else [])}
+    last = len(rank), None
     there = set(session.machine.effects)
     rows = [
-        _effect(effect, rank.get(effect.name, (len(rank), None))[1], on.get(effect.name), session)
+        _effect(effect, rank.get(effect.name, last)[1], on.get(effect.name), session)
         for effect in session.catalogue().effects
         if effect.name not in there
     ]
-    return sorted(rows, key=lambda row: rank.get(row["name"], (len(rank), None))[0])
+    return sorted(rows, key=lambda row: rank.get(row["name"], last)[0])
 
 
-def _effect(effect: Any, candidate: dict[str, Any] | None, on: Any, session: Session) -> dict[str, Any]:
-    fitted = _values(candidate) if candidate else {}
-    sliders = [_slider(one, candidate, fitted, session) for one in effect.parameters]
-    row = {
-        "name": effect.name,
-        "title": effect.title,
-        "link": effect.link,
-        "equation": effect.equation,
-        "source": effect.source,
-        "sliders": sliders,
-        "on": on,
-    }
-    names = (
-        "probability",
-        "mean_abs_error_percent",
-        "held_out_error_percent",
-        "finding",
-        "words",
-        "remark",
-        "eligible",
-    )
-    return row | {name: candidate[name] if candidate else None for name in names}
+def _effect(effect: tps.Effect, candidate: Document | None, on: Any, session: Session) -> Picture:
+    row = {name: getattr(effect, name) for name in ("name", "title", "link", "equation", "source")}
+    sliders = [_slider(parameter, candidate or {}, session) for parameter in effect.parameters]
+    judged = _of(
+        candidate or {}, "probability", "mean_abs_error_percent", "held_out_error_percent", "finding", "words",
+        "remark", "eligible",
+    )  # fmt: skip
+    return {**row, "sliders": sliders, "on": on, **judged}
 
 
-def _slider(one: Any, candidate: dict[str, Any] | None, fitted: dict[str, Any], session: Session) -> dict[str, Any]:
+def _slider(parameter: tps.Parameter, candidate: Document, session: Session) -> Picture:
     """A parameter: its key, what it is, the ends of its slider, where it begins."""
-    row = {
-        "key": one.key,
-        "name": one.name.replace("_", " "),
-        "unit": one.unit,
-        "meaning": one.meaning,
-        "kind": one.kind,
-    }
-    if one.kind == "text":
-        names = sorted(set(_setups(session)))
-        return row | {"choices": names, "start": fitted.get(one.key) or (names[0] if names else "")}
-    if one.kind == "integer":
-        low, high = (int(end) for end in one.bounds)
-        return row | {"choices": list(range(low, high + 1)), "start": fitted.get(one.key, low)}
-    known = (candidate or {}).get("parameters", {}).get(one.key, {})
-    value = fitted.get(one.key)
-    low, high = one.typical
-    usual = [end for end in (low, high, value) if end is not None and math.isfinite(end)]
-    if math.isfinite(one.neutral):
-        far = 1.5 * max(abs(end - one.neutral) for end in usual)
-        ends = [
-            one.neutral - far if one.bounds[0] < one.neutral else one.neutral,
-            one.neutral + far if one.bounds[1] > one.neutral else one.neutral,
-        ]
+    fitted = _values(candidate) if candidate else {}
+    key, neutral, value = parameter.key, parameter.neutral, fitted.get(parameter.key)
+    row = {"key": key, "name": parameter.name.replace("_", " "), "unit": parameter.unit}
+    row |= {"meaning": parameter.meaning, "kind": parameter.kind}
+    if parameter.kind == "text":
+        names = _setups(session)
+        return row | {"choices": names, "start": value or (names[0] if names else "")}
+    if parameter.kind == "integer":
+        first, final = (int(end) for end in parameter.bounds)
+        return row | {"choices": list(range(first, final + 1)), "start": fitted.get(key, first)}
+    usual = [end for end in (*parameter.typical, value) if end is not None and math.isfinite(end)]
+    if math.isfinite(neutral):
+        far = 1.5 * max(abs(end - neutral) for end in usual)
+        low, high = neutral - far, neutral + far
     else:
-        ends = [0.2 * min(usual), 5.0 * max(usual)]
-    ends = [max(ends[0], one.bounds[0]), min(ends[1], one.bounds[1])]
-    middle = 0.5 * (low + high) if math.isfinite(low + high) else ends[0]
-    start = value if value is not None and math.isfinite(value) else min(max(middle, ends[0]), ends[1])
-    return row | {"low": ends[0], "high": ends[1], "start": start, "fitted": value, "interval": known.get("interval")}
+        low, high = 0.2 * min(usual), 5.0 * max(usual)
+    low, high = max(low, parameter.bounds[0]), min(high, parameter.bounds[1])
+    middle = 0.5 * sum(parameter.typical) if math.isfinite(sum(parameter.typical)) else low
+    start = value if value is not None and math.isfinite(value) else min(max(middle, low), high)
+    interval = candidate.get("parameters", {}).get(key, {}).get("interval")
+    return row | {"low": low, "high": high, "start": start, "fitted": value, "interval": interval}
 
 
 def _setups(session: Session) -> list[str]:
-    """Names of set-ups in the readings."""
+    """Names of set-ups in the readings, in their order."""
 
     def make() -> list[str]:
         frame = session.case.data.to_frame(session.machine)
-        return [name for name in frame["setup"].unique().tolist() if name] if "setup" in frame else []
+        return sorted(set(frame["setup"]) - {""}) if "setup" in frame else []
 
-    found: list[str] = session.once("setups", session.data_key, make) if session.case.state.data else []
-    return found
+    return session.once("setups", session.data_key, make) if session.case.state.data else []
 
 
-def fit(session: Session) -> dict[str, Any] | None:
+def fit(session: Session) -> Picture | None:
     """The last fit, if it is of these readings."""
     found = session.found("update")
     if not found:
         return None
-    said = found["document"]
-    return {
-        "verdict": said["verdict"],
-        "text": said["text"],
-        "steps": said["steps"],
-        "support": said["support"],
-        "warnings": said["warnings"],
-        "accepted": found["accepted"],
-        "holds": session.is_fitted,
-        "result": found["result"],
-    }
+    told = _of(found["document"], "verdict", "text", "steps", "support", "warnings")
+    return {**told, "accepted": found["accepted"], "holds": session.is_fitted, "result": found["result"]}
 
 
-def plan(session: Session) -> dict[str, Any] | None:
+def plan(session: Session) -> Picture | None:
     """What to measure next."""
     found = session.found("plan")
     if not found:
         return None
-    said = found["document"]
     names = ("text", "visits", "poses", "readings", "minutes", "notes")
-    return {**{name: said[name] for name in names}, "file": f"{found['result']}/plan.csv"}
+    return {**_of(found["document"], *names), "file": f"{found['result']}/plan.csv"}
 
 
-def compare(session: Session) -> dict[str, Any] | None:
+def compare(session: Session) -> Picture | None:
     """Where the model fails: planes by direction, findings; the folder with its page."""
     found = session.found("compare")
     if not found:
         return None
-    said = found["document"]
     names = ("text", "by_plane_and_direction", "by_direction", "findings", "outliers", "warnings")
-    return {**{name: said[name] for name in names}, "result": found["result"]}
+    return {**_of(found["document"], *names), "result": found["result"]}
 
 
-def program(session: Session) -> dict[str, Any] | None:
+def program(session: Session) -> Picture | None:
     """The program's text and, once it is analyzed, its path."""
     state = session.case.state
     if not state.program:
@@ -319,26 +260,11 @@ def program(session: Session) -> dict[str, Any] | None:
     }
     if not found:
         return {**shown, "path": None, "error": error}
-    said = found["document"]
-    names = (
-        "mean_N_per_mm",
-        "min_N_per_mm",
-        "max_N_per_mm",
-        "range_N_per_mm",
-        "weakest",
-        "plunges",
-        "warnings",
-        "out_of_reach_samples",
-        "per_operation",
-        "required",
-    )
-    return {
-        **shown,
-        "path": found["path"],
-        "summary": {name: said.get(name) for name in names},
-        "result": found["result"],
-        "error": "",
-    }
+    summary = _of(
+        found["document"], "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "weakest", "plunges",
+        "warnings", "out_of_reach_samples", "per_operation", "required",
+    )  # fmt: skip
+    return {**shown, "path": found["path"], "summary": summary, "result": found["result"], "error": ""}
 
 
 def origin(session: Session) -> list[float]:
@@ -346,39 +272,32 @@ def origin(session: Session) -> list[float]:
     state = session.case.state
     if state.origin:
         return [*state.origin, 0.0, 0.0, 0.0][:6]
-    found = session.found("analyze")
-    return list(found["document"]["origin_mm_deg"] if found else session.machine.origin_mm_deg)
+    analysis = session.document("analyze")
+    return list(analysis["origin_mm_deg"] if analysis else session.machine.origin_mm_deg)
 
 
-def placement(session: Session) -> dict[str, Any] | None:
+def placement(session: Session) -> Picture | None:
     """The front of the last search, if it is of this program where it sits."""
     state = session.case.state
     if not state.program:
         return None
-    try:
-        now = session.once(
-            "placed",
-            (session.data_key, session.program_key, tuple(origin(session))),
-            lambda: session.trial().at(origin(session)),
-        )
-    except TpsError:
-        now = None
+    now = None
+    with suppress(TpsError):
+        place = origin(session)
+        key = (session.data_key, session.program_key, tuple(place))
+        now = session.once("placed", key, lambda: session.trial().at(place))
     entry, sheet = session.found("place"), set_up(session)
     if not entry:
         return {"now": now, "front": None, "set_up": sheet}
-    said = entry["document"]
     names = ("front", "chosen", "before", "worse", "warnings", "offset_blocks")
-    return {"now": now, "set_up": sheet, "result": entry["result"], **{name: said.get(name) for name in names}}
+    return {"now": now, "set_up": sheet, "result": entry["result"], **_of(entry["document"], *names)}
 
 
-def set_up(session: Session) -> dict[str, Any] | None:
+def set_up(session: Session) -> Picture | None:
     """Offsets, files and warnings for the shop floor, where they were made for the present placement."""
     entry = session.found("set_up")
     if not entry:
         return None
-    said = entry["document"]
     files = {"sheet": "setup.pdf", "written": entry["written"], "page": "report.html"}
-    return {
-        **{name: said.get(name) for name in ("warnings", "offset_blocks", "chosen", "before", "worse")},
-        **{name: f"{entry['result']}/{file}" for name, file in files.items()},
-    }
+    told = _of(entry["document"], "warnings", "offset_blocks", "chosen", "before", "worse")
+    return told | {name: f"{entry['result']}/{file}" for name, file in files.items()}

@@ -126,6 +126,11 @@ class Session:
         """What was found last, if it still holds."""
         return self._found.get((kind, self.key(kind)))
 
+    def document(self, kind: str) -> Document | None:
+        """The document of what was found last, if it still holds."""
+        found = self.found(kind)
+        return found["document"] if found else None
+
     def catalogue(self) -> tps.EffectCatalogue:
         """The effects that can be switched on."""
         files = self.case.state.effects

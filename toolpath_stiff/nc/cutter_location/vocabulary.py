@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any
 
 from toolpath_stiff.nc.cutter_location import cycles, modes, motion
@@ -265,24 +264,3 @@ def execute(state: State, statement: Statement) -> None:
             f"{statement.shown}: {name} {UNKNOWN}, and may move the tool", GEOMETRY, "take the line out if it does not"
         )
     state.note(f"{name} {UNKNOWN}, and not acted upon", doubtful=True)
-
-
-def words_table() -> str:
-    r"""The words as a Markdown table, as it stands in docs/nc.md: neighbours with the same meaning share a row.
-
-    Examples
-    --------
-    >>> print("\n".join(words_table().splitlines()[:3]))
-    | words | taken for | | written by | source |
-    | --- | --- | --- | --- | --- |
-    | `GOTO/x,y,z[,i,j,k]` | the tool moves to a point | read | all | ISO 4343 |
-    """
-    lines = ["| words | taken for | | written by | source |", "| --- | --- | --- | --- | --- |"]
-    order = (READ, LISTED, DOUBTFUL, REFUSED)
-    words = sorted(WORDS.values(), key=lambda word: order.index(word.kind))
-    for (kind, meaning, by, source), group in groupby(
-        words, lambda word: (word.kind, word.meaning, word.written_by, word.source)
-    ):
-        names = " ".join(f"`{word.name}{word.form}`" for word in group)
-        lines.append(f"| {names} | {meaning} | {kind} | {by} | {source} |")
-    return "\n".join(lines) + "\n"

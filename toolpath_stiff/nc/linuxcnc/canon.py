@@ -12,13 +12,12 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
-from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, needs_tags, step_in_words, tool_numbers
+from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, step_in_words
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
 from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, tool_table_hint
@@ -55,6 +54,8 @@ class Follower:
     lines: Sequence[Line]
     tools: dict[int, ToolEntry] | None
     posted: PostedKinematics | None
+    tagged: bool  # the copy carries its line numbers as comments
+    numbers: Sequence[int]  # of the tools, in the order of their table
     reference: Sequence[float] = (0.0, 0.0, 0.0)
     recorder: Recorder = field(default_factory=Recorder)
     used_tools: list[int] = field(default_factory=list)
@@ -82,7 +83,6 @@ class Follower:
     moves_of_line: int = 0
 
     def __post_init__(self) -> None:
-        self.tagged, self.numbers = needs_tags(self.lines), tool_numbers(self.tools, self.lines)
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
 
     def follow(self, text: str) -> None:
@@ -102,9 +102,9 @@ class Follower:
         """An error of a line of the program."""
         return ProgramError(found, expected=expected, hint=hint, file=self.name, line=line or None)
 
-    def _lengths(self, numbers: Sequence[float]) -> Vector:
+    def _point(self, inner: str) -> Vector:
         """X, Y, Z as printed in mm, A, B, C in degrees."""
-        return [v * self.scale if i < 3 else v for i, v in enumerate(numbers[:6])]
+        return [v * self.scale if i < 3 else v for i, v in enumerate(_numbers(inner)[:6])]
 
     def _on_use_length_units(self, inner: str) -> None:
         scale = MM_PER_INCH if "INCH" in inner else 1.0
@@ -120,11 +120,11 @@ class Follower:
             self.feed_scale = scale
 
     def _on_set_g5x_offset(self, inner: str) -> None:
-        self.frames.offsets.table[0].axes = self._lengths(_numbers(inner.partition(",")[2]))
+        self.frames.offsets.table[0].axes = self._point(inner.partition(",")[2])
         self.frame_changed = True
 
     def _on_set_g92_offset(self, inner: str) -> None:
-        self.frames.g92 = self._lengths(_numbers(inner))
+        self.frames.g92 = self._point(inner)
         self.frame_changed = True
 
     def _on_set_xy_rotation(self, inner: str) -> None:
@@ -240,25 +240,26 @@ class Follower:
         self.ended = True
 
     def _on_straight_traverse(self, inner: str) -> None:
-        self._move(RAPID, self._lengths(_numbers(inner)))
+        self._move(RAPID, self._point(inner))
 
     def _on_straight_feed(self, inner: str) -> None:
-        self._move(CYCLE if self.cycle else FEED, self._lengths(_numbers(inner)))
+        self._move(CYCLE if self.cycle else FEED, self._point(inner))
 
     def _on_rigid_tap(self, inner: str) -> None:
         """Down and, the spindle reversed, back."""
         here = self.frames.to_program(self.frames.position)
-        self._move(CYCLE, [*self._lengths(_numbers(inner)[:3]), *here[3:]])
+        self._move(CYCLE, [*self._point(inner)[:3], *here[3:]])
         self._move(CYCLE, here)
 
     def _on_arc_feed(self, inner: str) -> None:
         e1, e2, c1, c2, turns, axis_end, *rotary = _numbers(inner)
+        scale = self.scale
         if self.plane not in geometry.PLANES:
             raise self.fail(self.line, f"an arc in the plane {self.plane}", "G17, G18 or G19")
         first, second, normal = geometry.PLANES[self.plane]
         end = [0.0, 0.0, 0.0, *rotary]
-        end[first], end[second], end[normal] = e1, e2, axis_end
-        self._move(ARC, self._lengths(end), (c1 * self.scale, c2 * self.scale, turns))
+        end[first], end[second], end[normal] = e1 * scale, e2 * scale, axis_end * scale
+        self._move(ARC, end, (c1 * scale, c2 * scale, turns))
 
     def _move(self, motion: int, target: Vector, arc: tuple[float, float, float] | None = None) -> None:
         """One move to a point in program coordinates; an arc with its centre in the plane and its turns."""
@@ -272,15 +273,22 @@ class Follower:
             return
         if self.first_motion is None:
             self.first_motion = self.line
-        if self.turned_by:
-            self._check_turned()
+        if self.turned_by and not {"X", "Y"} <= set(self._words(self.line)):
+            raise self.fail(
+                self.turned_by,
+                "G10 turns the work offset in force, and the next move does not name both X and Y: "
+                "LinuxCNC's rs274 would take the old numbers for them",
+                "X and Y in the move that follows",
+            )
+        self.turned_by = 0
         if self.frame_changed:  # the same place in other numbers, up to the digits printed
             near = SAME_PLACE * self.scale
             start = [e if abs(e - s) < near else s for s, e in zip(start, end, strict=True)]
             self.frame_changed = False
         centred = self._arc(start, end, *arc) if arc else None
         shift = (*self.reference, 0.0, 0.0, 0.0)
-        start, end = ([value - zero for value, zero in zip(point, shift, strict=True)] for point in (start, end))
+        start = [value - zero for value, zero in zip(start, shift, strict=True)]
+        end = [value - zero for value, zero in zip(end, shift, strict=True)]
         feed = math.nan if motion == RAPID else self._feed_of(start, end, arc is not None)
         flags = self._machine_flags(start, end)
         added = self.recorder.add(self.line, motion, start, end, feed, self.tool, self.tool_length, flags, centred)
@@ -306,7 +314,8 @@ class Follower:
 
     def _end_in_words(self, here: Vector, there: Vector, axes: tuple[int, int]) -> Vector:
         """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
-        step = None if self.incremental else step_in_words(self.lines, self.line, [AXES[axis] for axis in axes])
+        incremental = any("G" in line.words and "1" in DISTANCE_MODE.findall(line.plain) for line in self.lines)
+        step = None if incremental else step_in_words(self.lines, self.line, [AXES[axis] for axis in axes])
         if step is None or max(map(abs, step)) > SAME_PLACE:  # computed, or compensated
             if max(abs(here[axis] - there[axis]) for axis in axes) > ROUNDING * self.scale:
                 raise self.fail(
@@ -319,22 +328,6 @@ class Follower:
         for axis, length in zip(axes, step, strict=True):
             end[axis] += length * self.scale
         return end
-
-    @cached_property
-    def incremental(self) -> bool:
-        """Whether the program uses G91 anywhere."""
-        return any("G" in line.words and "1" in DISTANCE_MODE.findall(line.plain) for line in self.lines)
-
-    def _check_turned(self) -> None:
-        words = self._words(self.line)
-        if not ("X" in words and "Y" in words):
-            raise self.fail(
-                self.turned_by,
-                "G10 turns the work offset in force, and the next move does not name both X and Y: "
-                "LinuxCNC's rs274 would take the old numbers for them",
-                "X and Y in the move that follows",
-            )
-        self.turned_by = 0
 
     def _find_height(self, end: Vector) -> None:
         """Until a move names Z, rs274 prints the number that Z had before the length changed."""

@@ -85,6 +85,7 @@ class _Session:
     ) -> None:
         self.request, self.lines, self.rs274, self.dropped, self.limits = request, lines, rs274, dropped, limits
         self.offsets = copy.deepcopy(request.work_offsets)
+        self.tagged, self.tool_numbers = needs_tags(lines), tool_numbers(request.tool_table, lines)
 
     def read(self) -> ReadProgram:
         request = self.request
@@ -172,15 +173,15 @@ class _Session:
 
     def _run(self, shift: Sequence[float], until: int | None = None) -> tuple[Run, Follower]:
         """Run the program, or its part before the line `until` is first executed."""
-        name, tools = self.request.name, self.request.tool_table
+        name = self.request.name
         prefix, active = self._prefix(shift)
         lines = [Line(line.number, "M2") if line.number == until else line for line in self.lines]
         switch = bool(self.request.switches)
         try:
             run = run_rs274(
-                numbered(lines, name, block_delete=switch, tags=needs_tags(self.lines), prefix=prefix),
+                numbered(lines, name, block_delete=switch, tags=self.tagged, prefix=prefix),
                 parameter_file(self.offsets, shift, active),
-                tool_file(tool_numbers(tools, self.lines), tools),
+                tool_file(self.tool_numbers, self.request.tool_table),
                 rs274=self.rs274,
                 limits=self.limits,
             )
@@ -195,7 +196,8 @@ class _Session:
 
     def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
         request = self.request
-        follower = Follower(request.name, self.lines, request.tool_table, request.posted, reference)
+        tools = (request.tool_table, request.posted, self.tagged, self.tool_numbers)
+        follower = Follower(request.name, self.lines, *tools, reference)
         follower.follow(run.canon)
         return follower
 

@@ -36,18 +36,18 @@ BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and 
 
 
 @drawn
-def ladder_png(found: Diagnosis) -> Figure:
+def ladder_png(diagnosis: Diagnosis) -> Figure:
     """PNG: every explanation with its error at left-out points and its probability, best first.
 
     As given, strut law refitted, what no effect describes (if it was weighed), then pairs and effects.
     """
-    every, standing = found.rows, len(found.explanations)
+    every, standing = diagnosis.rows, len(diagnosis.explanations)
     rows = [every.as_given, every.refitted, *([every.outside] if every.outside.probability else [])]
     rows += [*every.pairs[:MOST_PAIRS], *every.candidates]
     height = 1.75 + ROW * len(rows)
     shaded = f"shaded: {standing} explanation{'s' if standing > 1 else ''} left standing" if standing else "none left"
     note = (
-        f"verdict: {found.verdict}   ·   {shaded}   ·   bar at a dot: standard error of its fall from the refitted "
+        f"verdict: {diagnosis.verdict}   ·   {shaded}   ·   bar at a dot: standard error of its fall from the refitted "
         "strut law   ·   grey: not offered"
     )
     with house_style():
@@ -67,7 +67,7 @@ def ladder_png(found: Diagnosis) -> Figure:
             axes.grid(visible=False, axis="y")
             axes.spines[["top", "right", "left"]].set_visible(False)
         _labels(labels, rows)
-        _errors(errors, rows, found)
+        _errors(errors, rows, diagnosis)
         _chances(chances, rows)
         for y, row in enumerate(rows):
             lines = textwrap.wrap(remark_text(row).split(":")[0], 31, max_lines=2, placeholder=" ...")
@@ -86,14 +86,14 @@ def _labels(axes: Axes, rows: Sequence[Row]) -> None:
         axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=small_colour, size=8)
 
 
-def _errors(axes: Axes, rows: Sequence[Row], found: Diagnosis) -> None:
-    base, floor = found.rows.refitted.held_out_error_percent, json_number(found.noise.floor_percent) or 0.0
+def _errors(axes: Axes, rows: Sequence[Row], diagnosis: Diagnosis) -> None:
+    base, floor = diagnosis.rows.refitted.held_out_error_percent, json_number(diagnosis.noise.floor_percent) or 0.0
     errors = [error for row in rows for error in (row.held_out_error_percent, row.mean_abs_error_percent)]
     end = 1.08 * max(error for error in errors if error is not None)
     end = max(end if base is None else min(end, BEYOND * base), 1.3 * floor, 1e-6)
     axes.set_xlim(0.0, end)
     for value, other, text, colour, style in (
-        (floor, base, f"noise floor {floor_text(found)}", SECOND_ORANGE, ":"),
+        (floor, base, f"noise floor {floor_text(diagnosis)}", SECOND_ORANGE, ":"),
         (base, floor, f"strut law refitted {percent(base)}", INK, "--"),
     ):
         if value is not None:

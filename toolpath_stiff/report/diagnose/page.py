@@ -60,73 +60,73 @@ QUESTIONS = {
 }
 
 
-def diagnose_html(found: Diagnosis, pictures: Mapping[str, bytes]) -> str:
+def diagnose_html(diagnosis: Diagnosis, pictures: Mapping[str, bytes]) -> str:
     """The page's text.
 
     Parameters
     ----------
-    found
+    diagnosis
         The diagnosis.
     pictures
         File name -> PNG; those in `QUESTIONS` are shown.
     """
-    about, beside = words.data_text(found), beside_text(found.unexcluded)
+    about, beside = words.data_text(diagnosis), beside_text(diagnosis.unexcluded)
 
     def shown(name: str) -> Markup:
         return picture(name, pictures, QUESTIONS)
 
     sections = [
-        section("Why", bullets(why(found))),
+        section("Why", bullets(why(diagnosis))),
         shown("ladder.png"),
-        section("What the missing thing looks like", portrait_section(found.portrait)),
+        section("What the missing thing looks like", portrait_section(diagnosis.portrait)),
         shown("portrait.png"),
-        section("What the fits say", _candidates(found)),
+        section("What the fits say", _candidates(diagnosis)),
         shown("before_after.png"),
         shown("confounding.png"),
         shown("detectable.png"),
-        *loops_section(found.loops),
-        section("What to measure or do next", _next(found)),
-        section("What these data cannot test", _cannot_test(found)),
-        section("How much the choice matters on the tool path", _path(found)),
+        *loops_section(diagnosis.loops),
+        section("What to measure or do next", _next(diagnosis)),
+        section("What these data cannot test", _cannot_test(diagnosis)),
+        section("How much the choice matters on the tool path", _path(diagnosis)),
         shown("envelope.png"),
-        section("How much readings scatter", _noise(found)),
-        section("Assumptions", bullets([*assumptions(found), *found.data.notes, *doubts(found)])),
+        section("How much readings scatter", _noise(diagnosis)),
+        section("Assumptions", bullets([*assumptions(diagnosis), *diagnosis.data.notes, *doubts(diagnosis)])),
     ]
     return page(
         title=f"Diagnosis: {about[1]}",
-        verdict=found.verdict,
-        headline=words.headline(found),
-        text=" ".join(filter(None, (verdict_text(found), f"May be there beside it: {beside}." if beside else ""))),
+        verdict=diagnosis.verdict,
+        headline=words.headline(diagnosis),
+        text=" ".join(filter(None, (verdict_text(diagnosis), f"May be there beside it: {beside}." if beside else ""))),
         about=about,
-        figures=_figures(found),
-        warnings=found.predictor.data.warnings,
+        figures=_figures(diagnosis),
+        warnings=diagnosis.predictor.data.warnings,
         sections=sections,
-        footer=markup("<code>{}</code> seed {}", found.line, found.seed),
-        verdict_class=found.verdict,
+        footer=markup("<code>{}</code> seed {}", diagnosis.line, diagnosis.seed),
+        verdict_class=diagnosis.verdict,
     )
 
 
-def _figures(found: Diagnosis) -> list[tuple[str, str]]:
+def _figures(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     """The few figures that say it all."""
-    rows, standing = found.rows, found.explanations
+    rows, standing = diagnosis.rows, diagnosis.explanations
     figures = [
         (percent(rows.as_given.mean_abs_error_percent, 2), "mean error as given"),
         (percent(rows.refitted.mean_abs_error_percent, 2), "mean error, strut law refitted"),
     ]
-    if rows.best is not None and found.verdict in ("identified", "described", "ambiguous"):
+    if rows.best is not None and diagnosis.verdict in ("identified", "described", "ambiguous"):
         figures.append((percent(rows.best.mean_abs_error_percent, 2), f"mean error with {plain(rows.best.label)}"))
         figures.append((percent(rows.best.held_out_error_percent, 2), "the same at points left out"))
-    figures.append((words.floor_text(found), "would be left by scatter alone"))
-    one = "describes it" if found.verdict == "described" else "is the explanation"
+    figures.append((words.floor_text(diagnosis), "would be left by scatter alone"))
+    one = "describes it" if diagnosis.verdict == "described" else "is the explanation"
     remark = "are left standing" if len(standing) > 1 else one
     none = ("no effect", "of the catalogue is left standing")
     return [*figures, (words.plausible_text(standing), remark) if standing else none]
 
 
-def _candidates(found: Diagnosis) -> Markup:
+def _candidates(diagnosis: Diagnosis) -> Markup:
     """As given, strut law refitted, pairs and all candidates."""
     cells = []
-    for row in (found.rows.as_given, found.rows.refitted, *found.rows.pairs, *found.rows.candidates):
+    for row in (diagnosis.rows.as_given, diagnosis.rows.refitted, *diagnosis.rows.pairs, *diagnosis.rows.candidates):
         sizes = Markup("<br>").join(markup('<span class="whole">{}</span>', size) for size in words.size_texts(row))
         texts = (
             markup("{}<small>{}</small>", row.label, row.finding or row.title),
@@ -144,53 +144,53 @@ def _candidates(found: Diagnosis) -> Markup:
     return table(head, cells, range(2, 6))
 
 
-def _next(found: Diagnosis) -> Markup:
+def _next(diagnosis: Diagnosis) -> Markup:
     """What to do, and the readings that tell most."""
-    readings = found.next_measurements
+    readings = diagnosis.next_measurements
     keys = list(dict.fromkeys(key for reading in readings for key in reading if key != "why"))
     keys = [key for key in keys if any(reading.get(key) not in ("", None) for reading in readings)]
     rows = [("", [_cell(reading.get(key)) for key in (*keys, "why")]) for reading in readings]
     numeric = [i for i, key in enumerate(keys) if all(isinstance(r.get(key), int | float) for r in readings)]
-    return hint_list(next_steps(found)) + table([*keys, "why"], rows, numeric)
+    return hint_list(next_steps(diagnosis)) + table([*keys, "why"], rows, numeric)
 
 
 def _cell(value: object) -> str:
     return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _cannot_test(found: Diagnosis) -> Markup:
+def _cannot_test(diagnosis: Diagnosis) -> Markup:
     rows = []
-    for name, lacks in sorted(found.cannot_test.items()):
+    for name, lacks in sorted(diagnosis.cannot_test.items()):
         columns = Markup(", ").join(markup("<code>{}</code>", column) for column in lacks)
         rows.append(("", [name, columns or "nothing in these data depends on it"]))
     # 80 % power is what `detectable` asks for.
     never = "even at its largest possible size these data would show it less than four times in five"
-    rows += [("", [words.hidden_name(smallest), never]) for smallest in found.detectable if not smallest.seen]
+    rows += [("", [words.hidden_name(smallest), never]) for smallest in diagnosis.detectable if not smallest.seen]
     return table(("effect", "the column that is missing"), rows)
 
 
-def _path(found: Diagnosis) -> Markup:
+def _path(diagnosis: Diagnosis) -> Markup:
     """What the plausible explanations predict on the path."""
-    text = words.path_text(found.path)
-    if found.path is None or not text:
+    text = words.path_text(diagnosis.path)
+    if diagnosis.path is None or not text:
         return Markup()
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
-    explanations = found.path.get("explanations", {})
+    explanations = diagnosis.path.get("explanations", {})
     rows = [("", [name, *(number(figures[key]) for key in keys)]) for name, figures in explanations.items()]
     listed = table(("explanation", "mean N/mm", "range N/mm", "weakest N/mm"), rows, (1, 2, 3))
     return markup("<p>{}.</p>", text[0].upper() + text[1:]) + listed
 
 
-def _noise(found: Diagnosis) -> Markup:
+def _noise(diagnosis: Diagnosis) -> Markup:
     """Where the noise comes from, and the verdict under each guess."""
-    noise = found.noise
+    noise = diagnosis.noise
     shares = (("repeats", noise.typical_repeat), ("clamping", noise.clamping),
               ("struts among themselves", noise.strut_spread))  # fmt: skip
     parts = [f"{name} {percent(percent_of(share, 4))}" for name, share in shares]
     parts.append(f"joints {significant(json_number(float(mm_from_m(noise.joint_error)), 4), 2)} mm")
     body = markup("<p>Standard deviations: {}. {}</p>", ", ".join(parts), noise.origin)
     rows = []
-    for name, judged in found.judgements.items():
+    for name, judged in diagnosis.judgements.items():
         likely = [f"{key} {words.probability_text(json_number(p, 4))}" for key, p in judged.likely if p > 1e-4]
         cells = [name, percent(percent_of(judged.noise.typical, 4)), judged.verdict]
         rows.append(("", [*cells, words.plausible_text(judged.plausible), ", ".join(likely[:4])]))
@@ -206,32 +206,32 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return (*data, *pictures, "report.html") if plots else data
 
 
-def files(found: Diagnosis, *, plots: bool = True) -> dict[str, Content]:
+def files(diagnosis: Diagnosis, *, plots: bool = True) -> dict[str, Content]:
     """The document as JSON, one row a reading, and with `plots` the pictures that have something to show, and page."""
-    contents: dict[str, Content] = {"diagnose.json": found.to_json(), "residuals.csv": residuals_csv(found)}
+    contents: dict[str, Content] = {"diagnose.json": diagnosis.to_json(), "residuals.csv": residuals_csv(diagnosis)}
     if not plots:
         return contents
-    base, best = found.rows.refitted, None if found.verdict == "adequate" else found.rows.best
-    word = "best of the catalogue:" if found.verdict == "unexplained" else "with"
+    base, best = diagnosis.rows.refitted, None if diagnosis.verdict == "adequate" else diagnosis.rows.best
+    word = "best of the catalogue:" if diagnosis.verdict == "unexplained" else "with"
     before_after = before_after_png(
-        found.data, found.before, found.after, f"{word} {plain(best.label)}" if best else LAW_REFITTED,
+        diagnosis.data, diagnosis.before, diagnosis.after, f"{word} {plain(best.label)}" if best else LAW_REFITTED,
         (best or base).held_out_error_percent, base.mean_abs_error_percent if best else None,
     )  # fmt: skip
     pictures: dict[str, bytes | None] = {
-        "ladder.png": ladder_png(found),
-        "portrait.png": portrait_png(found.portrait, found.data),
-        "confounding.png": confounding_png(found),
-        "detectable.png": detectable_png(found),
+        "ladder.png": ladder_png(diagnosis),
+        "portrait.png": portrait_png(diagnosis.portrait, diagnosis.data),
+        "confounding.png": confounding_png(diagnosis),
+        "detectable.png": detectable_png(diagnosis),
         "before_after.png": before_after,
-        "envelope.png": envelope_png(found.main.base_gate),
+        "envelope.png": envelope_png(diagnosis.main.base_gate),
     }
     drawn = {name: picture for name, picture in pictures.items() if picture is not None}
-    return {**contents, **drawn, "report.html": diagnose_html(found, drawn)}
+    return {**contents, **drawn, "report.html": diagnose_html(diagnosis, drawn)}
 
 
-def residuals_csv(found: Diagnosis) -> str:
+def residuals_csv(diagnosis: Diagnosis) -> str:
     """One row a reading: measured, modelled as given, with the law refitted, with the best explanation."""
-    data, residuals = found.data, (found.before, found.base.residual, found.after)
+    data, residuals = diagnosis.data, (diagnosis.before, diagnosis.base.residual, diagnosis.after)
     models = ("as_given", "law_refitted", "after")
     head = [
         "file", "line", "point", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz",

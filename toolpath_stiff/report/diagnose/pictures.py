@@ -45,12 +45,12 @@ def titled_figure(height: float, title: str, note: str) -> Figure:
 
 
 @drawn
-def confounding_png(found: Diagnosis) -> Figure:
+def confounding_png(diagnosis: Diagnosis) -> Figure:
     """PNG: how alike the effects' signatures are on this design; effects that cannot be told apart stand in boxes."""
     from matplotlib.colors import to_rgb
     from matplotlib.patches import Rectangle
 
-    names, matrix, sets = confounding_in_order(found.confounding)
+    names, matrix, sets = confounding_in_order(diagnosis.confounding)
     count = max(len(names), 1)
     with house_style():
         width, left, overhang = 14.0, 2.3, 1.25  # inches; the last name leans over the matrix by the overhang
@@ -116,18 +116,21 @@ def _chain(places: Sequence[int], matrix: FloatArray) -> list[int]:
 
 
 @drawn
-def detectable_png(found: Diagnosis) -> Figure:
+def detectable_png(diagnosis: Diagnosis) -> Figure:
     """PNG: the smallest size of each effect that these data would show, as the change of stiffness that it makes."""
     from matplotlib.ticker import LogLocator, NullLocator
 
-    seen = sorted((one for one in found.detectable if one.seen), key=lambda one: percent_of(one.rms) or 0.0)
-    rows = [*seen, *(one for one in found.detectable if not one.seen)]
+    seen = sorted(
+        (smallest for smallest in diagnosis.detectable if smallest.seen),
+        key=lambda smallest: percent_of(smallest.rms) or 0.0,
+    )
+    rows = [*seen, *(smallest for smallest in diagnosis.detectable if not smallest.seen)]
     height = 1.7 + 0.32 * max(len(rows), 3)
     note = "smallest size seen with 80 % power at 5 % family-wise, and the change it makes; less stays unseen"
     with house_style():
         figure = titled_figure(height, "What could be there unseen?", note)
         axes = figure.add_axes((3.6 / 14.0, 0.58 / height, 9.9 / 14.0, 1.0 - 1.55 / height))
-        sizes = [percent_of(one.rms) or 0.0 for one in seen] or [1.0]
+        sizes = [percent_of(smallest.rms) or 0.0 for smallest in seen] or [1.0]
         # From a tenth of a per cent to far beyond the readings: equal steps of the logarithm.
         start, reach = 0.7 * min(sizes), 4.0 * max(sizes)
         axes.set_xscale("log")
@@ -147,7 +150,7 @@ def detectable_png(found: Diagnosis) -> Figure:
             axes.annotate(
                 text, (start, y), (6, 0), textcoords="offset points", va="center", size=9.5, color=UNREACHABLE_RED
             )
-        axes.set_yticks(range(len(rows)), [shortened(hidden_name(one), 42) for one in rows], color=INK)
+        axes.set_yticks(range(len(rows)), [shortened(hidden_name(smallest), 42) for smallest in rows], color=INK)
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")
         axes.spines[["top", "right"]].set_visible(False)

@@ -2,61 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.placement.result import Placement, Refused, Written
 from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
-from toolpath_stiff.report.figure import page_colours
-from toolpath_stiff.report.pages import render
-from toolpath_stiff.report.place.drawn import drawn_path
+from toolpath_stiff.report.place.html import place_page
 from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, workspace_picture
 from toolpath_stiff.report.place.sheet import setup_sheet
-from toolpath_stiff.report.words import machine_text, plain
-from toolpath_stiff.units import mm_from_m, number
-
-
-def place_page(placed: Placement) -> str:
-    """The page's text."""
-    best, present = placed.best, placed.present
-    path, note = drawn_path(placed, [*placed.front, *([present] if present else [])])
-    data = {
-        "front": [vars(row) for row in placed.front],
-        "chosen": (placed.chosen.number or 0) - 1,
-        "recommended": placed.search.recommended - 1,
-        "before": present.figures() if present else None,
-        "before_reason": plain(placed.present_reason),
-        "force": best.force,
-        "keepouts": [
-            {"name": plain(box.name), "box": _corners(mm_from_m(box.corners))} for box in placed.task.rules.keepouts
-        ],
-        "workspace": _corners(mm_from_m(best.machine.limits.workspace)),
-        **path,
-        **page_colours(),
-    }
-    return render(
-        "place.html",
-        styles=["viewer.css", "place.css"],
-        scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
-        data=data,
-        title=f"Placements of {placed.program.name}",
-        about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
-        objective=placed.objective,
-        load=str(best.load),
-        note=note,
-        warnings=placed.warnings,
-    )
-
-
-def _corners(corners: FloatArray) -> list[list[float | None]]:
-    """Lower and upper corner in mm; None where the machine file sets no bound."""
-    return [[round(v, 3) if np.isfinite(v) else None for v in corner] for corner in corners.tolist()]
+from toolpath_stiff.report.words import machine_text
+from toolpath_stiff.units import number
 
 
 def text(placed: Placement) -> str:
-    """What got worse, the placement, what it brings, what it costs."""
+    """A placement in words: what got worse, the placement, what it brings, what it costs."""
     best, present, count = placed.chosen, placed.present, len(placed.front)
     first = len(placed.worse) + placed.search.nothing_better
     label = "picked" if placed.picked else "recommended"
@@ -101,7 +59,7 @@ def _figures_words(row: PlacementRow) -> str:
 
 
 def _written(written: Written | Refused) -> list[str]:
-    """What became of the transformed program."""
+    """Lines on the transformed program."""
     if isinstance(written, Refused):
         return [f"not rewritten   {written.file}: {written.refused}"]
     zero, apart = written.analysed_at, written.relative_difference

@@ -1,4 +1,4 @@
-"""The path as a page draws it.
+"""The page of a search for placements, and the path as it draws it.
 
 A page cannot hold every sample of a long program at sixty placements. The ends of every cut and its corners are kept
 first, then samples evenly along the path; the stiffness is evaluated at just these.
@@ -18,6 +18,9 @@ from toolpath_stiff.path import Samples, sample_moves
 from toolpath_stiff.placement.paths import placed_path
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.rows import PlacementRow
+from toolpath_stiff.report.figure import page_colours
+from toolpath_stiff.report.pages import render
+from toolpath_stiff.report.words import machine_text, plain
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number, rad_from_deg
 
@@ -26,6 +29,43 @@ VALUES = 48_000  # points times placements that the page holds, some 300 kB
 ENDS = (0.05, 0.95)  # of the path's length, all placements together, between which the colours run
 CORNER = rad_from_deg(10.0)  # a sharper one is kept before samples along straight cuts are
 SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
+
+
+def place_page(placed: Placement) -> str:
+    """The page's text."""
+    best, present = placed.best, placed.present
+    path, note = drawn_path(placed, [*placed.front, *([present] if present else [])])
+    data = {
+        "front": [vars(row) for row in placed.front],
+        "chosen": (placed.chosen.number or 0) - 1,
+        "recommended": placed.search.recommended - 1,
+        "before": present.figures() if present else None,
+        "before_reason": plain(placed.present_reason),
+        "force": best.force,
+        "keepouts": [
+            {"name": plain(box.name), "box": _corners(mm_from_m(box.corners))} for box in placed.task.rules.keepouts
+        ],
+        "workspace": _corners(mm_from_m(best.machine.limits.workspace)),
+        **path,
+        **page_colours(),
+    }
+    return render(
+        "place.html",
+        styles=["viewer.css", "place.css"],
+        scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
+        data=data,
+        title=f"Placements of {placed.program.name}",
+        about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
+        objective=placed.objective,
+        load=str(best.load),
+        note=note,
+        warnings=placed.warnings,
+    )
+
+
+def _corners(corners: FloatArray) -> list[list[float | None]]:
+    """Lower and upper corner in mm; None where the machine file sets no bound."""
+    return [[round(v, 3) if np.isfinite(v) else None for v in corner] for corner in corners.tolist()]
 
 
 def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[dict[str, Any], str]:
@@ -39,8 +79,8 @@ def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[dict[st
     placements = zip(*(placed_path(few, np.array(row.origin)) for row in rows), strict=True)
     position, tangent, abc = (np.concatenate(parts) for parts in placements)
     tools = np.tile(few.tool_length, len(rows))
-    at = evaluate(best.model, position, abc, tangent, tools, best.load, best.force)
-    stiffness = n_per_mm_from_n_per_m(at.stiffness.reshape(len(rows), -1))  # nan out of reach
+    there = evaluate(best.model, position, abc, tangent, tools, best.load, best.force)
+    stiffness = n_per_mm_from_n_per_m(there.stiffness.reshape(len(rows), -1))  # nan out of reach
     counting = few.weight > 0.0
     plunge = plunging_rows(best.load, few.tangent, few.abc, counting)
     plunge &= ~headline_rows(best.load, few.tangent, few.abc, counting)

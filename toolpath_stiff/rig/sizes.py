@@ -1,0 +1,157 @@
+"""Sizes of hidden effects: how large one shows on a campaign, and the strength for a wanted size.
+
+The size is the root mean square change of the readings' logarithm. It is drawn log-uniform from just detectable on that
+campaign (`DETECTABLE`) to 30 %, as far as the effect's bounds allow.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.rig.effects import Parameters, at_strength, draw_shape, with_effect
+from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
+from toolpath_stiff.rig.nominal import Nominal
+from toolpath_stiff.rig.rows import Rows
+from toolpath_stiff.rig.unknowns import UNKNOWNS
+
+LARGEST = 0.30  # rms change of ln stiffness
+UNKNOWN_SIZES = (0.04, 0.15)  # rms change of ln stiffness that an unknown is drawn with, log-uniform
+LARGEST_SINGLE = 1.0  # change of one reading: whoever reads nearly three times the others throws it away (assumed)
+# Whitened length of an effect's signature, beside strut law and nuisances, that is found with 80 % power at 5 %
+# among some twenty candidates: z(1 - 0.0025/2) + z(0.8) = 3.02 + 0.84 (normal quantiles, Bonferroni).
+DETECTABLE = 3.9
+FREE_LAW = 1.0  # prior sd of the logarithms of the two strut stiffnesses: free, next to 2 % noise
+
+
+class Scale:
+    """How large an effect shows on one campaign, and its strength for a wanted size."""
+
+    def __init__(self, nominal: Nominal, rows: Rows, clamps: IntArray, nuisances: Nuisances) -> None:
+        self.nominal, self.rows = nominal, rows
+        self.vertices = int(nominal.vertices.max()) + 1
+        self.setups = sorted(set(rows.setup.tolist()))
+        self.base = np.log(readings(nominal, HiddenMachine(), rows))
+        self.covariance = Covariance(clamps, _spread(self, nuisances), nuisances)
+
+    def change(self, machine: HiddenMachine) -> FloatArray:
+        """(n,) change of ln stiffness; infinite beyond `LARGEST_SINGLE`, or where an indicator would run backwards."""
+        shown = readings(self.nominal, machine, self.rows)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            logs = np.log(shown)
+        change = np.where(np.isfinite(logs), logs - self.base, math.inf)
+        return np.where(np.abs(change) <= LARGEST_SINGLE, change, math.inf)
+
+    def draw(self, name: str, size: float | None, rng: Generator) -> tuple[dict[str, Any], dict[str, float]]:
+        """Parameters, and their size and detectability."""
+        shape = draw_shape(name, rng, self.vertices, self.setups)
+        fraction = rng.random()
+        strength, change = self._reach(name, shape, 0.03)
+        rms, seen = _rms(change), self._detectability(change)
+        if size is None:
+            # To first order both grow in proportion to the strength.
+            smallest, largest = min(max(rms * DETECTABLE / max(seen, 1e-12), 1e-4), LARGEST), LARGEST
+            if name in UNKNOWNS:
+                smallest, largest = UNKNOWN_SIZES
+            size = smallest * (largest / smallest) ** fraction
+        strength, change = self._reach(name, shape, size, start=strength)
+        parameters = {
+            key: float(f"{value:.4g}") if isinstance(value, float) else value
+            for key, value in at_strength(name, shape, strength).items()
+        }
+        # The digits beyond are the processor's.
+        figures = {"size": _rms(change), "detectability": self._detectability(change)}
+        return parameters, {key: float(f"{value:.6g}") for key, value in figures.items()}
+
+    def _reach(self, name: str, shape: Parameters, size: float, start: float = 0.02) -> tuple[float, FloatArray]:
+        """Strength in (0, 1] at which the rms change is `size` within 2 %, and that change; 1 if no strength does.
+
+        The change grows about in proportion to the strength, so scaling the strength by what is missing converges.
+        """
+        low, high, strength = 0.0, math.inf, start
+        change = np.zeros(len(self.base))
+        for _ in range(25):
+            change = self.change(with_effect(HiddenMachine(), name, at_strength(name, shape, strength)))
+            rms = _rms(change)
+            if abs(rms - size) <= 0.02 * size or (rms < size and strength == 1.0):
+                break
+            low, high = (strength, high) if rms < size else (low, strength)
+            wanted = min(strength * size / rms, 1.0) if 0.0 < rms < math.inf else 0.5 * strength
+            # A step that leaves the bracket is replaced by halving the bracket.
+            strength = wanted if low < wanted < high else 0.5 * (low + min(high, 1.0))
+        return strength, change
+
+    def _detectability(self, change: FloatArray) -> float:
+        return self.covariance.length(change) if np.isfinite(change).all() else math.inf
+
+
+_SCALES: dict[tuple[Any, ...], Scale] = {}
+SCALES_KEPT = 8
+
+
+def scale_of(nominal: Nominal, rows: Rows, clamps: IntArray, nuisances: Nuisances) -> Scale:
+    """The scale of a campaign; those used last are kept, for many cases are drawn on one campaign."""
+    parts = [clamps, *vars(nominal).values(), *vars(rows).values()]
+    key = (nuisances, *((part.dtype.str, part.tobytes()) if isinstance(part, np.ndarray) else part for part in parts))
+    if key not in _SCALES:
+        while len(_SCALES) >= SCALES_KEPT:
+            _SCALES.pop(next(iter(_SCALES)))
+        _SCALES[key] = Scale(nominal, rows, clamps, nuisances)
+    return _SCALES[key]
+
+
+def _rms(change: FloatArray) -> float:
+    return float(np.sqrt(np.mean(change**2)))
+
+
+class Covariance:
+    """Covariance of ln readings: repeat noise, clamping, strut spread, a free strut law.
+
+    The first two are a multiple of the identity and one block of ones a clamp, whose inverse is known; the rest has
+    rank 8 and enters by Woodbury's identity, (N + S S^T)^-1 = N^-1 - N^-1 S (1 + S^T N^-1 S)^-1 S^T N^-1.
+    """
+
+    def __init__(self, clamps: IntArray, spread: FloatArray, nuisances: Nuisances) -> None:
+        self.clamps = clamps
+        self.noise = max(nuisances.repeat, 1e-3) ** 2
+        share = nuisances.clamping**2
+        self.pull = share / (self.noise + np.bincount(clamps) * share)
+        self.spread = spread
+        self.inner = np.eye(spread.shape[1]) + spread.T @ self._solve_noise(spread)
+
+    def _solve_noise(self, x: FloatArray) -> FloatArray:
+        """N^-1 x for x (n, m)."""
+        sums = np.zeros((len(self.pull), x.shape[1]))
+        np.add.at(sums, self.clamps, x)
+        return np.asarray((x - (self.pull[:, None] * sums)[self.clamps]) / self.noise)
+
+    def length(self, x: FloatArray) -> float:
+        """Whitened length of x (n,), sqrt(x^T C^-1 x)."""
+        solved = self._solve_noise(x[:, None])[:, 0]
+        projected = self.spread.T @ solved
+        squared = float(x @ solved - projected @ np.linalg.solve(self.inner, projected))
+        return math.sqrt(max(squared, 0.0))
+
+
+def _spread(scale: Scale, nuisances: Nuisances) -> FloatArray:
+    """(n, 8) changes of ln readings by one standard deviation of each strut and of the strut law at its two ends.
+
+    (n, 7) of a law with one stiffness; of a law with more than two the points between move with the ends.
+    """
+    step = 1e-4
+    columns = []
+    for strut in range(6):
+        factors = np.where(np.arange(6) == strut, 1.0 + step, 1.0)
+        columns.append(nuisances.strut_spread * scale.change(HiddenMachine(strut_factors=factors)) / step)
+    (first, last), lengths = scale.nominal.law_ends, scale.nominal.law_lengths
+    toward = (lengths - first) / (last - first)
+    for moved in [np.ones(1)] if len(lengths) == 1 else [1.0 - toward, toward]:
+        stiffer = scale.nominal.law_stiffnesses * (1.0 + step * moved)
+        other = dataclasses.replace(scale.nominal, law_stiffnesses=stiffer)
+        columns.append(FREE_LAW * (np.log(readings(other, HiddenMachine(), scale.rows)) - scale.base) / step)
+    return np.column_stack(columns)
