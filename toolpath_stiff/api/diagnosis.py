@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from toolpath_stiff.api.inputs import Origin, origin_si, origin_word
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.defaults import MACHINE
+from toolpath_stiff.documents import without_nan
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, options
 from toolpath_stiff.nc.program import Program, program_from
@@ -77,9 +77,9 @@ class Measurements:
         >>> tps.Measurements.read("nist-table1")
         <Measurements nist-table1>
         """
-        found = cls([str(file) for file in files], columns)
-        found.on(Machine.load())
-        return found
+        measurements = cls([str(file) for file in files], columns)
+        measurements.on(Machine.load())
+        return measurements
 
     def on(self, machine: Machine) -> Readings:
         """The readings as arrays in SI, checked against a machine.
@@ -128,9 +128,11 @@ class Measurements:
         from toolpath_stiff.readings.measurements import reading_columns
 
         columns = reading_columns(self.on(machine_from(machine)))
-        cells = ([None if _is_nan(one) else one for one in values.tolist()] for values in columns.values())
-        rows = [dict(zip(columns, row, strict=True)) for row in zip(*cells, strict=True)]
-        return {"files": list(self.files), "readings": rows}
+        cells = zip(*(values.tolist() for values in columns.values()), strict=True)
+        return {
+            "files": list(self.files),
+            "readings": without_nan([dict(zip(columns, row, strict=True)) for row in cells]),
+        }
 
     def __repr__(self) -> str:
         return f"<Measurements {', '.join(self.files)}>"
@@ -138,10 +140,6 @@ class Measurements:
     def _repr_html_(self) -> str:
         """For notebooks: the readings on the default machine, its first and last rows if they are many."""
         return str(self.to_frame().to_html(max_rows=20, notebook=True))
-
-
-def _is_nan(value: object) -> bool:
-    return isinstance(value, float) and math.isnan(value)
 
 
 Data = Measurements | str | Path | Sequence[str | Path]
@@ -158,7 +156,7 @@ def measurements_from(data: Data, columns: Mapped = None) -> Measurements:
     """Measurements; of a file's name or several, those in the files, whose columns are called as `columns` says."""
     if isinstance(data, Measurements):
         return data
-    return Measurements([str(data)] if isinstance(data, str | Path) else [str(file) for file in data], columns)
+    return Measurements([str(file) for file in ([data] if isinstance(data, str | Path) else data)], columns)
 
 
 class Question:

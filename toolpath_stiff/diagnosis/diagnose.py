@@ -18,6 +18,7 @@ from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.diagnosis.examination import NAMING
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.inference import slips
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.confounding import confounding
 from toolpath_stiff.inference.detectable import detectable_sizes
@@ -27,15 +28,6 @@ from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, jud
 from toolpath_stiff.inference.left_out import held_out, of_readings
 from toolpath_stiff.inference.noise import JOINT_ERROR, noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
-from toolpath_stiff.inference.slips import (
-    SlipSize,
-    SuspectEntry,
-    alone,
-    mended,
-    slips_that_show,
-    suspect_entries,
-    suspect_rows,
-)
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import plan_measurements
@@ -118,7 +110,7 @@ def diagnose(
         # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
         return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
 
-    judgements, main, data, suspects, slips = _without_slips(judged, data, progress)
+    judgements, main, data, suspects, shown = _without_slips(judged, data, progress)
     progress("final fits, errors held out by point")
     effects, cannot = testable_effects(main.problem.predictor)
     tested = {family.name for family in main.families}
@@ -141,7 +133,7 @@ def diagnose(
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
         tuple(names) or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=suspects,
         unexcluded=tuple(hidden for hidden in unexcluded(main) if hidden.effect.name not in plausible),
-        slips=slips,
+        slips=shown,
         loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
     )  # fmt: skip
     diagnosis = replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis))
@@ -157,26 +149,26 @@ Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise mo
 
 def _without_slips(
     judged: Callable[[Measurements], Judged], data: Measurements, progress: Callable[[str], None]
-) -> tuple[dict[str, Judgement], Judgement, Measurements, tuple[SuspectEntry, ...], tuple[SlipSize, ...]]:
+) -> tuple[dict[str, Judgement], Judgement, Measurements, tuple[slips.SuspectEntry, ...], tuple[slips.SlipSize, ...]]:
     """Judgements of the readings without rows that are clearly mistyped, these readings, suspects, slips that show."""
     judgements, main = judged(data)
     if main.question or data.beside is not None:
         return judgements, main, data, (), ()
-    suspects = suspect_rows(main.problem, main.likeliest)
+    suspects = slips.suspect_rows(main.problem, main.likeliest)
     clear = [suspect for suspect in suspects if suspect.clear]
-    clear = [suspect for suspect in clear if suspect not in alone(data, clear)]
+    clear = [suspect for suspect in clear if suspect not in slips.alone(data, clear)]
     kept = np.ones(len(data), dtype=bool)
     kept[[row for suspect in clear for row in suspect.rows]] = False
     if clear and kept.sum() >= FEWEST:
         # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
         progress("once more with the rows mended that look mistyped")
-        clear = clear if judged(mended(data, clear))[1].explained else []
-    entries = suspect_entries(suspects, data, left_out=clear)
+        clear = clear if judged(slips.mended(data, clear))[1].explained else []
+    entries = slips.suspect_entries(suspects, data, left_out=clear)
     if clear:
         progress("once more without the rows that look mistyped")
         data = data.select(kept)
         judgements, main = judged(data)
-    return judgements, main, data, tuple(entries), slips_that_show(main.problem, main.likeliest)
+    return judgements, main, data, tuple(entries), slips.slips_that_show(main.problem, main.likeliest)
 
 
 def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:

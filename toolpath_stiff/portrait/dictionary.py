@@ -11,20 +11,16 @@ over the constants of a shape, so that no link is preferred for having many term
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations, product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Factor, Term
-
-if TYPE_CHECKING:
-    from toolpath_stiff.portrait.columns import Ground
-
 
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 
@@ -33,6 +29,9 @@ ONCE = ("constant", "direction")  # variables whose every place stands in the di
 
 
 ALL_STRUTS, ALL_VERTICES = (None, 1, 2, 3, 4, 5, 6), (None, 1, 2, 3)
+
+
+ALONE = ("coupling", "joint offset")  # actions that depend on nothing
 
 
 SIDE = 0.2  # prior weight of what a link could do by a way round: a frame does not feel where the tip is
@@ -193,41 +192,34 @@ def dictionary_of(ground: Ground) -> Dictionary:
     """Every term that does something to these readings."""
     entries: list[Entry] = []
     blocks: list[FloatArray] = []
-    largest: list[FloatArray] = []
-    signs: list[NDArray[np.bool_]] = []
-    every = locals_of(ground.data.extra)
-    prior = Prior.of(every, ground)
-    for local in every:
+    limits: list[float] = []
+    signs: list[bool] = []
+    prior = Prior(ground)
+    for local in prior.locals:
         plain = local.term("constant", "offset", ())
         share, signed = ground.share(plain), len(plain.signs) > 1
         limit = max(abs(bound) for bound in plain.bounds) * plain.si
         for variable in local.variables:
-            every_column = columns_of(variable, ground, local.link == "joints")
-            for column in every_column:
+            columns = columns_of(variable, ground, local.link == "joints")
+            for column in columns:
                 named, values = ground.shapes(variable, column, signed, local.where)
                 if not named:
                     continue
                 blocks.append(ground.columns(plain, share, values))
                 kinds = Counter(shape for shape, _ in named)
-                log = prior.place(local, variable) - float(np.log(len(kinds) * len(every_column)))
+                log = prior.place(local, variable) - float(np.log(len(kinds) * len(columns)))
                 entries += [
                     Entry(local, variable, column, shape, at, log - float(np.log(kinds[shape]))) for shape, at in named
                 ]
-                largest.append(np.full(len(named), limit))
-                signs.append(np.full(len(named), signed))
+                limits += [limit] * len(named)
+                signs += [signed] * len(named)
     relative = np.concatenate(blocks) / ground.compliance
     scale = np.sqrt((relative**2).mean(axis=1))
     # A term that changes every reading alike is the strut law's affair.
-    spread = relative.std(axis=1)
-    kept = (scale * np.concatenate(largest) > NOTHING) & (spread > 1e-6 * scale)
+    kept = (scale * np.array(limits) > NOTHING) & (relative.std(axis=1) > 1e-6 * scale)
     chosen = [entries[i] for i in np.flatnonzero(kept).tolist()]
-    return Dictionary(
-        tuple(chosen),
-        relative[kept] / scale[kept, None],
-        scale[kept],
-        np.array([entry.log_prior for entry in chosen]),
-        np.concatenate(signs)[kept],
-    )
+    log_prior = np.array([entry.log_prior for entry in chosen])
+    return Dictionary(tuple(chosen), relative[kept] / scale[kept, None], scale[kept], log_prior, np.array(signs)[kept])
 
 
 def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:
@@ -240,28 +232,28 @@ def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]
     return ["", "X", "Y", *(SWINGS if joints else ())] if variable == "tilt" else [""]
 
 
-@dataclass(frozen=True)
 class Prior:
     """Logarithms of prior weights: even over links, over the variables of each, over places and directions.
 
-    `places`: link, variable and whether at one place -> how many; `variables`: link -> how many variables.
+    Attributes
+    ----------
+    locals
+        Every link with its places and directions.
+    places, variables
+        Link, variable that the readings tell and whether at one place -> how many; link -> how many variables.
     """
 
-    places: Mapping[tuple[str, str, bool], int]
-    variables: Mapping[str, int]
-
-    @classmethod
-    def of(cls, every: Iterable[Local], ground: Ground) -> Prior:
-        """Of the links and those of their variables that the readings tell."""
-        told: dict[str, bool] = {}
-        places: Counter[tuple[str, str, bool]] = Counter()
-        for local in every:
-            for variable in local.variables:
-                if variable not in told:
-                    told[variable] = bool(columns_of(variable, ground))
-                if told[variable]:
-                    places[local.link, variable, local.single] += 1
-        return cls(places, Counter(link for link, _ in {key[:2] for key in places}))
+    def __init__(self, ground: Ground) -> None:
+        self.locals = locals_of(ground.data.extra)
+        every = {variable for local in self.locals for variable in local.variables}
+        known = {variable for variable in every if columns_of(variable, ground)}
+        self.places = Counter(
+            (local.link, variable, local.single)
+            for local in self.locals
+            for variable in local.variables
+            if variable in known
+        )
+        self.variables = Counter(link for link, _ in {key[:2] for key in self.places})
 
     def place(self, local: Local, variable: str) -> float:
         """Of a link with one place and direction and a variable, all shapes together.
@@ -276,51 +268,39 @@ class Prior:
 
 def crossed(term: Term, ground: Ground) -> list[Entry]:
     """The same variable and shape, constants included, at every other link, place and direction that may feel it."""
-    every = locals_of(ground.data.extra)
-    prior = Prior.of(every, ground)
-    found = []
-    for local in every:
-        if term.variable not in (*local.variables, *local.crossed) or term.variable in ONCE:
+    if term.variable in ONCE:
+        return []
+    prior, entries = Prior(ground), []
+    for local in prior.locals:
+        felt = (term,) if term.times is None else (term, term.times)
+        swings = any(part.column in SWINGS for part in felt) and local.link != "joints"
+        variables = (*local.variables, *local.crossed)
+        if swings or local.action in ALONE or not all(part.variable in variables for part in felt):
             continue
-        if local.action in ("coupling", "joint offset"):
-            continue
-        if term.column in SWINGS and local.link != "joints":
-            continue
-        if term.times is not None and not _may_feel(local, term.times):
-            continue
-        signed = len(local.term("constant", "offset", ()).signs) > 1
-        log = prior.place(local, term.variable)
-        found += [
+        signed, log = len(local.term("constant", "offset", ()).signs) > 1, prior.place(local, term.variable)
+        entries += [
             Entry(local, term.variable, term.column, shape, at, log, term.times)
             for shape, at in _translated(term, signed, ground)
         ]
-    return found
-
-
-def _may_feel(local: Local, factor: Factor) -> bool:
-    """Whether a link may depend on a second variable."""
-    if factor.column in SWINGS and local.link != "joints":
-        return False
-    return factor.variable in (*local.variables, *local.crossed)
+    return entries
 
 
 def products(term: Term, ground: Ground) -> list[Term]:
     """The same term times every shape of every other variable that its link may depend on, itself not negative."""
-    if term.times is not None or term.action in ("coupling", "joint offset"):
+    if term.times is not None or term.action in ALONE:
         return []
     place = (term.link, term.action, term.direction, term.where)
     every = locals_of(ground.data.extra)
-    (local,) = (one for one in every if (one.link, one.action, one.direction, one.where) == place)
-    found = []
+    (local,) = (other for other in every if (other.link, other.action, other.direction, other.where) == place)
+    terms = []
     for variable in dict.fromkeys((*local.variables, *local.crossed)):
         if variable in (*ONCE, term.variable):
             continue
         for column in columns_of(variable, ground, local.link == "joints"):
             named = ground.shapes(variable, column, False, local.where)[0]
-            found += [
-                replace(term, times=Factor(variable, shape, at, column)) for shape, at in named if shape != "periodic"
-            ]
-    return found
+            factors = (Factor(variable, shape, at, column) for shape, at in named if shape != "periodic")
+            terms += [replace(term, times=factor) for factor in factors]
+    return terms
 
 
 def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Constants]]:
