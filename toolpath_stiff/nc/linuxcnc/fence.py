@@ -1,4 +1,4 @@
-"""What `rs274` is never given, and what only confuses it.
+"""Programs that `rs274` is never given, and words that only confuse it.
 
 LinuxCNC executes Python in comments (`;py,...`, `(py,...)`, `(pyrun,...)`), user M codes (M100 to M199) as executables,
 and subprograms of other files. A program with these is refused here, before anything is started. The copy that rs274
