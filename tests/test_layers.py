@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import ast
 import builtins
+import pkgutil
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from importlinter.cli import lint_imports
 
 import toolpath_stiff
 from toolpath_stiff.cli.main import COMMANDS
 
 PACKAGE = Path(toolpath_stiff.__file__).parent
+POCKET = PACKAGE.parent / "programs" / "pocket.nc"
 HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "pyarrow", "pygcode")
 
 
@@ -48,6 +51,44 @@ def test_every_room_is_in_the_architecture_page():
     page = (PACKAGE.parent / "docs" / "architecture.md").read_text("utf-8")
     rooms = {path.parts[0].removesuffix(".py") for path in modules()}
     assert {room for room in rooms if f"`{room}`" not in page} == set()
+
+
+def walks() -> dict[str, list[str]]:
+    """Heading of each walk of the architecture page -> the functions and modules that it names, in order."""
+    page = (PACKAGE.parent / "docs" / "architecture.md").read_text("utf-8")
+    sections = [section.partition("**") for section in page.partition("\n## ")[0].split("\n**")[1:]]
+    return {heading: re.findall(r"`((?:[a-z_]+\.)+\w+(?:\.\w+)?)`", text) for heading, _, text in sections}
+
+
+def test_the_walks_of_the_architecture_page_name_what_there_is():
+    for heading, names in walks().items():
+        assert 3 <= len(names) <= 12, heading
+        for name in names:
+            assert pkgutil.resolve_name(f"toolpath_stiff.{name}")
+    assert len(walks()) == 3
+
+
+@pytest.mark.parametrize(("walk", "words"), [(0, ["analyze", str(POCKET)]), (1, ["diagnose", "nist-table1"])])
+def test_a_run_goes_the_walk(tmp_path, walk, words):
+    """The functions of a walk are called, one first after the other, in a fresh interpreter."""
+    code = (
+        "import sys\n"
+        "called = {}\n"
+        "def note(frame, event, argument):\n"
+        "    if event == 'call':\n"
+        "        module = frame.f_globals.get('__name__', '').removeprefix('toolpath_stiff.')\n"
+        "        called.setdefault(f'{module}.{frame.f_code.co_qualname}', len(called))\n"
+        "from toolpath_stiff.cli.main import main\n"
+        "sys.setprofile(note)\n"
+        f"main({[*words, '--no-plots']!r})\n"
+        "sys.setprofile(None)\n"
+        "print('called', *called)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    called = {name: number for number, name in enumerate(done.stdout.splitlines()[-1].split())}
+    names = [name for name in list(walks().values())[walk] if name != "nc.codes.registry"]
+    assert [name for name in names if name not in called] == []
+    assert sorted(names, key=lambda name: called[name]) == names
 
 
 def test_the_help_imports_nothing_heavy():

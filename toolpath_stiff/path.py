@@ -285,7 +285,7 @@ def _plunge_borders(
 def _borders_of_block(
     moves: Moves, counts: IntArray, finer: IntArray, origin: ArrayLike
 ) -> tuple[IntArray, FloatArray]:
-    """As `_plunge_borders`, of moves divided into `counts` pieces, of which `finer` lie between two samples."""
+    """The same of moves divided into `counts` pieces, of which `finer` lie between two samples."""
     move = np.repeat(np.arange(len(moves)), counts + 1)
     index = np.arange(len(move)) - np.repeat(np.cumsum(counts + 1) - counts - 1, counts + 1)
     plunge = np.abs(_along(moves, move, index / counts[move], origin)) >= BORDER

@@ -12,7 +12,7 @@ import pytest
 from tests.browser import needs_browser, run_in
 from tests.report.test_report_page import EVIL, Page
 from toolpath_stiff.report.batch.index import batch_page
-from toolpath_stiff.report.batch.programs import Outcome, summary_csv, terminal_summary
+from toolpath_stiff.report.batch.outcomes import Outcome, summary_csv, terminal_summary
 from toolpath_stiff.report.pages import script_hash
 
 

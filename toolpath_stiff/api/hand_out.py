@@ -20,7 +20,8 @@ from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.processes import ProcessPool, death
-from toolpath_stiff.report.batch.programs import Listed, Outcome, figures_of
+from toolpath_stiff.report.batch.outcomes import Outcome, figures_of
+from toolpath_stiff.report.batch.programs import Listed
 from toolpath_stiff.results_folder import Rules, clear_up
 
 _ALONE = threading.Lock()  # a process analyzes one program at a time, however many threads an executor has

@@ -86,12 +86,7 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
 
 
 @checked
-def pose(
-    pose_mm_deg: ArrayLike,
-    machine: Machine | str | Path = "nist",
-    *,
-    force_N: Force = FORCE,
-) -> PoseStiffness:
+def pose(pose_mm_deg: ArrayLike, machine: Machine | str | Path = "nist", *, force_N: Force = FORCE) -> PoseStiffness:
     """Stiffness at a pose, or at many.
 
     Parameters

@@ -81,9 +81,8 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
     try:
         text = read_bytes(path, "machine file", LARGEST_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
-        raise MachineFileError(
-            f"not a text file (byte {error.start})", expected="a machine file (TOML, UTF-8)", file=str(path)
-        ) from None
+        mistake = f"not a text file (byte {error.start})"
+        raise MachineFileError(mistake, expected="a machine file (TOML, UTF-8)", file=str(path)) from None
     return parse_machine(text, file=str(path))
 
 

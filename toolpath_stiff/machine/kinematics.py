@@ -23,16 +23,9 @@ from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
 LENGTH_TOLERANCE = 1e-12  # m, a few units in the last place of a strut's length
-
-
 MOST_STEPS = 50
-
-
 # Farthest step of Newton's method: beyond some tenths of a radian its linear model of a rotation is worthless.
-LARGEST_TURN = 0.3  # rad
-
-
-LARGEST_SHIFT = 0.5  # m
+LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.3  # m, rad
 
 
 @dataclass(frozen=True)
@@ -66,10 +59,7 @@ class Struts:
 
 
 def solve_struts(
-    machine: Machine,
-    position: ArrayLike,
-    rotation: ArrayLike | None = None,
-    tool_length: ArrayLike = np.nan,
+    machine: Machine, position: ArrayLike, rotation: ArrayLike | None = None, tool_length: ArrayLike = np.nan
 ) -> Struts:
     """Lengths, directions and arms of the six struts.
 
@@ -101,11 +91,9 @@ def solve_struts(
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     joints = machine.platform_joints_for(tool_length)
-    if rotation is None:
-        arms = np.broadcast_to(joints, (len(tip), 6, 3))
-    else:
-        arms = np.asarray(joints @ np.swapaxes(np.asarray(rotation, dtype=float), -1, -2))
-        arms = np.broadcast_to(arms, (len(tip), 6, 3))
+    if rotation is not None:
+        joints = np.asarray(joints @ np.swapaxes(np.asarray(rotation, dtype=float), -1, -2))
+    arms = np.broadcast_to(joints, (len(tip), 6, 3))
     struts = tip[:, None, :] + arms - machine.frame_joints
     lengths = np.sqrt(np.einsum("nij,nij->ni", struts, struts))
     return Struts(lengths=lengths, directions=struts / lengths[..., None], arms=arms)
@@ -140,11 +128,9 @@ def joint_angles(machine: Machine, struts: Struts, rotation: ArrayLike | None = 
         (n, 6) rad each.
     """
     frame_axes, platform_axes = neutral_axes(machine)
-    frame = _angle(struts.directions, frame_axes)
-    if rotation is None:
-        return frame, _angle(struts.directions, platform_axes)
-    turned = platform_axes @ np.swapaxes(np.asarray(rotation, dtype=float), -1, -2)
-    return frame, _angle(struts.directions, turned)
+    if rotation is not None:
+        platform_axes = platform_axes @ np.swapaxes(np.asarray(rotation, dtype=float), -1, -2)
+    return _angle(struts.directions, frame_axes), _angle(struts.directions, platform_axes)
 
 
 def _angle(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -226,11 +212,8 @@ def forward_kinematics(
     failed = np.flatnonzero(~(error < 1e3 * LENGTH_TOLERANCE))
     if len(failed):
         row = int(failed[0])
-        shown = ", ".join(f"{mm_from_m(v):.3f}" for v in wanted[row])
-        raise PoseError(
-            f"row {row + 1}: no pose near the start has struts of {shown} mm",
-            hint="check the lengths, or give a start nearer to the pose",
-        )
+        mistake = f"row {row + 1}: no pose near the start has struts of {_in_words(wanted[row])} mm"
+        raise PoseError(mistake, hint="check the lengths, or give a start nearer to the pose")
     return np.concatenate([position, roll_pitch_yaw(rotation)], axis=1)
 
 
@@ -241,8 +224,12 @@ def _check_lengths(lengths: FloatArray) -> None:
     bad = np.flatnonzero(~(np.isfinite(lengths) & (lengths > 0.0)).all(axis=1))
     if len(bad):
         row = int(bad[0])
-        shown = ", ".join(f"{mm_from_m(v):.3f}" for v in lengths[row])
-        raise PoseError(f"row {row + 1}: strut lengths {shown} mm", expected="six finite lengths above 0")
+        mistake = f"row {row + 1}: strut lengths {_in_words(lengths[row])} mm"
+        raise PoseError(mistake, expected="six finite lengths above 0")
+
+
+def _in_words(lengths: FloatArray) -> str:
+    return ", ".join(f"{mm_from_m(v):.3f}" for v in lengths)
 
 
 def _newton_step(jacobian: FloatArray, missing: FloatArray) -> FloatArray:

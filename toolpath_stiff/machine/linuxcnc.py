@@ -15,7 +15,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import MachineFileError
-from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
@@ -115,27 +114,27 @@ def _with_assumptions(frame: FloatArray, platform: FloatArray, file: str) -> Mac
     size = float(np.linalg.norm(frame[:, :2], axis=1).mean())
     height = float(frame[:, 2].mean() + 0.87 * size)  # struts then lean by about 45 degrees
     neutral = (0.0, 0.0, height, 0.0, 0.0, 0.0)
+    struts = platform + np.array(neutral[:3]) - frame
+    middle = float(np.sqrt(np.einsum("ij,ij->i", struts, struts)).mean())
+    travel = (0.7 * middle, 1.4 * middle)
     name = Path(file).name
-    machine = Machine(
+    return Machine(
         name=Path(file).stem,
         title=f"hexapod of {name}",
         source=f"genhexkins pins of {name}",
         frame_joints=frame,
         platform_joints=platform,
         reference_tool_length=0.0,
-        strut_law=StrutLaw(0.5 * size, ASSUMED_STIFFNESS, 2.0 * size, ASSUMED_STIFFNESS),
+        strut_law=StrutLaw(travel[0], ASSUMED_STIFFNESS, travel[1], ASSUMED_STIFFNESS),
+        limits=Limits(
+            strut_length=travel,
+            frame_joint_angle=rad_from_deg(45.0),
+            platform_joint_angle=rad_from_deg(45.0),
+            workspace=np.array([[-size, -size, height - 0.5 * size], [size, size, height + 0.5 * size]]),
+            singularity=0.1,
+            neutral_pose=neutral,
+        ),
         default_origin=neutral,
         origins={"frame_joints": "published", "platform_joints": "published"},
         remarks={"strut_law": "LinuxCNC knows no stiffness; set your own"},
     )
-    middle = float(solve_struts_at(machine, neutral).lengths.mean())
-    limits = Limits(
-        strut_length=(0.7 * middle, 1.4 * middle),
-        frame_joint_angle=rad_from_deg(45.0),
-        platform_joint_angle=rad_from_deg(45.0),
-        workspace=np.array([[-size, -size, height - 0.5 * size], [size, size, height + 0.5 * size]]),
-        singularity=0.1,
-        neutral_pose=neutral,
-    )
-    law = StrutLaw(0.7 * middle, ASSUMED_STIFFNESS, 1.4 * middle, ASSUMED_STIFFNESS)
-    return machine.with_changes(limits=limits, strut_law=law)

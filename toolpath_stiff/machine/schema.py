@@ -67,16 +67,17 @@ class Key:
         return shape in (self.shape, (self.also_length,)) or (self.or_one and not shape)
 
 
-JOINTS_MM = Key(unit="mm", shape=(6, 3), required=False)
-# Rows of radius, angle about Z, height: keeps the symmetry of a machine exact, and reads better.
-JOINTS_CYLINDRICAL = Key(unit="mm, deg, mm", shape=(6, 3), required=False)
+JOINTS = {
+    "mm": Key(unit="mm", shape=(6, 3), required=False),
+    # Rows of radius, angle about Z, height: keeps the symmetry of a machine exact, and reads better.
+    "cylindrical_mm_deg": Key(unit="mm, deg, mm", shape=(6, 3), required=False),
+}
 ANGLE = Key(unit="deg", low=0.0, high=180.0, open_low=True, infinite=True)
 CORNER = Key(unit="mm", shape=(3,))
 
 SECTIONS: dict[str, dict[str, Key]] = {
     "": {"name": Key(text=True), "title": Key(text=True, required=False), "source": Key(text=True, required=False)},
-    "frame_joints": {"mm": JOINTS_MM, "cylindrical_mm_deg": JOINTS_CYLINDRICAL},
-    "platform_joints": {"mm": JOINTS_MM, "cylindrical_mm_deg": JOINTS_CYLINDRICAL},
+    **dict.fromkeys(("frame_joints", "platform_joints"), JOINTS),
     "reference_tool": {"length_mm": Key(unit="mm", low=0.0, high=2000.0)},
     "strut_law": {
         "length_mm": Key(unit="mm", shape=(2,), low=0.0, open_low=True, required=False, many=True),

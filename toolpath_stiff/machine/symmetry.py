@@ -195,8 +195,5 @@ def describe_stray(stray: Stray, kind: str) -> str:
         f"{stray.body} joint {stray.joint + 1} stands at {shown(stray.given)} mm; the {kind} symmetry of the others "
         f"puts it at {shown(stray.expected)} mm, {mm_from_m(stray.distance):.1f} mm away"
     )
-    if stray.slip:
-        text += f" ({stray.slip})"
-    if stray.instead_of is not None:
-        text += f"; or joint {stray.instead_of + 1} is the wrong one of the two"
-    return text
+    text += f" ({stray.slip})" if stray.slip else ""
+    return text + ("" if stray.instead_of is None else f"; or joint {stray.instead_of + 1} is the wrong one of the two")

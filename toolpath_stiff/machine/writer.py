@@ -83,9 +83,8 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
         for entry in entries:
             lines += ["", f"[[{kind}]]", *_rows({"name": entry.name, **entry.parameters})]
             lines += [f"[{kind}.provenance]", *_rows(entry.provenance)] if entry.provenance else []
-    if machine.uncertainty is not None:
-        names, sd, correlation = (getattr(machine.uncertainty, name) for name in ("names", "sd", "correlation"))
-        figures = {"parameters": names, "sd": sd, "correlation": correlation}
+    if (known := machine.uncertainty) is not None:
+        figures = {"parameters": known.names, "sd": known.sd, "correlation": known.correlation}
         lines += ["", f"# {HEADINGS['uncertainty']}", "[uncertainty]", *_rows(figures)]
     return "\n".join([*lines, ""])
 

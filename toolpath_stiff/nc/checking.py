@@ -275,22 +275,22 @@ def _run_to_the_end(run: _CheckingRun) -> tuple[list[InputError], list[str]]:
 
 def _on_the_part(
     moves: Moves | None, kinematics: PostedKinematics, state: State, name: str
-) -> tuple[Moves | None, list[InputError], tuple[str, ...], tuple[str, ...]]:
+) -> tuple[Moves | None, list[InputError], list[str], list[str]]:
     """Moves of the posted machine on the part, None where that is refused; errors, warnings, assumptions."""
     from toolpath_stiff.nc.posted import check_rotary_offsets, on_the_part
 
     if moves is None:
-        return None, [], (), ()
+        return None, [], [], []
     frames = state.frames
     x, y, z = (m_from_mm(v) for v in frames.origin[:3])
     zero = (x, y, z, 0.0, 0.0, 0.0) if frames.source == "program" else None
     try:
         check_rotary_offsets(frames.offsets, kinematics, name)
         tools = state.used_tools.values()
-        part = on_the_part(moves, kinematics, zero, tools, name, state.tip_held)
+        moves, warnings, assumptions = on_the_part(moves, kinematics, zero, tools, name, state.tip_held)
     except InputError as error:
-        return None, [error], (), ()
-    return part.moves, [], part.warnings, part.assumptions
+        return None, [error], [], []
+    return moves, [], warnings, assumptions
 
 
 def _check_cutter_location(

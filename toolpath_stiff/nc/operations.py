@@ -16,7 +16,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -75,23 +74,22 @@ def headings(lines: Sequence[str]) -> list[Heading]:
     >>> [(heading.line, heading.name) for heading in headings(("G21", "(FACE)", "G1 X1"))]
     [(2, 'FACE')]
     """
-    comments = []  # number and text of lines that hold comments alone
+    blocks: list[tuple[int, list[str]]] = []  # the first line of each, and its comments
+    last = -1
     for number, text in enumerate(lines, 1):
         if ("(" in text or ";" in text) and BEGINS.match(text):
             code, comment = split_comments(text)
             if NO_WORDS.fullmatch(code):
-                comments.append((number, comment))
-    # Successive lines are as far ahead of their place in this list.
-    blocks = groupby(enumerate(comments), lambda item: item[1][0] - item[0])
-    named = []
-    for _, block in blocks:
-        numbers, texts = zip(*(comment for _, comment in block), strict=True)
-        named.append(heading_of(texts, numbers[0]))
+                if number != last + 1:
+                    blocks.append((number, []))
+                blocks[-1][1].append(comment)
+                last = number
+    named = (heading_of(comments, first) for first, comments in blocks)
     return [heading for heading in named if heading is not None]
 
 
 def heading_of(block: Sequence[str], line: int) -> Heading | None:
-    """What a block of comments names: what the post marks, else the first line with letters, else a tool."""
+    """The heading of a block of comments: what the post marks, else the first line with letters, else a tool."""
     named = tool = number = None
     for comment in block:
         name = plain_name(comment)
@@ -238,7 +236,7 @@ def find_operations(
 
 @dataclass
 class _Beginning:
-    """What stands between two cuts: the first move after it, headings passed, the tool that cuts, its tool change."""
+    """The gap between two cuts: the first move after it, headings passed, the tool that cuts, its tool change."""
 
     move: int
     heads: list[Heading]
@@ -247,7 +245,7 @@ class _Beginning:
 
     @property
     def line(self) -> int:
-        """Where its heading or its tool change stands; the largest number there is without any."""
+        """The line of its heading or its tool change; the largest number there is without any."""
         lines = [head.line for head in self.heads] + ([self.change[0]] if self.change else [])
         return min(lines, default=np.iinfo(np.int64).max)
 
@@ -385,7 +383,7 @@ def _tool_change(lines: Sequence[str], stretches: list[tuple[int, int]]) -> tupl
 
 
 def _name(begin: _Beginning, title: str, remarks: dict[int, str], alone: bool) -> str:
-    """What the post marks, else the first heading, else the tool; of a lone operation rather the title; "" if none."""
+    """The name: what the post marks, else the first heading, else the tool; of a lone one rather the title, or ""."""
     names: dict[str, list[str]] = {MARKED: [], NAMED: [], TOOL: []}
     for head in begin.heads:
         names[head.kind].append(head.name)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis, tool_poses
+from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, tool_poses
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram, ToolUse
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.recovery import recover_moves, turns_far
@@ -26,15 +26,6 @@ OWN_POINTS = (
     "G53, G28 and G30 go to points of the machine that the program was posted for, as it stands about the work; their "
     "place on this machine means nothing"
 )
-
-
-@dataclass(frozen=True)
-class OnThePart:
-    """Moves in part coordinates, and the sentences that go with them."""
-
-    moves: Moves
-    warnings: tuple[str, ...]
-    assumptions: tuple[str, ...]
 
 
 def recovered(
@@ -59,14 +50,14 @@ def recovered(
         See `on_the_part`.
     """
     zero = program.origin if program.origin_source == "program" else None
-    part = on_the_part(program.moves, kinematics, zero, program.tools, program.name, tip_held)
+    moves, warnings, assumptions = on_the_part(program.moves, kinematics, zero, program.tools, program.name, tip_held)
     return replace(
         program,
-        moves=part.moves,
+        moves=moves,
         origin=origin,
         origin_source=source,
-        warnings=(*program.warnings, *part.warnings),
-        assumptions=(*program.assumptions, *part.assumptions),
+        warnings=(*program.warnings, *warnings),
+        assumptions=(*program.assumptions, *assumptions),
         kinematics=kinematics.label,
         jumps=None,  # they count the moves of the other machine
     )
@@ -79,8 +70,8 @@ def on_the_part(
     tools: Iterable[ToolUse],
     name: str,
     tip_held: Sequence[tuple[int, bool]] = (),
-) -> OnThePart:
-    """Moves of the posted machine, recovered on the part.
+) -> tuple[Moves, list[str], list[str]]:
+    """Moves of the posted machine, recovered on the part, and the warnings and assumptions that go with them.
 
     Parameters
     ----------
@@ -109,11 +100,9 @@ def on_the_part(
     held = np.full(len(moves), kinematics.tcp)
     for first, on in tip_held:
         held[first:] = on or kinematics.tcp
-    assumptions = [
-        kinematics.assumption(switched=any(on for _, on in tip_held)),
-        *assumptions,
-        *([OWN_ZERO] if zero is not None else []),
-    ]
+    assumptions = [kinematics.assumption(switched=any(on for _, on in tip_held)), *assumptions]
+    if zero is not None:
+        assumptions.append(OWN_ZERO)
     far = turns_far(kept, kinematics)
     if far:
         line, letter, degrees = far[0]
@@ -123,7 +112,7 @@ def on_the_part(
             + f"; if the control takes the shorter way, set rollover = true for {letter} in the controller file"
         )
     lengths = {tool.number: tool.length for tool in tools}
-    return OnThePart(recover_moves(kept, placed, lengths, name, held[known]), tuple(warnings), tuple(assumptions))
+    return recover_moves(kept, placed, lengths, name, held[known]), warnings, assumptions
 
 
 def check_rotary_offsets(offsets: Offsets, kinematics: PostedKinematics, name: str) -> None:
@@ -168,15 +157,13 @@ def _points_at(kinematics: PostedKinematics, zero: Pose | None, name: str) -> Po
             hint='or give the points in program coordinates: points = "program"',
             file=name,
         )
-    return replace(kinematics, axes=tuple(_moved(axis, zero) for axis in kinematics.axes))
-
-
-def _moved(axis: RotaryAxis, zero: Pose) -> RotaryAxis:
-    """An axis whose point on a table is given from another zero."""
-    if axis.turns != TABLE or axis.point is None:
-        return axis
-    x, y, z = (p - o for p, o in zip(axis.point, zero[:3], strict=True))
-    return replace(axis, point=(x, y, z))
+    axes = []
+    for axis in kinematics.axes:
+        point = axis.point
+        if axis.turns == TABLE and point is not None:
+            point = (point[0] - zero[0], point[1] - zero[1], point[2] - zero[2])
+        axes.append(replace(axis, point=point))
+    return replace(kinematics, axes=tuple(axes))
 
 
 def _known_points(
@@ -188,18 +175,17 @@ def _known_points(
         return ~fixed, [], []
     if zero is not None and not kinematics.tcp:
         return np.ones(len(moves), dtype=bool), [], [OWN_POINTS]
-    reason = (
-        "tool centre point control does not hold there"
-        if kinematics.tcp
-        else "the place of G54 on that machine is not known"
-    )
+    reason = "the place of G54 on that machine is not known"
+    hint = "give G54 in the controller file's [offsets]"
+    if kinematics.tcp:
+        reason, hint = "tool centre point control does not hold there", ""
     cuts = fixed & (moves.motion != RAPID)
     if cuts.any():
         raise Place(name, int(moves.line[np.argmax(cuts)])).fail(
             f"a cut that begins or ends at a point of the machine that the program was posted for (G53, G28, G30): "
             f"{reason}",
             "rapids alone there, and X Y Z in the move after them",
-            "" if kinematics.tcp else "give G54 in the controller file's [offsets]",
+            hint,
         )
     lines = np.unique(moves.line[fixed])
     shown = ", ".join(str(line) for line in lines[:MOST_LINES])

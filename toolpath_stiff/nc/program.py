@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Reading(TypedDict, total=False):
-    """How a program is read: the arguments of `Program.read`."""
+    """Options of reading: the arguments of `Program.read`."""
 
     dialect: str | None
     controller: str | Path | None
@@ -151,7 +151,7 @@ class Program:
 
     @classmethod
     def _of(cls, name: str, file: str | None, text: str | None, reading: Mapping[str, Any]) -> Program:
-        """What the options of reading mean, tables included."""
+        """A program whose options of reading are looked up, tables included."""
         from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
         from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 
@@ -198,7 +198,7 @@ class Program:
 
     @property
     def read_as(self) -> dict[str, Any]:
-        """What the reader of its blocks needs beside the text: offsets, tools, block delete."""
+        """Arguments of the reader of its blocks beside the text: offsets, tools, block delete."""
         control = self.controller
         return {"offsets": control.offsets, "tools": control.tools, "block_delete": self.options["block_delete"]}
 

@@ -35,7 +35,7 @@ INTERPRETERS = ("builtin", "linuxcnc", "auto")
 
 
 class Options(TypedDict, total=False):
-    """How a program is read; see `Request`."""
+    """Options of reading; see `Request`."""
 
     origin: Pose | None
     default_origin: Pose
@@ -216,7 +216,7 @@ _LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beg
 
 
 def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
-    """That numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
+    """A warning that numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
 
     Where whole numbers are increments, posts end those in mm with their point.
     """
@@ -232,7 +232,7 @@ def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
 
 
 def feed_assumption(controller: Controller, moves: Moves | None) -> list[str]:
-    """That the first cuts have the feed that was asked for."""
+    """The assumption that the first cuts have the feed that was asked for."""
     if controller.feed is None or moves is None:
         return []
     cuts = moves.feed[moves.motion != RAPID][:1]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, count, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -212,10 +212,8 @@ def next_visit(
 
 def own_files(folder: str | Path) -> tuple[str, ...]:
     """A plan's own measurement files: plan.csv, and next_1.csv and so on as far as there are any."""
-    chosen: list[str] = []
-    while (file := Path(folder) / f"next_{len(chosen) + 1}.csv").exists():
-        chosen.append(str(file))
-    return (str(Path(folder) / "plan.csv"), *chosen)
+    further = takewhile(Path.exists, (Path(folder) / f"next_{number}.csv" for number in count(1)))
+    return tuple(map(str, (Path(folder) / "plan.csv", *further)))
 
 
 def conditioned(tables: Tables, taken: Taken) -> tuple[tuple[Forecast, ...], list[tuple[int, float]]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -56,18 +57,13 @@ def plan_rows(visits: Visits, chosen: Sequence[int], taken: Iterable[str] = ()) 
 
 def _point_names(visits: Visits, chosen: Sequence[int], taken: set[str]) -> list[str]:
     """The name that a pose had before, or a new one; one name a pose."""
-    known: dict[tuple[float, ...], str] = {}
-    number, names = 0, []
-    for visit in chosen:
-        pose = tuple(visits.pose[visit].tolist())
-        if pose not in known:
-            name = str(visits.label[visit])
-            while not name or (not visits.label[visit] and name in taken):
-                number += 1
-                name = f"plan {number}"
-            known[pose] = name
-        names.append(known[pose])
-    return names
+    fresh = (name for name in map("plan {}".format, count(1)) if name not in taken)
+    poses = [tuple(pose) for pose in visits.pose[list(chosen)].tolist()]
+    names: dict[tuple[float, ...], str] = {}
+    for visit, pose in zip(chosen, poses, strict=True):
+        if pose not in names:
+            names[pose] = str(visits.label[visit]) or next(fresh)
+    return [names[pose] for pose in poses]
 
 
 def _round(value: float) -> float:

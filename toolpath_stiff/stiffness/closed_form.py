@@ -18,14 +18,7 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.machine.kinematics import LENGTH_TOLERANCE, Struts, solve_struts_at
 from toolpath_stiff.machine.model import Machine, StrutLaw
-from toolpath_stiff.stiffness.elimination import (
-    Vector,
-    cross,
-    dot,
-    forces,
-    over_struts,
-    strut,
-)
+from toolpath_stiff.stiffness.elimination import Vector, cross, dot, forces, over_struts, strut
 
 BLOCK = 2048  # poses: some 1 MB of work arrays, which stay in a core's second-level cache
 # Determinants of unit directions lie within 0 and 1. Above this the elimination loses up to seven of sixteen digits:

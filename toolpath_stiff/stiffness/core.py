@@ -35,6 +35,7 @@ CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2
 COMPILED_FROM = 1_500_000
 ROUTES = ("exact", "closed_form", "compiled")
 
+Tools = FloatArray | float  # m, length of the tool: of all poses, or (n,)
 Along = Callable[[FloatArray, IntArray], FloatArray]
 
 DIRECTIONS = 60  # over half a sphere: neighbours some 15 degrees apart
@@ -47,7 +48,7 @@ IN_PLANE = 12  # over half a circle of the directions in which one strut is idle
 def is_closed_form(model: StiffnessModel) -> bool:
     """Whether struts on a rigid platform are all that acts, so that the closed form holds."""
     acting = replace(model, effects=acting_effects(model))
-    return acting.is_plain and bool(np.isinf(acting.platform_bars))
+    return acting.is_plain and all(np.isinf(active.values["bar_stiffness"]) for active in acting.effects)
 
 
 def choose_route(model: StiffnessModel, poses: int) -> str:
@@ -65,7 +66,7 @@ def tip_compliance(
     model: StiffnessModel,
     position: FloatArray,
     rotation: FloatArray | None = None,
-    tool_length: FloatArray | float = np.nan,
+    tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
     route: str | None = None,
 ) -> FloatArray:
@@ -199,11 +200,7 @@ def compliance_with_effects(
 
 
 def _exact(
-    model: StiffnessModel,
-    position: FloatArray,
-    rotation: FloatArray | None,
-    tool_length: FloatArray | float,
-    force: float,
+    model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: Tools, force: float
 ) -> FloatArray:
     compliance = np.empty((len(position), 3, 3))
     for rows, path in _paths(model, position, rotation, tool_length, force):
@@ -215,7 +212,7 @@ def _paths(
     model: StiffnessModel,
     position: FloatArray,
     rotation: FloatArray | None,
-    tool_length: FloatArray | float,
+    tool_length: Tools,
     force: float,
     at_a_time: int = BLOCK,
 ) -> Iterator[tuple[slice, LoadPath]]:
@@ -232,7 +229,7 @@ def compliance_along(
     direction: FloatArray,
     position: FloatArray,
     rotation: FloatArray | None = None,
-    tool_length: FloatArray | float = np.nan,
+    tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
 ) -> FloatArray:
     """Compliance of the tip along unit vectors (n, 3), load-dependent effects included: (n,) m/N."""
@@ -246,7 +243,7 @@ def extreme_directions(
     model: StiffnessModel,
     position: FloatArray,
     rotation: FloatArray | None = None,
-    tool_length: FloatArray | float = np.nan,
+    tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
     softest: bool = True,
     across: FloatArray | None = None,
@@ -276,11 +273,7 @@ def half_sphere(count: int) -> FloatArray:
 
 
 def searched_directions(
-    along: Along,
-    tensor: FloatArray,
-    forces: FloatArray,
-    softest: bool = True,
-    across: FloatArray | None = None,
+    along: Along, tensor: FloatArray, forces: FloatArray, softest: bool = True, across: FloatArray | None = None
 ) -> FloatArray:
     """Directions in which the tip gives way most, or least.
 

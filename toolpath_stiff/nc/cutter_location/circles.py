@@ -132,7 +132,7 @@ def turned_as(center: Vector, axis: Vector, start: Vector, direction: Vector) ->
 
 
 def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which: int) -> Vector:
-    """Where a motion along the circle meets a line for the first or second time. Raises `ArcError`.
+    """The point where a motion along the circle meets a line for the first or second time. Raises `ArcError`.
 
     Parameters
     ----------

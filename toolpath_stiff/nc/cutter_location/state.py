@@ -44,7 +44,7 @@ class Noted:
 
 @dataclass
 class State:
-    """What is in force after the statements so far; every word is a function of this and its statement."""
+    """The modes in force and all that was made so far; every word is a function of this and its statement."""
 
     name: str  # of the file, for messages
     tools: dict[int, ToolEntry] | None

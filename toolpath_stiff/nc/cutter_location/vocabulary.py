@@ -94,12 +94,12 @@ def refused(
 
 
 def no_shift(statement: Statement) -> bool:
-    """Whether a statement shifts by nothing."""
+    """True for a statement that shifts by nothing."""
     return len(statement.words) == 3 and all(is_number(word) and not number(word) for word in statement.words)
 
 
 def no_turn(statement: Statement) -> bool:
-    """Whether a rotary axis turns by nothing, or goes to 0."""
+    """True for a rotary axis that turns by nothing, or goes to 0."""
     angles = [number(word) for word in statement.words if is_number(word)]
     return bool(angles) and not any(angles)
 
@@ -238,7 +238,7 @@ def look_up(name: str) -> Word | None:
 
 
 def meaning_of(name: str) -> str:
-    """What a word is taken for, for a list of the words used."""
+    """The meaning of a word, for a list of the words used."""
     word = look_up(name)
     if word is None:
         return UNKNOWN

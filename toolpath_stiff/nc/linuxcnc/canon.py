@@ -17,7 +17,7 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
-from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, needs_tags, step_in_words, tool_numbers
+from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, step_in_words
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
 from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, tool_table_hint
@@ -54,6 +54,8 @@ class Follower:
     lines: Sequence[Line]
     tools: dict[int, ToolEntry] | None
     posted: PostedKinematics | None
+    tagged: bool  # the copy carries its line numbers as comments
+    numbers: Sequence[int]  # of the tools, in the order of their table
     reference: Sequence[float] = (0.0, 0.0, 0.0)
     recorder: Recorder = field(default_factory=Recorder)
     used_tools: list[int] = field(default_factory=list)
@@ -81,7 +83,6 @@ class Follower:
     moves_of_line: int = 0
 
     def __post_init__(self) -> None:
-        self.tagged, self.numbers = needs_tags(self.lines), tool_numbers(self.tools, self.lines)
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
 
     def follow(self, text: str) -> None:
@@ -135,7 +136,7 @@ class Follower:
         self.frame_changed = True
 
     def _no_length(self, words: str) -> InputError:
-        """Of a G43 without a length: which tool's, unless H is computed."""
+        """The error for a G43 without a length, with its tool unless H is computed."""
         missing = "and there is no tool table" if self.tools is None else "which the tool table does not give"
         named, hint = LENGTH_WORD.search(words), "give it in a tool table (--tools FILE)"
         if self.tools is None and (named or "H" not in words):
@@ -286,7 +287,8 @@ class Follower:
             self.frame_changed = False
         centred = self._arc(start, end, *arc) if arc else None
         shift = (*self.reference, 0.0, 0.0, 0.0)
-        start, end = ([value - zero for value, zero in zip(point, shift, strict=True)] for point in (start, end))
+        start = [value - zero for value, zero in zip(start, shift, strict=True)]
+        end = [value - zero for value, zero in zip(end, shift, strict=True)]
         feed = math.nan if motion == RAPID else self._feed_of(start, end, arc is not None)
         flags = self._machine_flags(start, end)
         added = self.recorder.add(self.line, motion, start, end, feed, self.tool, self.tool_length, flags, centred)
@@ -344,7 +346,7 @@ class Follower:
             end[2] += self.lost
 
     def _machine_flags(self, start: Vector, end: Vector) -> tuple[bool, bool]:
-        """Whether start and end were given in machine coordinates (G53, G28, G30), axis by axis as in `Frames`."""
+        """Two flags: start and end were given in machine coordinates (G53, G28, G30), axis by axis as in `Frames`."""
         if not self.tagged or (self.cycle and start == end):
             return (False, False)
         was = self.frames.bound

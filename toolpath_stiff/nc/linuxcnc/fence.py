@@ -1,4 +1,4 @@
-"""What `rs274` is never given, and what only confuses it.
+"""Programs that `rs274` is never given, and words that only confuse it.
 
 LinuxCNC executes Python in comments (`;py,...`, `(py,...)`, `(pyrun,...)`), user M codes (M100 to M199) as executables,
 and subprograms of other files. A program with these is refused here, before anything is started. The copy that rs274
@@ -110,6 +110,7 @@ KNOWN_M = frozenset((*range(10), 19, 30, *range(48, 54), *range(60, 69), *range(
 # LinuxCNC's own with any other word.
 OTHERS_CODES = {"G5": "P", "G5.1": "QR", "G8": "P", "G9": "", "G103": "P", "G187": "PE", "G254": "", "G255": ""}
 OWN_CODES = ("G5", "G5.1", "G8")
+MAY_CONFUSE = frozenset("GMDHIJK")
 ARC_CODES = frozenset(("G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G40", "G90", "G91", "G94"))
 Dropped = tuple[int, str]  # line, word
 
@@ -121,10 +122,14 @@ def without_others(lines: Iterable[Line]) -> tuple[list[Line], list[Dropped]]:
     """
     kept, dropped = [], list[Dropped]()
     for line in lines:
-        confusing = _confusing(line.words) if line.rest is None and TOKENS.fullmatch(line.words) else ()
-        dropped += [(line.number, word) for word in confusing]
-        left = (match[0] for match in TOKEN.finditer(line.words) if match[0] not in confusing)
-        kept.append(replace(line, words="".join(left)) if confusing else line)
+        looked_at = line.rest is None and MAY_CONFUSE & set(line.words) and TOKENS.fullmatch(line.words)
+        confusing = _confusing(line.words) if looked_at else ()
+        if confusing:
+            dropped += [(line.number, word) for word in confusing]
+            left = (match[0] for match in TOKEN.finditer(line.words) if match[0] not in confusing)
+            kept.append(replace(line, words="".join(left)))
+        else:
+            kept.append(line)
     return kept, dropped
 
 

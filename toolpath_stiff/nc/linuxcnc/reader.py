@@ -69,7 +69,7 @@ def _checked(source: Sequence[str], name: str) -> tuple[list[Line], list[Dropped
 
 
 def refusal(source: Sequence[str], name: str) -> InputError | None:
-    """Why the second interpreter is not started on a program; None if it may be."""
+    """The error with which the second interpreter is not started on a program; None if it may be."""
     try:
         _checked(source, name)
     except InputError as error:
@@ -85,6 +85,7 @@ class _Session:
     ) -> None:
         self.request, self.lines, self.rs274, self.dropped, self.limits = request, lines, rs274, dropped, limits
         self.offsets = copy.deepcopy(request.work_offsets)
+        self.tagged, self.tool_numbers = needs_tags(lines), tool_numbers(request.tool_table, lines)
 
     def read(self) -> ReadProgram:
         request = self.request
@@ -123,7 +124,7 @@ class _Session:
         return any(codes.search(line.plain) for line in self.lines)
 
     def _shift(self, origin: ShopPose | None, default_origin: ShopPose) -> Sequence[float]:
-        """How far all work offsets must be moved for machine coordinates to be those of the machine; mm.
+        """The shift of all work offsets for machine coordinates to be those of the machine; mm.
 
         It matters to G53, G28 and G30 alone. G10 writes offsets that are machine coordinates already: then none.
         """
@@ -172,15 +173,15 @@ class _Session:
 
     def _run(self, shift: Sequence[float], until: int | None = None) -> tuple[Run, Follower]:
         """Run the program, or its part before the line `until` is first executed."""
-        name, tools = self.request.name, self.request.tool_table
+        name = self.request.name
         prefix, active = self._prefix(shift)
         lines = [Line(line.number, "M2") if line.number == until else line for line in self.lines]
         switch = bool(self.request.switches)
         try:
             run = run_rs274(
-                numbered(lines, name, block_delete=switch, tags=needs_tags(self.lines), prefix=prefix),
+                numbered(lines, name, block_delete=switch, tags=self.tagged, prefix=prefix),
                 parameter_file(self.offsets, shift, active),
-                tool_file(tool_numbers(tools, self.lines), tools),
+                tool_file(self.tool_numbers, self.request.tool_table),
                 rs274=self.rs274,
                 limits=self.limits,
             )
@@ -195,7 +196,8 @@ class _Session:
 
     def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
         request = self.request
-        follower = Follower(request.name, self.lines, request.tool_table, request.posted, reference)
+        tools = (request.tool_table, request.posted, self.tagged, self.tool_numbers)
+        follower = Follower(request.name, self.lines, *tools, reference)
         follower.follow(run.canon)
         return follower
 
@@ -233,7 +235,7 @@ class _Session:
         return before, g54.given or any(OFFSET_CODES.search(words) and SETS_G54.search(words) for words in early)
 
     def _turning(self) -> dict[str, int]:
-        """What makes the program look like a lathe's, with its line."""
+        """Codes that make the program look like a lathe's, with their lines."""
         signs: dict[str, int] = {}
         for line in self.lines:
             for number in TURNING.findall(line.plain) if "G" in line.words else ():
@@ -270,7 +272,7 @@ class _Session:
         return unsupported
 
     def _column(self, line: Line, word: str) -> int:
-        """Where a word stands in its line, whatever blanks are within it."""
+        """Column of a word in its line, whatever blanks are within it."""
         text = self.request.lines[line.number - 1]
         for start, comment in line.comments:
             text = text[: start - 1] + " " * (len(comment) + 1) + text[start + len(comment) :]

@@ -1,0 +1,193 @@
+"""What became of many programs: the figures that are kept of each, as `summary.csv` and as a table on the terminal."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.documents import Document
+from toolpath_stiff.report.words import WIDTH, counted, duration, only_plunges, plain, shortened
+from toolpath_stiff.units import number
+
+MOST_NAME = 36  # columns of the terminal for the name
+# First columns of summary.csv -> what of the outcome they show.
+TOLD = {"program": "name", "file": "file", "status": "status", "reason": "reason", "report": "opens"}
+# Its further columns, keys of the figures -> decimals; the units are in the names.
+COLUMNS: Mapping[str, int | None] = {
+    "machine": None,
+    "load": None,
+    "force_N": 3,
+    "samples": 0,
+    "cutting_length_mm": 3,
+    "rapid_length_mm": 3,
+    "time_s": 3,
+    "mean_N_per_mm": 4,
+    "min_N_per_mm": 4,
+    "max_N_per_mm": 4,
+    "range_N_per_mm": 4,
+    "mean_deflection_um": 4,
+    "headline": None,
+    "plunge_length_mm": 3,
+    "plunge_mean_N_per_mm": 4,
+    "plunge_min_N_per_mm": 4,
+    "plunge_max_N_per_mm": 4,
+    "weakest_line": 0,
+    "weakest_text": None,
+    "weakest_x_mm": 4,
+    "weakest_y_mm": 4,
+    "weakest_z_mm": 4,
+    "weakest_a_deg": 5,
+    "weakest_b_deg": 5,
+    "weakest_c_deg": 5,
+    "min_margin": 5,
+    "min_margin_line": 0,
+    "out_of_reach_samples": 0,
+    "extrapolated_share": 5,
+    "warnings": 0,
+    "not_acted_upon": 0,
+    "required_N_per_mm": 4,
+    "lines_below_required": 0,
+    "compare_machine": None,
+    "compare_mean_N_per_mm": 4,
+    "compare_min_N_per_mm": 4,
+    "compare_mean_difference_percent": 3,
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a program.
+
+    Attributes
+    ----------
+    name
+        Short, and no other program's.
+    file
+        Where it was read, as named.
+    reason
+        Why it failed, a sentence that begins with the file; "" if it did not.
+    opens
+        The file that shows most of it, seen from the folder of all reports; "" if it failed.
+    figures
+        One value for each of `COLUMNS` where there is one; nothing if it failed.
+    """
+
+    name: str
+    file: str
+    reason: str = ""
+    opens: str = ""
+    figures: Document = field(default_factory=dict)
+
+    @property
+    def status(self) -> str:
+        """Failed; partial, with samples out of reach left out; or done."""
+        if not self.figures:
+            return "failed"
+        return "partial" if self.figures["out_of_reach_samples"] else "done"
+
+    @property
+    def plunges_only(self) -> bool:
+        """True where its figures are of plunges, for it does nothing else."""
+        return only_plunges(self.figures)
+
+    def figure(self, name: str) -> Any:
+        """One of the figures; None where there is none."""
+        return self.figures.get(name)
+
+    def number(self, name: str, digits: int = 0) -> str:
+        """The same for people; "-" where there is none."""
+        return number(self.figure(name), digits)
+
+
+def good_and_failed(outcomes: Sequence[Outcome]) -> tuple[list[Outcome], list[Outcome]]:
+    """The programs that have figures, and those that failed."""
+    good, failed = ([one for one in outcomes if bool(one.figures) is analyzed] for analyzed in (True, False))
+    return good, failed
+
+
+def figures_of(summary: Document) -> Document:
+    """The values of `COLUMNS` from a `summary.json`: small, however long the program."""
+    flat = {
+        **summary,
+        **{f"weakest_{key}": value for key, value in (summary["weakest"] or {}).items()},
+        **{f"plunge_{key}": value for key, value in (summary["plunges"] or {}).items()},
+        "warnings": len(summary["warnings"]),
+        "not_acted_upon": len(summary["unsupported"]),
+    }
+    if required := summary.get("required"):
+        flat |= {"required_N_per_mm": required["required_N_per_mm"], "lines_below_required": len(required["below"])}
+    if other := summary.get("compare"):
+        flat |= {f"compare_{key}": value for key, value in other.items()}
+        flat["compare_mean_difference_percent"] = other["difference_percent"]["mean"]
+    return {name: flat[name] for name in COLUMNS if name in flat}
+
+
+def summary_csv(outcomes: Sequence[Outcome]) -> str:
+    """`summary.csv`: one row a program, failures too; a figure that does not exist is an empty cell."""
+
+    def cell(value: Any, digits: int | None) -> str:
+        if value is None:
+            return ""
+        return plain(str(value)) if digits is None else f"{value:.{digits}f}"
+
+    kinds, columns = {**dict.fromkeys(TOLD), **COLUMNS}, columns_of(outcomes).values()
+    rows = [[cell(*pair) for pair in zip(row, kinds.values(), strict=True)] for row in zip(*columns, strict=True)]
+    return csv_text([*kinds], rows)
+
+
+def columns_of(outcomes: Sequence[Outcome]) -> dict[str, list[Any]]:
+    """The same as values, column by column; None for a figure that does not exist."""
+    columns = {name: [getattr(outcome, of) for outcome in outcomes] for name, of in TOLD.items()}
+    return columns | {name: [outcome.figure(name) for outcome in outcomes] for name in COLUMNS}
+
+
+def terminal_summary(outcomes: Sequence[Outcome]) -> str:
+    """One line a program that was analyzed, then the failures with their reasons; at most 100 columns but for these."""
+    good, failed = good_and_failed(outcomes)
+    lines = _program_table(good) if good else []
+    plunging = [plain(outcome.name) for outcome in good if outcome.plunges_only]
+    if plunging:
+        lines += textwrap.wrap(f"figures of plunges, nothing else is cut: {', '.join(plunging)}", WIDTH)
+    partial = [outcome for outcome in good if outcome.status == "partial"]
+    if partial:
+        lines.append("cutting samples out of reach, left out:")
+        lines += [f"  {plain(outcome.name)}: {outcome.number('out_of_reach_samples')}" for outcome in partial]
+    below = [(outcome, count) for outcome in good if (count := outcome.figure("lines_below_required"))]
+    if below:
+        lines.append(f"below the required {good[0].figure('required_N_per_mm'):g} N/mm:")
+        lines += [f"  {plain(outcome.name)}: {counted(count, 'line')}" for outcome, count in below]
+    if failed:
+        lines.append(f"{len(failed)} of {len(outcomes)} programs failed:")
+        lines += [f"  {plain(outcome.reason)}" for outcome in failed]
+    return "\n".join(lines)
+
+
+def _program_table(good: Sequence[Outcome]) -> list[str]:
+    """Names and program text to the left, figures to the right."""
+    compared = good[0].figure("compare_machine") is not None
+    heads = ["program", "cutting mm", "time", "mean N/mm", "min N/mm"]
+    rows = [[*heads, *(["other mean", "change"] if compared else []), "weakest line", ""]]
+    for outcome in good:
+        change = outcome.figure("compare_mean_difference_percent")
+        shown = "-" if change is None else f"{change:+.1f} %"
+        rows.append(
+            [
+                shortened(plain(outcome.name), MOST_NAME),
+                outcome.number("cutting_length_mm", 1),
+                duration(outcome.figure("time_s")),
+                outcome.number("mean_N_per_mm"),
+                outcome.number("min_N_per_mm"),
+                *([outcome.number("compare_mean_N_per_mm"), shown] if compared else []),
+                outcome.number("weakest_line").replace(" ", ""),
+                plain(outcome.figure("weakest_text") or ""),
+            ]
+        )
+    *widths, _ = (max(map(len, column)) for column in zip(*rows, strict=True))
+    lines = []
+    for name, *cells, text in rows:
+        middle = [f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True)]
+        lines.append(shortened("  ".join([f"{name:<{widths[0]}}", *middle, text]).rstrip(), WIDTH))
+    return lines
