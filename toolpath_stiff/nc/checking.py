@@ -73,11 +73,11 @@ def check_lines(
         raise ProgramError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
         return _check_cutter_location(lines, name, origin or default_origin, bool(block_delete), controller)
-    placed = None if origin is None else _pose(origin)
+    given = None if origin is None else _pose(origin)
     request = Request(
         lines,
         name,
-        origin=placed,
+        origin=given,
         default_origin=_pose(default_origin),
         block_delete=block_delete,
         controller=controller,
