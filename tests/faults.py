@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from unittest import mock
 
-from toolpath_stiff import files, results_folder
+from toolpath_stiff import files, locks, results_folder
 
 # What changes a disk. `os.open` counts where it makes a file.
 CALLS = ("open", "write", "fsync", "rename", "replace", "link", "unlink", "mkdir", "rmdir", "chmod", "ftruncate")
@@ -84,13 +84,13 @@ _heard: list[list[tuple[str, bool]]] = []  # the list of who listens now; a firs
 
 
 def _listen(event: str, args: tuple[object, ...]) -> None:
-    """An audit hook, which stays for good: what is opened to be written, and whether `files` does it."""
+    """An audit hook, which stays for good: what is opened to be written, and whether `files` or `locks` does it."""
     if len(_heard) < 2 or event != "open" or not isinstance(args[0], str | os.PathLike):
         return
     if isinstance(args[2], int) and args[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
         frame, within = sys._getframe(), False
         while frame is not None and not within:
-            within, frame = frame.f_code.co_filename == files.__file__, frame.f_back
+            within, frame = frame.f_code.co_filename in (files.__file__, locks.__file__), frame.f_back
         _heard[-1].append((os.path.realpath(os.fspath(args[0])), within))
 
 

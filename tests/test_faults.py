@@ -235,9 +235,9 @@ def test_what_others_write_at_the_moment_of_the_exchange_stays(tmp_path, monkeyp
 
 def test_another_run_is_named(tmp_path, monkeypatch):
     """Where it does not come to an end; this one waits for a while."""
-    from toolpath_stiff import files
+    from toolpath_stiff import locks
 
-    monkeypatch.setattr(files, "WAIT_SECONDS", 0.05)
+    monkeypatch.setattr(locks, "WAIT_SECONDS", 0.05)
     monkeypatch.setattr(sys, "argv", ["/usr/bin/tps", "analyze", "my part.nc"])
     inside = {"a": lambda: write_folder(tmp_path / "out", {"b": ""}, command="test")}
     told = r"is being written by another run: tps analyze 'my part.nc' \(process \d+ on .+\)\. Wait for it"

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-import numpy as np
-
 Document = Mapping[str, Any]  # what a JSON file holds, or a part of it, by the file's own keys
 
 
@@ -20,7 +18,7 @@ def to_dict(value: Any) -> Any:
         return {key: to_dict(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
         return [to_dict(part) for part in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    return value.tolist() if hasattr(value, "tolist") else value  # numpy is not imported: help texts need none
 
 
 def without_nan(value: Any) -> Any:

@@ -1,21 +1,12 @@
-"""Files that are whole or not there: written beside their place and flushed to the disk, then renamed.
-
-What is being written is locked by its process, and the lock ends with the process however that ends: a temporary file
-or folder that nobody holds was left by a run that was killed, and the next run takes it away.
-"""
+"""Files that are whole or not there: written beside their place and flushed to the disk, then renamed."""
 
 from __future__ import annotations
 
 import errno
-import hashlib
 import itertools
-import json
 import os
-import shlex
-import shutil
 import stat
 import sys
-import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
@@ -23,26 +14,17 @@ from pathlib import Path
 from typing import BinaryIO
 
 from toolpath_stiff.errors import FileError
-
-if sys.platform != "win32":  # nothing is locked there, and what a killed run leaves stays
-    import fcntl
+from toolpath_stiff.locks import beside, hold, is_at, reason, remove_parts, writing_errors
 
 NOT_WINDOWS = frozenset(b"\x81\x8d\x8f\x90\x9d")  # bytes that Windows' Latin-1 (cp1252) leaves undefined
 LARGEST_BYTES = 1 << 30  # of a file that is read
 BLOCK = 1 << 20  # bytes written at once
 NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)  # the last is Windows'
-WAIT_SECONDS = 10.0  # for another run that writes to the same place
-LONGEST_NAME = 60  # letters of a target in the name of what lies beside it: names may have 255 bytes
 # renameat2(2); what says that this file system, or this folder, cannot be exchanged
 AT_FDCWD, RENAME_EXCHANGE = -100, 2
 NOT_EXCHANGED = (errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.EPERM, errno.EACCES, errno.EBUSY, errno.EXDEV)
 
 Content = str | bytes | Iterable[str | bytes]
-
-
-def reason(error: OSError) -> str:
-    """What an error of the system says."""
-    return error.strerror or str(error) or type(error).__name__
 
 
 def write_atomically(path: str | Path, content: Content) -> Path:
@@ -66,29 +48,26 @@ def written_beside(contents: Mapping[str | Path, Content]) -> Iterator[Callable[
     with ExitStack() as stack:
         steps = []
         for path, content in contents.items():
-            with _errors_of(path):
+            with writing_errors(path):
                 steps.append(stack.enter_context(_beside_its_place(Path(path), content)))
 
         def put() -> None:
             for path, step in zip(contents, steps, strict=True):
-                with _errors_of(path):
+                with writing_errors(path):
                     step()
 
         yield put
 
 
 @contextmanager
-def _errors_of(path: str | Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise FileError(f"cannot write {str(path)!r}: {reason(error)}") from None
-
-
-@contextmanager
 def _beside_its_place(path: Path, content: Content) -> Iterator[Callable[[], None]]:
     if path.exists() and not path.is_file() and not path.is_dir():
-        yield lambda: _to_device(path, content)
+
+        def to_device() -> None:
+            with path.open("wb") as stream:
+                stream.writelines(encoded(content))
+
+        yield to_device
         return
     target = Path(os.path.realpath(path))
     if target.is_symlink() or target.is_dir():  # realpath leaves nothing else a link
@@ -108,18 +87,6 @@ def _beside_its_place(path: Path, content: Content) -> Iterator[Callable[[], Non
                     temporary.unlink()
 
 
-def remove_parts(prefix: Path) -> None:
-    """Take away what killed runs left of files that they wrote: `beside(file, "part-")` and more letters."""
-    for left in prefix.parent.iterdir():
-        if left.name.startswith(prefix.name):
-            _remove_if_left(left)
-
-
-def _to_device(path: Path, content: Content) -> None:
-    with path.open("wb") as stream:
-        stream.writelines(encoded(content))
-
-
 def _put(held: BinaryIO, temporary: Path, target: Path) -> None:
     if sys.platform == "win32":  # where an open file cannot be renamed
         held.close()
@@ -133,7 +100,7 @@ def _new_file(prefix: Path) -> tuple[int, Path]:
         path = prefix.with_name(prefix.name + os.urandom(4).hex())
         handle = os.open(path, NEW_FILE, 0o666)
         hold(handle)
-        if _is_at(path, handle):  # not taken away by another run between the two calls
+        if is_at(path, handle):  # not taken away by another run between the two calls
             return handle, path
         os.close(handle)
 
@@ -155,7 +122,7 @@ def _write(handle: int, content: Content) -> str:
         while rest:
             rest = rest[os.write(handle, rest) :]
     os.fsync(handle)
-    return _checksum(crc, size)
+    return f"{crc:08x}-{size}"
 
 
 def checksum(path: Path) -> str:
@@ -169,10 +136,6 @@ def checksum(path: Path) -> str:
     with path.open("rb", buffering=0) as stream:
         while block := stream.read(BLOCK):
             crc, size = zlib.crc32(block, crc), size + len(block)
-    return _checksum(crc, size)
-
-
-def _checksum(crc: int, size: int) -> str:
     return f"{crc:08x}-{size}"
 
 
@@ -227,168 +190,6 @@ def encoded(content: Content) -> Iterator[bytes]:
             yield piece.encode("utf-8", "replace") if isinstance(piece, str) else piece
 
 
-# -- who writes where --------------------------------------------------------------------------------------------------
-
-
-def beside(target: Path, what: str) -> Path:
-    """The name beside a file or folder of what belongs to it while it is written."""
-    name = target.name
-    if len(name) > LONGEST_NAME:  # the letters of a name are up to four bytes
-        digest = hashlib.sha256(os.fsencode(name)).hexdigest()[:16]
-        name = f"{name[:LONGEST_NAME]}-{digest}"
-    return target.with_name(f".{name}.tps-{what}")
-
-
-def hold(handle: int) -> bool:
-    """Lock an open file or folder until it is closed, or its process ends; False where another holds it.
-
-    True as well where the file system knows no locks: nobody is kept out there.
-    """
-    if sys.platform == "win32":
-        return True
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        return not isinstance(error, BlockingIOError | PermissionError)
-    return True
-
-
-def is_left(path: Path) -> bool:
-    """Whether something that is locked while it is used is there and not locked: its process was killed."""
-    if sys.platform == "win32":
-        return False
-    try:
-        handle = os.open(path, os.O_RDONLY)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:  # held, or no locks here: nobody can tell
-        return False
-    finally:
-        os.close(handle)
-    return True
-
-
-def _remove_if_left(path: Path) -> None:
-    if is_left(path):
-        with suppress(OSError):
-            path.unlink()
-
-
-def _is_at(path: Path, handle: int) -> bool:
-    try:
-        return os.path.samestat(path.stat(), os.fstat(handle))
-    except OSError:
-        return False
-
-
-@contextmanager
-def locked(lock: Path, what: str, wait: float | None = None) -> Iterator[None]:
-    """Hold a lock file, which says who does: process, host, command.
-
-    Parameters
-    ----------
-    lock
-        Its name; made, and removed at the end.
-    what
-        What is written under it, for the message.
-    wait
-        Seconds to wait for another run, `WAIT_SECONDS` unless given.
-
-    Raises
-    ------
-    InputError
-        Another run holds it; the message names that run.
-    """
-    import platform  # numpy has it already; `socket` would be loaded for one name
-
-    end = time.monotonic() + (WAIT_SECONDS if wait is None else wait)
-    while True:
-        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
-        if hold(handle) and _is_at(lock, handle):
-            break
-        holder = _holder(handle)
-        os.close(handle)
-        if holder and time.monotonic() > end:
-            raise FileError(f"{what} is being written by {holder}", hint="wait for it, or choose another folder")
-        time.sleep(0.02)
-    try:
-        command = shlex.join([Path(sys.argv[0] or "python").name, *sys.argv[1:]])[:500]
-        told = {"process": os.getpid(), "host": platform.node(), "command": command}
-        os.ftruncate(handle, 0)
-        os.write(handle, (json.dumps(told) + "\n").encode())
-        yield
-    finally:
-        with suppress(OSError):
-            lock.unlink()
-        os.close(handle)
-
-
-def _holder(handle: int) -> str:
-    """Who wrote a lock file."""
-    try:
-        told = json.loads(os.read(handle, 4096))
-        return f"another run: {told['command']} (process {told['process']} on {told['host']})"
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # it has not written its name yet
-        return "another run"
-
-
-_JOURNALS: dict[Path, int] = {}  # those that this process holds
-
-
-def announce(journal: Path, name: str) -> None:
-    """Note in a journal that something is about to be written; held until `forget`, or its process ends.
-
-    Raises `InputError`.
-    """
-    with _errors_of(journal):
-        handle = _JOURNALS.get(journal)
-        if handle is None or not _is_at(journal, handle):
-            journal.parent.mkdir(parents=True, exist_ok=True)
-            handle = _JOURNALS[journal] = os.open(journal, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-            hold(handle)
-        os.write(handle, f"{name}\n".encode())
-        os.fsync(handle)
-
-
-def forget(journal: Path) -> None:
-    """Take a journal away: what it announced is there."""
-    journal.unlink(missing_ok=True)
-    handle = _JOURNALS.pop(journal, None)
-    if handle is not None:
-        os.close(handle)
-
-
-@contextmanager
-def temporary_folder(prefix: str) -> Iterator[Path]:
-    """A new folder among the system's temporary ones, removed at the end; those of killed runs are removed as well."""
-    import tempfile
-
-    place = Path(tempfile.gettempdir())
-    for left in place.glob(f"{prefix}*"):
-        if left.is_dir() and not left.is_symlink() and is_left(left):
-            shutil.rmtree(left, ignore_errors=True)
-    while True:
-        folder = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
-        try:
-            handle = os.open(folder, os.O_RDONLY) if sys.platform != "win32" else None
-        except FileNotFoundError:  # another run took it for a killed one's before it was held
-            continue
-        if handle is None or (hold(handle) and _is_at(folder, handle)):
-            break
-        os.close(handle)
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        if handle is not None:
-            os.close(handle)
-
-
-# -- reading -----------------------------------------------------------------------------------------------------------
-
-
 def is_file(path: str | Path) -> bool:
     """Whether there is such a file; False as well for a name that none can have (too long, a circle of links)."""
     try:
@@ -404,8 +205,8 @@ def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
         with Path(path).open("rb") as stream:
             content = _read(stream, most)
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        told = reason(error) if isinstance(error, OSError) else str(error)
-        raise FileError(f"cannot read {what} {str(path)!r}: {told}") from None
+        cause = reason(error) if isinstance(error, OSError) else str(error)
+        raise FileError(f"cannot read {what} {str(path)!r}: {cause}") from None
     if len(content) > most:
         raise FileError(f"{what} {str(path)!r} has more than {most / 1e6:.0f} MB", hint="is it the right file?")
     return content
@@ -460,20 +261,13 @@ def check_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path], r
     Raises `InputError` for the first of them unless `replace`.
     """
     given = [Path(file) for file in inputs if is_file(file)]
-    found = [Path(out) for out in outputs if any(_is_same(Path(out), file) for file in given)]
-    if found and not replace:
+    read = [Path(out) for out in outputs if is_file(out) and any(Path(out).samefile(file) for file in given)]
+    if read and not replace:
         raise FileError(
-            f"{str(found[0])!r} is read here and would be written over",
+            f"{str(read[0])!r} is read here and would be written over",
             hint="write somewhere else, or say --replace (replace=True): the old file is kept beside the new one",
         )
-    return found
-
-
-def _is_same(out: Path, file: Path) -> bool:
-    try:
-        return out.samefile(file)
-    except OSError:  # one of them is not there
-        return False
+    return read
 
 
 def keep_old(file: str | Path) -> Path | None:

@@ -6,7 +6,6 @@ says what is wrong, the same for both.
 
 from __future__ import annotations
 
-import builtins
 import inspect
 import math
 import re
@@ -140,21 +139,23 @@ def number_in(value: Any) -> float:
         return math.nan
 
 
-class _Names(dict[str, Any]):
-    """The names that annotations are read with; what only type checkers import is taken for a list."""
-
-    def __missing__(self, name: str) -> type:
-        return list
+def _hints(function: Callable[..., Any]) -> dict[str, Any]:
+    """The annotations of a function; types that only type checkers import stand as `object`."""
+    unknown: dict[str, Any] = {}
+    while True:
+        try:
+            return get_type_hints(function, None, unknown, include_extras=True)
+        except NameError as error:
+            unknown[str(error.name)] = object
 
 
 @cache
 def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
     """The arguments of a function that are options, by name."""
     function = inspect.unwrap(getattr(function, "__func__", function))
-    names = _Names({**vars(builtins), **function.__globals__})
     texts = parameter_texts(function)
     arguments = {}
-    for name, hint in get_type_hints(function, {}, names, include_extras=True).items():
+    for name, hint in _hints(function).items():
         parts = [hint, *get_args(hint)]
         marks = [mark for part in parts for mark in getattr(part, "__metadata__", ())]
         option = next((mark for mark in marks if isinstance(mark, Option)), None)

@@ -30,18 +30,16 @@ from types import MappingProxyType
 from toolpath_stiff.errors import FileError
 from toolpath_stiff.files import (
     Content,
-    beside,
     check_outputs,
     checksum,
     exchange,
     free_name,
-    locked,
-    reason,
     sync_folder,
     write_file,
     written_beside,
 )
 from toolpath_stiff.hints import both_names
+from toolpath_stiff.locks import beside, locked, writing_errors
 
 MANIFEST = ".tps-files.json"
 INCOMPLETE = "INCOMPLETE.txt"  # a file of the run like the others, until it comes to its end
@@ -146,17 +144,23 @@ def write_folder(
     target = Path(os.path.realpath(folder))
     marked: Mapping[str, Content | Callable[[], Content]] = {}
     if elsewhere or unfinished:
-        marked = {INCOMPLETE: _incomplete_text(command, elsewhere)}
-    with _errors_of(folder), _folders_above(target), locked(_lock(target), repr(str(folder))):
+        files = "".join(f", with {file}" for file in elsewhere)
+        not_yet = "While this file is here, it has not come to its end: run it again."
+        marked = {INCOMPLETE: f"`tps {command}` writes here{files}. {not_yet}\n"}
+    with writing_errors(folder, "write to"), _folders_above(target), locked(_lock(target), repr(str(folder))):
         _clear_up_held(target)
         in_the_way = _refused(Path(folder), [*marked, *contents], rules)
         old = read_manifest(target)
-        stage = _stage(target)
+        outside, inside = _stages(target)
+        stage = outside if not target.is_dir() or _can_be_exchanged(target) else inside
         try:
             new = stage / NEW
             new.mkdir(parents=True)
-            hashes = {name: write_file(new / name, _made(one)) for name, one in {**marked, **contents}.items()}
-            manifest = Manifest(command, _relative(target, rules.of), {name: (sha,) for name, sha in hashes.items()})
+            sums = {
+                name: (write_file(new / name, content() if callable(content) else content),)
+                for name, content in {**marked, **contents}.items()
+            }
+            manifest = Manifest(command, _relative(target, rules.of), sums)
             write_file(new / MANIFEST, manifest.text())
             with written_beside(elsewhere) as put_elsewhere:
                 kept = _put(target, stage, old, [file.name for file in in_the_way])
@@ -164,18 +168,13 @@ def write_folder(
             if elsewhere and not unfinished:
                 (target / INCOMPLETE).unlink()
         finally:
-            for one in _stages(target):
-                if not (one / WHOLE / MANIFEST).exists():  # else it could not be taken back: the next run carries it on
-                    shutil.rmtree(one, ignore_errors=True)
+            for left in (outside, inside):
+                if not (left / WHOLE / MANIFEST).exists():  # else it could not be taken back: the next run goes on
+                    shutil.rmtree(left, ignore_errors=True)
     for name, kept_as in kept.items():
         if rules.kept is not None:
             rules.kept(Path(folder) / name, Path(folder) / kept_as)
     return [Path(folder) / name for name in contents]
-
-
-def _incomplete_text(command: str, elsewhere: Iterable[str | Path]) -> str:
-    files = "".join(f", with {file}" for file in elsewhere)
-    return f"`tps {command}` writes here{files}. While this file is here, it has not come to its end: run it again.\n"
 
 
 def incomplete(folder: str | Path) -> str:
@@ -186,10 +185,6 @@ def incomplete(folder: str | Path) -> str:
     return ""
 
 
-def _made(content: Content | Callable[[], Content]) -> Content:
-    return content() if callable(content) else content
-
-
 def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules()) -> list[Path]:
     """What `write_folder` would refuse, before anything is computed; the files that it will keep with `rules.replace`.
 
@@ -198,7 +193,7 @@ def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules(
     InputError
         As `write_folder`.
     """
-    with _errors_of(folder):
+    with writing_errors(folder, "write to"):
         clear_up([folder])
         return _refused(Path(folder), names, rules)
 
@@ -212,14 +207,16 @@ def _refused(target: Path, names: Iterable[str], rules: Rules) -> list[Path]:
     touched = [target / name for name in dict.fromkeys([*names, *old.files])]
     in_the_way = check_outputs(touched, rules.inputs, rules.replace)
     if rules.replace:
-        return list(dict.fromkeys([*in_the_way, *(target / name for name in names if _told(target, name, old, rules))]))
+        return list(
+            dict.fromkeys([*in_the_way, *(target / name for name in names if _objection(target, name, old, rules))])
+        )
     if holds_others(target, rules.of):
         raise FileError(
             f"{str(target)!r} holds the results of {', '.join(map(repr, old.of))} (seen from there)", hint=_OTHER_FOLDER
         )
     for name in names:
-        if told := _told(target, name, old, rules):
-            raise FileError(f"{str(target / name)!r} {told}", hint=ELSEWHERE)
+        if objection := _objection(target, name, old, rules):
+            raise FileError(f"{str(target / name)!r} {objection}", hint=ELSEWHERE)
     return []
 
 
@@ -229,7 +226,7 @@ def holds_others(folder: Path, of: Sequence[str]) -> bool:
     return bool(of and old.of and old.of != _relative(folder, of))
 
 
-def _told(folder: Path, name: str, old: Manifest, rules: Rules) -> str:
+def _objection(folder: Path, name: str, old: Manifest, rules: Rules) -> str:
     """Why a file must not be replaced; nothing where it may."""
     if not os.path.lexists(folder / name):
         return ""
@@ -279,10 +276,7 @@ def _is_ours(folder: Path, name: str, manifest: Manifest) -> bool:
 
 def _relative(folder: Path, of: Sequence[str]) -> tuple[str, ...]:
     """Files as seen from the folder, names that are no files as they are."""
-    return tuple(Path(os.path.relpath(one, folder)).as_posix() if Path(one).exists() else one for one in of)
-
-
-# -- to their places ---------------------------------------------------------------------------------------------------
+    return tuple(Path(os.path.relpath(name, folder)).as_posix() if Path(name).exists() else name for name in of)
 
 
 def _lock(folder: Path) -> Path:
@@ -293,12 +287,6 @@ def _lock(folder: Path) -> Path:
 def _stages(folder: Path) -> tuple[Path, Path]:
     """Where the temporary folder of a run may be: beside the folder, or in it."""
     return beside(folder, "stage"), folder / STAGE
-
-
-def _stage(folder: Path) -> Path:
-    """Where it is this time: beside what is new or can be exchanged."""
-    outside, inside = _stages(folder)
-    return outside if not folder.is_dir() or _can_be_exchanged(folder) else inside
 
 
 def _can_be_exchanged(folder: Path) -> bool:
@@ -318,9 +306,10 @@ def _put(folder: Path, stage: Path, old: Manifest, in_the_way: Iterable[str]) ->
         sync_folder(folder.parent)
         return {}
     kept = {name: free_name(name, lambda free: os.path.lexists(folder / free)) for name in in_the_way}
-    own = [name for name in _own(folder, old) if name not in kept]
+    # The names in the folder that are the tool's: the manifest, and the files that are as they were written.
+    ours = [MANIFEST, *(name for name in old.files if name not in kept and _is_ours(folder, name, old))]
     if stage.parent != folder:
-        if _exchanged(folder, new, own, kept):
+        if _exchanged(folder, new, ours, kept):
             return kept
         inside = _stages(folder)[1]
         inside.mkdir()
@@ -333,14 +322,9 @@ def _put(folder: Path, stage: Path, old: Manifest, in_the_way: Iterable[str]) ->
     return kept
 
 
-def _own(folder: Path, old: Manifest) -> list[str]:
-    """The names in a folder that are the tool's: the manifest, and the files that are as they were written."""
-    return [name for name in (MANIFEST, *old.files) if name == MANIFEST or _is_ours(folder, name, old)]
-
-
-def _exchanged(folder: Path, new: Path, own: Sequence[str], kept: Mapping[str, str]) -> bool:
+def _exchanged(folder: Path, new: Path, ours: Sequence[str], kept: Mapping[str, str]) -> bool:
     """Give the new folder what is the user's in the old one, and exchange them; False where that cannot be done."""
-    taken = {name: kept.get(name, name) for name in _names(folder) if name not in own}
+    taken = {file.name: kept.get(file.name, file.name) for file in folder.iterdir() if file.name not in ours}
     linked = []
     try:
         for name, becomes in taken.items():
@@ -360,15 +344,11 @@ def _exchanged(folder: Path, new: Path, own: Sequence[str], kept: Mapping[str, s
             (new / becomes).unlink()
         return False
     sync_folder(folder.parent)
-    for name in _names(new):  # written by somebody else in this very moment
-        now = folder / taken.get(name, name)
-        if name not in own and not (os.path.lexists(now) and os.path.samestat((new / name).lstat(), now.lstat())):
-            (new / name).replace(now)
+    for file in list(new.iterdir()):  # written by somebody else in this very moment
+        now = folder / taken.get(file.name, file.name)
+        if file.name not in ours and not (os.path.lexists(now) and os.path.samestat(file.lstat(), now.lstat())):
+            file.replace(now)
     return True
-
-
-def _names(folder: Path) -> list[str]:
-    return [entry.name for entry in folder.iterdir()]
 
 
 def _move_in(folder: Path, stage: Path, old: Manifest, kept: Mapping[str, str], again: bool = False) -> None:
@@ -379,9 +359,9 @@ def _move_in(folder: Path, stage: Path, old: Manifest, kept: Mapping[str, str], 
     whole, gone = stage / WHOLE, stage / GONE
     moves: list[tuple[Path, Path]] = []
 
-    def move(one: Path, to: Path) -> None:
-        one.rename(to)
-        moves.append((one, to))
+    def move(file: Path, to: Path) -> None:
+        file.rename(to)
+        moves.append((file, to))
 
     try:
         gone.mkdir(exist_ok=True)
@@ -404,8 +384,8 @@ def _move_in(folder: Path, stage: Path, old: Manifest, kept: Mapping[str, str], 
         sync_folder(folder)
     except BaseException:
         if not again:
-            for one, to in reversed(moves):
-                to.rename(one)
+            for file, to in reversed(moves):
+                to.rename(file)
             whole.rename(stage / NEW)
         raise
 
@@ -447,12 +427,3 @@ def _folders_above(folder: Path) -> Iterator[None]:
             with suppress(OSError):  # not empty: someone else uses it by now
                 parent.rmdir()
         raise
-
-
-@contextmanager
-def _errors_of(folder: str | Path) -> Iterator[None]:
-    """An error of the system becomes an `InputError`."""
-    try:
-        yield
-    except OSError as error:
-        raise FileError(f"cannot write to {str(folder)!r}: {reason(error)}") from None

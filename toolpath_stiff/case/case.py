@@ -39,8 +39,9 @@ from toolpath_stiff.case.files import (
 from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES, read_case, recorded
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import FileError, InputError, TpsError
-from toolpath_stiff.files import read_bytes, reason
+from toolpath_stiff.files import read_bytes
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.locks import reason
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import arguments_of

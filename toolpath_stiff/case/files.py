@@ -12,7 +12,8 @@ from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import announce, forget, read_bytes, write_atomically
+from toolpath_stiff.files import read_bytes, write_atomically
+from toolpath_stiff.locks import announce, forget
 from toolpath_stiff.readings.measurements import NIST_TABLE_1
 
 JOURNAL = ".tps-adding"  # what a step is about to bring into these rooms, until case.toml names it

@@ -26,7 +26,8 @@ from toolpath_stiff.case.files import (
 )
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import beside, forget, is_file, is_left, read_text, remove_parts, write_atomically
+from toolpath_stiff.files import is_file, read_text, write_atomically
+from toolpath_stiff.locks import beside, forget, is_left, remove_parts
 from toolpath_stiff.machine.writer import toml_text
 from toolpath_stiff.results_folder import clear_up
 from toolpath_stiff.toml_reader import TomlReader, is_number, shortened

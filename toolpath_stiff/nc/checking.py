@@ -73,9 +73,14 @@ def check_lines(
         raise ProgramError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
         return _check_cutter_location(lines, name, origin or default_origin, bool(block_delete), controller)
-    at = None if origin is None else _pose(origin)
+    placed = None if origin is None else _pose(origin)
     request = Request(
-        lines, name, origin=at, default_origin=_pose(default_origin), block_delete=block_delete, controller=controller
+        lines,
+        name,
+        origin=placed,
+        default_origin=_pose(default_origin),
+        block_delete=block_delete,
+        controller=controller,
     )
     run, start, errors, ending = _checked_run(request)
     state, frames, tally, posted = run.state, run.state.frames, run.tally, request.posted

@@ -191,10 +191,7 @@ def _with_feed(program: ReadProgram, request: Request) -> ReadProgram:
 
 
 def _on_the_part(
-    program: ReadProgram,
-    request: Request,
-    tip_held: Sequence[tuple[int, bool]] = (),
-    offsets: Offsets | None = None,
+    program: ReadProgram, request: Request, tip_held: Sequence[tuple[int, bool]] = (), offsets: Offsets | None = None
 ) -> ReadProgram:
     """A program with the moves of the tool on the part, if it was posted for another machine."""
     program = _with_feed(program, request)

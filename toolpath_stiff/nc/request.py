@@ -84,7 +84,7 @@ class Request:
 
     @property
     def zero(self) -> tuple[ShopPose | None, ShopPose]:
-        """Where G54's zero sits, mm and degrees, as the caller says, and by default.
+        """G54's zero, mm and degrees, as the caller says, and by default.
 
         A program that was posted for another machine is read in that one's coordinates first.
         """

@@ -21,7 +21,8 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from toolpath_stiff.api.inputs import finite
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.files import is_file, reason
+from toolpath_stiff.files import is_file
+from toolpath_stiff.locks import reason
 from toolpath_stiff.studio.actions import do, take_file
 from toolpath_stiff.studio.page import exported, page
 from toolpath_stiff.studio.picture import document
