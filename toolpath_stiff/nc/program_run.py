@@ -324,12 +324,8 @@ class ProgramRun:
         self._restore(at)
         level = self._levels.pop()
         if level.again or to < level.back:
-            raise self._fail(
-                at,
-                f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram",
-                "a block after the call, which is not repeated",
-                column=flow.column,
-            )
+            found = f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram"
+            raise self._fail(at, found, "a block after the call, which is not repeated", column=flow.column)
         return to
 
     def _restore(self, at: int) -> None:

@@ -22,21 +22,17 @@ def work_offset(state: State, block: CurrentBlock, code: str) -> None:
 
 def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
     """G54.1 P and G154 P: an additional offset; the controller file or G10 must have defined it."""
-    word = block.codes[code]
     if code not in state.dialect.additional:
-        known = " or ".join(state.dialect.additional)
-        raise block.fail(
-            word, f"is not a code of the dialect {state.dialect.name}", f"{known} P" if known else "G54 to G59.3"
-        )
-    _additional(state, block, word, code, block.whole("P", word))
+        known = f"{' or '.join(state.dialect.additional)} P" if state.dialect.additional else "G54 to G59.3"
+        raise block.fail(code, f"is not a code of the dialect {state.dialect.name}", known)
+    _additional(state, block, block.codes[code], code, block.whole("P", block.codes[code]))
 
 
 def numbered_offset(state: State, block: CurrentBlock, code: str) -> None:
     """G110 to G129: Haas' older names of G154 P1 to P20."""
-    word = block.codes[code]
     if state.dialect.name != "haas":
-        raise block.fail(word, "is a work offset of Haas' controls", hint="name the control with --dialect")
-    _additional(state, block, word, "G154", int(code[1:]) - FIRST_NUMBERED + 1)
+        raise block.fail(code, "is a work offset of Haas' controls", hint="name the control with --dialect")
+    _additional(state, block, block.codes[code], "G154", int(code[1:]) - FIRST_NUMBERED + 1)
 
 
 def _additional(state: State, block: CurrentBlock, word: Word, code: str, number: int | None) -> None:
