@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.inference.noise import Noise
     from toolpath_stiff.inference.prediction import Predictor
     from toolpath_stiff.machine.model import Machine
-    from toolpath_stiff.readings.measurements import Measurements
+    from toolpath_stiff.readings.measurements import Readings
     from toolpath_stiff.stiffness.contract import Effect
     from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -136,7 +136,7 @@ def predictors_are_shared() -> Iterator[None]:
 
     plain = machine_toml(nist())
 
-    def shared(machine: Machine, data: Measurements, effect_files: Sequence[str | Path] = ()) -> Predictor:
+    def shared(machine: Machine, data: Readings, effect_files: Sequence[str | Path] = ()) -> Predictor:
         """`Predictor(...)`; of the nist machine without effects of a user's own, that of the design."""
         known = not effect_files and machine_toml(machine) == plain
         return predictor_for(data) if known else Predictor(machine, data, effect_files)
@@ -161,7 +161,7 @@ def joint_columns_are_shared() -> Iterator[None]:
         """`Predictor.joint_columns`."""
         return joint_columns_once("readings", own.machine, own.data, lambda: of_readings(own), own.effect_files)
 
-    def for_plan(model: StiffnessModel, readings: Measurements) -> FloatArray:
+    def for_plan(model: StiffnessModel, readings: Readings) -> FloatArray:
         """`forecasts.joint_columns`."""
         if model.given is None or any(is_foreign(one.effect) for one in (*model.effects, *model.instruments)):
             return of_plan(model, readings)

@@ -20,7 +20,7 @@ from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_m
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.reader import parse_program
-from toolpath_stiff.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.readings.measurements import Readings, read_measurements
 from toolpath_stiff.report.compare.page import text as compare_text
 from toolpath_stiff.report.machine import machine_figures
 from toolpath_stiff.report.update.page import text as update_text
@@ -232,7 +232,7 @@ def test_a_parameter_of_a_constant_law():
 
 
 @cache
-def campaign(law: str) -> tuple[str, Measurements]:
+def campaign(law: str) -> tuple[str, Readings]:
     """The paper's poses on a rig machine of that law, as text and as read."""
     rows, _ = case.make_case(5, "paper", "none", 0.01, parse_nominal(text_with(law), "mine.toml"))
     text = exercise.csv_text(rows)

@@ -19,7 +19,7 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.comparison.compare import Comparison, compare
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.report.compare.load_path import load_path_png
 from toolpath_stiff.report.compare.page import PICTURES, QUESTIONS, compare_html, residuals_csv
 from toolpath_stiff.report.compare.page import text as terminal_text
@@ -27,15 +27,15 @@ from toolpath_stiff.report.compare.page import text as terminal_text
 NASTY = '<script>alert("1")</script>$x^2$'
 
 
-def quick(data: Measurements) -> Comparison:
+def quick(data: Readings) -> Comparison:
     return compare(nist(), data, draws=100)
 
 
-def one_reading() -> Measurements:
+def one_reading() -> Readings:
     return readings_by_hand([55e6], position=(0.0, 0.0, 1.0))
 
 
-def oblique() -> Measurements:
+def oblique() -> Readings:
     """Directions that are no axis, poses all alike, names that would like to be code."""
     direction = np.random.default_rng(0).normal(size=(9, 3))
     return readings_by_hand(
@@ -43,7 +43,7 @@ def oblique() -> Measurements:
     )
 
 
-def with_a_wild_reading() -> Measurements:
+def with_a_wild_reading() -> Readings:
     data = campaign(60, layout="paper")[0]
     return replace(data, stiffness=np.where(np.arange(len(data)) == 10, 3.0 * data.stiffness, data.stiffness))
 

@@ -28,7 +28,7 @@ from toolpath_stiff.inference.noise import Noise, noise_models
 from toolpath_stiff.inference.prediction import Predictor, idle_on
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.machine.writer import machine_toml
-from toolpath_stiff.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.readings.measurements import Readings, read_measurements
 from toolpath_stiff.rig import case, exercise
 from toolpath_stiff.rig import hidden as hidden_module
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -51,7 +51,7 @@ OPTIONAL_COLUMNS = (
 )  # fmt: skip
 
 
-def read_text(text: str, machine: Machine | None = None) -> Measurements:
+def read_text(text: str, machine: Machine | None = None) -> Readings:
     """Measurements from the text of a file."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "measurements.csv"
@@ -66,14 +66,14 @@ def campaign(
     hidden: str = "none",
     size: float | None = None,
     nuisances: hidden_module.Nuisances | None = None,
-) -> tuple[Measurements, dict[str, Any]]:
+) -> tuple[Readings, dict[str, Any]]:
     """A blind campaign on the NIST machine and its truth."""
     rows, truth = case.make_case(seed, layout=layout, hidden=hidden, size=size, nuisances=nuisances)
     return read_text(exercise.csv_text(rows)), truth
 
 
 @cache
-def table_1() -> Measurements:
+def table_1() -> Readings:
     """The paper's own 42 readings."""
     return read_measurements("nist-table1", nist())
 
@@ -88,7 +88,7 @@ def readings_by_hand(
     minutes: ArrayLike | None = None,
     force: ArrayLike | None = None,
     sd: ArrayLike | None = None,
-) -> Measurements:
+) -> Readings:
     """Readings (n,) in N/m, columns that are not given missing; without clampings each reading has its own."""
     n = len(np.asarray(stiffness))
 
@@ -100,7 +100,7 @@ def readings_by_hand(
 
     given = {"point": point, "clamp": clamp, "setup": setup, "time_min": minutes, "force_N": force, "sd_N_per_mm": sd}
     rows = np.broadcast_to(np.asarray(direction, dtype=float), (n, 3))
-    return Measurements(
+    return Readings(
         position=np.array(np.broadcast_to(np.asarray(position, dtype=float), (n, 3))),
         angles=np.zeros((n, 3)),
         direction=rows / np.linalg.norm(rows, axis=1, keepdims=True),
@@ -165,7 +165,7 @@ PREDICTORS: dict[tuple[Any, ...], Predictor] = {}
 DESIGN = ("position", "angles", "direction", "force", "tool_extension", "time", "temperature", "setup")
 
 
-def predictor_for(data: Measurements) -> Predictor:
+def predictor_for(data: Readings) -> Predictor:
     """The nist machine's answers to these readings; for campaigns of one design worked out once.
 
     All that the model says of readings depends on how they are taken, not on what they show.
@@ -187,7 +187,7 @@ READ_OFF = ("stiffness", "sd", "file", "line", "notes", "warnings")  # what read
 def joint_columns_once(
     which: str,
     machine: Machine,
-    data: Measurements,
+    data: Readings,
     columns: Callable[[], FloatArray],
     files: Sequence[str | Path] = (),
 ) -> FloatArray:
@@ -243,7 +243,7 @@ def judged(seed: int, layout: str = "tilted", hidden: str = "none", size: float 
     return judge(problem, noise, testable_effects(problem.predictor)[0], seed=0)
 
 
-def make_problem(machine: Machine, data: Measurements, noise: Noise) -> tuple[Problem, FloatArray]:
+def make_problem(machine: Machine, data: Readings, noise: Noise) -> tuple[Problem, FloatArray]:
     """Data, model and scatter, ready for fits; and the covariance (n, n) of ln readings."""
     problem = Problem.of(Predictor(machine, data), noise)
     return problem, problem.scatter.covariance.dense()
@@ -255,7 +255,7 @@ def correlated_covariance(own: ArrayLike, shared: ArrayLike) -> Covariance:
     return Covariance(own, Groups.by(np.arange(len(own))), 0.0, np.asarray(shared, dtype=float).T)
 
 
-def examined(machine: Machine, data: Measurements, **options: Any) -> Diagnosis:
+def examined(machine: Machine, data: Readings, **options: Any) -> Diagnosis:
     """A diagnosis without the plan of what to measure next."""
     return diagnose(machine, data, plan_next=False, **options)
 

@@ -15,7 +15,7 @@ from tests.stiffness.cases import nist
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.planning.forecasts import Rival
-from toolpath_stiff.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.readings.measurements import Readings, read_measurements
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 
@@ -42,7 +42,7 @@ READING_SD = 0.02
 
 
 @cache
-def table_1_design() -> Measurements:
+def table_1_design() -> Readings:
     """The paper's 42 readings, as if their load of 1000 N were known."""
     data = read_measurements("nist-table1", nist())
     return replace(data, missing=tuple(name for name in data.missing if name != "force_N"))

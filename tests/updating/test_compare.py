@@ -17,18 +17,18 @@ from toolpath_stiff.comparison.residuals import directions, planes, radius, zone
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.errors import error_figures
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.readings.measurements import Readings, read_measurements
 from toolpath_stiff.rig import case, exercise
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 FEW = 300  # simulated sets of readings: enough to tell 5 % from 1 %
 
 
-def quick(data: Measurements, **options) -> Comparison:
+def quick(data: Readings, **options) -> Comparison:
     return compare(nist(), data, draws=FEW, **options)
 
 
-def softened(data: Measurements, rows, factor: float) -> Measurements:
+def softened(data: Readings, rows, factor: float) -> Readings:
     return replace(data, stiffness=np.where(rows, factor * data.stiffness, data.stiffness))
 
 

@@ -12,17 +12,17 @@ from tests.updating.cases import active, correlated_covariance, readings_by_hand
 from toolpath_stiff.comparison.principles import assess, model_free_checks, symmetries
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 
 ROUND = 1e-6  # relative: joints of the packaged machine are given to 1e-7 m of some metres
 
 
-def modelled(data: Measurements, effects=()) -> Measurements:
+def modelled(data: Readings, effects=()) -> Readings:
     """The same readings without scatter, from the model."""
     return replace(data, stiffness=np.exp(Predictor(nist(), data).log_stiffness(effects=effects)))
 
 
-def checked(data: Measurements, repeat: float = 0.02):
+def checked(data: Readings, repeat: float = 0.02):
     noise = simple_noise(len(data), repeat)
     spread = correlated_covariance(noise.repeat**2, np.zeros((len(data), 0)))
     draws = np.random.default_rng(0).normal(size=(400, len(data))) * repeat
@@ -30,7 +30,7 @@ def checked(data: Measurements, repeat: float = 0.02):
     return assess(checks, data, spread, draws), cannot
 
 
-def turned_poses() -> Measurements:
+def turned_poses() -> Readings:
     """A pose and its images by 120 and 240 degrees, along X, Y, Z; the turned X direction too."""
     turns = np.radians([0.0, 120.0, 240.0])
     positions, directions = [], []

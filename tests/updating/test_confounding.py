@@ -19,7 +19,7 @@ from toolpath_stiff.inference.detectable import Detectable, detectable_sizes
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.hypotheses import Family, score_families
 from toolpath_stiff.inference.quadrature import score_single
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect
@@ -35,7 +35,7 @@ class SoftJoint(type(find_effect("joint_compliance"))):  # type: ignore[misc]
     name = "soft_joint"
 
 
-def searched(data: Measurements, repeat: float = 0.02) -> tuple[Problem, list[Family]]:
+def searched(data: Readings, repeat: float = 0.02) -> tuple[Problem, list[Family]]:
     problem, _ = make_problem(nist(), data, simple_noise(len(data), repeat, 0.01, 0.01, 0.5e-3))
     effects: list[Effect] = [find_effect(name) for name in NAMES]
     return problem, score_families(problem, [*effects, SoftJoint()], problem.score_base())

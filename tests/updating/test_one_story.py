@@ -31,7 +31,7 @@ from toolpath_stiff.hints import Asked, parted
 from toolpath_stiff.inference.errors import raised_text, scatter_text
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.planning.rivals import errors_so_far, rivals_of
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.report import explanations as diagnose_report
 from toolpath_stiff.report.compare import page as compare_report
 from toolpath_stiff.report.compare.load_path import stiffness_deviation_percent
@@ -47,7 +47,7 @@ PROVENANCE = {"command": "tps update a.csv", "data_sha256": "0" * 64}
 MEAN = "mean_abs_error_percent"
 
 
-def compared(data: Measurements) -> Comparison:
+def compared(data: Readings) -> Comparison:
     return compare(nist(), data, draws=100)
 
 
@@ -57,12 +57,12 @@ def told(verdict: str) -> dict[str, Any]:
     return replace(diagnosed(*CASES[verdict]), line="tps diagnose a.csv").to_dict()
 
 
-def updated(data: Measurements, *names: str, **options: Any) -> dict[str, Any]:
+def updated(data: Readings, *names: str, **options: Any) -> dict[str, Any]:
     """The document of an update."""
     return update_of(data, *names, **options).document
 
 
-def update_of(data: Measurements, *names: str, **options: Any) -> Update:
+def update_of(data: Readings, *names: str, **options: Any) -> Update:
     found = build_ladder(nist(), data, [parse_addition(name, data) for name in names], **options)
     return replace(found, provenance=PROVENANCE, names=("a.csv",))
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.comparison.compare import Comparison
     from toolpath_stiff.diagnosis.result import Diagnosis
     from toolpath_stiff.machine.model import Machine as MachineModel
-    from toolpath_stiff.readings.measurements import Measurements as Readings
+    from toolpath_stiff.readings.measurements import Readings
 
 
 Noise = float | tuple[float, float] | None

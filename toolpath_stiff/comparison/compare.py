@@ -35,7 +35,7 @@ from toolpath_stiff.inference.noise import Noise, Scatter, covariance, noise_mod
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.readings.history import StrutHistory
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.units import certain
 
@@ -98,7 +98,7 @@ class Comparison(FolderResult):
     shown_by: ClassVar[str] = "compare.page"
 
     predictor: Predictor
-    data: Measurements
+    data: Readings
     noises: tuple[Noise, ...]
     log_model: FloatArray
     residual: FloatArray
@@ -149,7 +149,7 @@ class Comparison(FolderResult):
 
 def compare(
     machine: Machine,
-    data: Measurements,
+    data: Readings,
     *,
     noise: float | tuple[float, float] | None = None,
     strut_spread: float = STRUT_SPREAD,
@@ -243,7 +243,7 @@ def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int,
 
 
 def _beside_tip(
-    machine: Machine, data: Measurements, effect_files: Sequence[str | Path], noise: Noise, seed: int
+    machine: Machine, data: Readings, effect_files: Sequence[str | Path], noise: Noise, seed: int
 ) -> tuple[BesideTip, StrutHistory]:
     """Readings of loops beside the tip against the machine as its file has it; struts alone over their dates."""
     if data.beside is None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.readings.measurements import Measurements, measured_path
+from toolpath_stiff.readings.measurements import Readings, measured_path
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -31,7 +31,7 @@ class LinkShares:
     poses: int
 
 
-def load_path_shares(model: StiffnessModel, data: Measurements) -> LinkShares:
+def load_path_shares(model: StiffnessModel, data: Readings) -> LinkShares:
     """Shares at the measured poses, each counted once."""
     setup = np.unique(data.setup, return_inverse=True)[1]
     keys = np.concatenate([data.position, data.angles, data.tool_extension[:, None], setup[:, None]], axis=1)
@@ -44,7 +44,7 @@ def load_path_shares(model: StiffnessModel, data: Measurements) -> LinkShares:
     return LinkShares(names, np.array(by_axis), len(distinct))
 
 
-def _by_link(model: StiffnessModel, data: Measurements) -> FloatArray:
+def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
     """(n, links) m/N along each row's direction."""
     loaded = exact.under_load(model, measured_path(model, data), data.direction)
     path, links, f = loaded.path, loaded.links, loaded.forces

@@ -11,7 +11,7 @@ from toolpath_stiff.comparison.residuals import directions
 from toolpath_stiff.inference.covariances import Covariance
 from toolpath_stiff.readings.dates import day_of, short_dates
 from toolpath_stiff.readings.history import StrutHistory, history
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.readings.strut_series import StrutReadings
 
 STANDS_OUT = 3.0  # standard deviations from which a loop is said to read something else than the model has
@@ -56,7 +56,7 @@ class BesideTip:
     readings: tuple[LoopReadingFigures, ...] = ()
 
 
-def beside_tip(data: Measurements, log_model: FloatArray, spread: Covariance) -> BesideTip:
+def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> BesideTip:
     """Readings of loops beside the tip.
 
     Parameters
@@ -106,7 +106,7 @@ def beside_tip(data: Measurements, log_model: FloatArray, spread: Covariance) ->
     return BesideTip(tuple(means), tuple(readings))
 
 
-def strut_history(data: Measurements, log_model: FloatArray, seed: int) -> StrutHistory:
+def strut_history(data: Readings, log_model: FloatArray, seed: int) -> StrutHistory:
     """Struts measured alone, over their dates and by the sign of their force.
 
     Readings at several lengths are reduced to the mean of these by the model's own stiffness, `log_model` (n,).

@@ -25,7 +25,7 @@ from toolpath_stiff.comparison.residuals import directions, radius
 from toolpath_stiff.inference.covariances import Covariance
 from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import mm_from_m
 
 SAME = 1e-3  # m, poses and joints closer than this are one
@@ -97,7 +97,7 @@ def symmetries(machine: Machine) -> list[FloatArray]:
     return [q for q in candidates if maps(q, machine.frame_joints) and maps(q, machine.platform_joints)]
 
 
-def model_free_checks(machine: Machine, data: Measurements) -> tuple[list[Check], list[NotChecked]]:
+def model_free_checks(machine: Machine, data: Readings) -> tuple[list[Check], list[NotChecked]]:
     """The checks that n readings allow; for the others, why not."""
     cells, turns = _cells(data), symmetries(machine)
     threefold = sum(np.linalg.det(q) > 0 for q in turns) == 2
@@ -124,7 +124,7 @@ def model_free_checks(machine: Machine, data: Measurements) -> tuple[list[Check]
     return [check for _, checks, _ in kinds for check in checks], cannot
 
 
-def assess(checks: list[Check], data: Measurements, covariance: Covariance, draws: FloatArray) -> list[CheckOutcome]:
+def assess(checks: list[Check], data: Readings, covariance: Covariance, draws: FloatArray) -> list[CheckOutcome]:
     """Size, statistic and adjusted probability of every check.
 
     `draws` (m, n): simulated scatter, in which the largest statistic of all checks is looked up as well.
@@ -147,7 +147,7 @@ def assess(checks: list[Check], data: Measurements, covariance: Covariance, draw
     return outcomes
 
 
-def _cells(data: Measurements) -> dict[tuple[Any, ...], NDArray[np.int64]]:
+def _cells(data: Readings) -> dict[tuple[Any, ...], NDArray[np.int64]]:
     """Rows of one pose, tool, set-up, loop, load and direction: (pose, rest, direction) -> rows."""
     groups = repeat_groups(data)
     found = {}
@@ -166,7 +166,7 @@ def _mean(n: int, rows: NDArray[np.int64], weight: float = 1.0) -> FloatArray:
     return weights
 
 
-def _on_axis(data: Measurements, cells: dict[tuple[Any, ...], NDArray[np.int64]]) -> Iterator[Check]:
+def _on_axis(data: Readings, cells: dict[tuple[Any, ...], NDArray[np.int64]]) -> Iterator[Check]:
     """Differences ln k_x - ln k_y at upright poses on the axis."""
     for (pose, rest, direction), rows in cells.items():
         i = int(rows[0])
@@ -185,7 +185,7 @@ def _on_axis(data: Measurements, cells: dict[tuple[Any, ...], NDArray[np.int64]]
 
 
 def _images(
-    data: Measurements, cells: dict[tuple[Any, ...], NDArray[np.int64]], turns: list[FloatArray]
+    data: Readings, cells: dict[tuple[Any, ...], NDArray[np.int64]], turns: list[FloatArray]
 ) -> Iterator[Check]:
     """Two readings, or two sums 1/k_x + 1/k_y, that a symmetry of the machine maps onto each other."""
     n = len(data)
@@ -217,7 +217,7 @@ def _images(
             yield Check(IMAGES, weights, f"{where}, 1/k along X and Y added: {{percent}}", broken, size)
 
 
-def _is_image(data: Measurements, q: FloatArray, i: int, j: int) -> bool:
+def _is_image(data: Readings, q: FloatArray, i: int, j: int) -> bool:
     turn = data.rotation
     near = float(np.abs(q @ data.position[i] - data.position[j]).max()) < SAME
     return near and float(np.abs(q @ turn[i] @ q.T - turn[j]).max()) < UPRIGHT
@@ -228,7 +228,7 @@ def _named(direction: tuple[float, ...]) -> str:
     return named.get(tuple(abs(v) for v in direction), "({:.2g}, {:.2g}, {:.2g})".format(*direction))
 
 
-def _proportionality(data: Measurements) -> Iterator[Check]:
+def _proportionality(data: Readings) -> Iterator[Check]:
     """Slope of ln k over ln F within readings that differ in the load only, for a doubling of the load."""
     if "force_N" in data.missing:
         return
@@ -251,7 +251,7 @@ def _proportionality(data: Measurements) -> Iterator[Check]:
             )
 
 
-def _setups(data: Measurements) -> Iterator[Check]:
+def _setups(data: Readings) -> Iterator[Check]:
     """Means of the differences between two set-ups at poses and directions measured in both."""
     columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
     columns += [data.tool_extension[:, None], data.force[:, None]]

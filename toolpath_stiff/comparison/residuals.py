@@ -17,7 +17,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
 from toolpath_stiff.comparison.structure import Pattern
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.readings.measurements import Measurements, model_stiffness
+from toolpath_stiff.readings.measurements import Readings, model_stiffness
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 AXIS_ALIGNED = 0.999  # |cosine| from which a direction counts as X, Y or Z
@@ -127,14 +127,14 @@ class Residuals:
         return np.asarray(number.reshape(-1), dtype=np.int64)
 
 
-def directions(data: Measurements) -> TextArray:
+def directions(data: Readings) -> TextArray:
     """(n,) "X", "Y", "Z" or "oblique"."""
     axis = np.argmax(np.abs(data.direction), axis=1)
     along = np.abs(data.direction)[np.arange(len(data)), axis] >= AXIS_ALIGNED
     return np.where(along, np.array(["X", "Y", "Z"])[axis], "oblique")
 
 
-def planes(data: Measurements) -> TextArray:
+def planes(data: Readings) -> TextArray:
     """(n,) name of each reading's plane: heights in groups, or in three bands if there are many."""
     z = data.position[:, 2]
     order = np.argsort(z, kind="stable")
@@ -151,12 +151,12 @@ def planes(data: Measurements) -> TextArray:
     return np.array(named.get(count, heights))[group]
 
 
-def radius(data: Measurements) -> FloatArray:
+def radius(data: Readings) -> FloatArray:
     """(n,) m from the machine's axis."""
     return np.hypot(data.position[:, 0], data.position[:, 1])
 
 
-def zones(data: Measurements) -> TextArray:
+def zones(data: Readings) -> TextArray:
     """(n,) "on the axis", "near the axis" or "far from the axis"; "" where all are on it."""
     r = radius(data)
     largest = float(r.max())
@@ -223,7 +223,7 @@ def varies(values: FloatArray) -> bool:
     return len(known) >= 3 and float(np.ptp(known)) > 1e-9 * max(float(np.abs(known).max()), 1e-12)
 
 
-def labels(data: Measurements) -> tuple[list[Label], list[str]]:
+def labels(data: Readings) -> tuple[list[Label], list[str]]:
     """Names to hold residuals against, only those with two levels or more; notes about those with too many."""
     clamp, file = data.clamp, data.file
     if len(set(file.tolist())) == 1:
@@ -258,7 +258,7 @@ CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose
 ALL = "all"
 
 
-def patterns(data: Measurements, numbers: list[Variable], names: list[Label]) -> list[Pattern]:
+def patterns(data: Readings, numbers: list[Variable], names: list[Label]) -> list[Pattern]:
     """Everything that is looked for in n residuals; patterns equal to one before are only named with it."""
     kept: dict[bytes, list[Pattern]] = {}
     for pattern in _candidates(data, numbers, names):
@@ -270,7 +270,7 @@ def patterns(data: Measurements, numbers: list[Variable], names: list[Label]) ->
     return [replace(first, same=tuple(other.name for other in others)) for first, *others in kept.values()]
 
 
-def _candidates(data: Measurements, numbers: list[Variable], names: list[Label]) -> Iterator[Pattern]:
+def _candidates(data: Readings, numbers: list[Variable], names: list[Label]) -> Iterator[Pattern]:
     """Levels of the labels and slopes along the variables, in all directions and in each."""
     along, whole = directions(data), np.ones(len(data), dtype=bool)
     axes = np.unique(along).tolist()

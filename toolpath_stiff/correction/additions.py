@@ -9,7 +9,7 @@ from typing import Any
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, Component, candidates_of
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 
@@ -31,7 +31,7 @@ class Addition:
     effect: Effect
     choice: Mapping[str, Any]
 
-    def candidates(self, data: Measurements) -> list[Candidate]:
+    def candidates(self, data: Readings) -> list[Candidate]:
         """What may be fitted: one candidate a choice that is left open."""
         discrete = [p for p in self.effect.parameters if p.discrete]
         if not self.choice:
@@ -41,7 +41,7 @@ class Addition:
         return [Candidate(self.effect, tuple(values.items()), real)]
 
 
-def parse_addition(text: str, data: Measurements, effect_files: Sequence[str | Path] = ()) -> Addition:
+def parse_addition(text: str, data: Readings, effect_files: Sequence[str | Path] = ()) -> Addition:
     """`weak_strut`, `weak_strut:strut=3`, `gauge_scale:direction=Z,setup=riser`.
 
     Raises
@@ -70,7 +70,7 @@ def parse_addition(text: str, data: Measurements, effect_files: Sequence[str | P
     return Addition(effect, choice)
 
 
-def _chosen(parameter: Parameter, value: str, text: str, data: Measurements) -> Any:
+def _chosen(parameter: Parameter, value: str, text: str, data: Readings) -> Any:
     """The value of a choice. A direction may be called by its axis, a set-up must be one of the data's."""
     if parameter.kind == "text":
         setups = sorted(set(data.setup.tolist()) - {""})

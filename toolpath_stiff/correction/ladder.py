@@ -43,7 +43,7 @@ from toolpath_stiff.inference.noise import Noise, noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import Effect
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ MOST_EFFECTS = 4  # that `--auto` adds
 
 def build_ladder(
     machine: Machine,
-    data: Measurements,
+    data: Readings,
     additions: Sequence[Addition] = (),
     *,
     strut_law: bool = False,
@@ -124,7 +124,7 @@ def build_ladder(
 
 
 def _check(
-    machine: Machine, data: Measurements, additions: Sequence[Addition], strut_law: bool, keep_law: bool, auto: bool
+    machine: Machine, data: Readings, additions: Sequence[Addition], strut_law: bool, keep_law: bool, auto: bool
 ) -> None:
     if strut_law and keep_law:
         raise InputError("--strut-law and --keep-strut-law", expected="one of them")
@@ -169,7 +169,7 @@ class _Work:
     fields: dict[tuple[str, ...], _Field] = field(default_factory=dict)
 
     @property
-    def data(self) -> Measurements:
+    def data(self) -> Readings:
         return self.problem.predictor.data
 
     def step(self, name: str, fit: Fit) -> Step:

@@ -16,7 +16,7 @@ from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
 
@@ -57,7 +57,7 @@ class Outcome:
     """
 
     given: Machine
-    data: Measurements
+    data: Readings
     noise: Noise
     problem: Problem
     steps: tuple[Step, ...]

@@ -16,7 +16,7 @@ from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import HeldOut, held_out, of_readings
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.machine.model import StrutLaw
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import json_number, mm_from_m, n_per_um_from_n_per_m
 
 
@@ -50,7 +50,7 @@ class Step:
     along: NDArray[np.str_]
 
     @classmethod
-    def of(cls, name: str, fit: Fit, data: Measurements, held: HeldOut | None = None) -> Step:
+    def of(cls, name: str, fit: Fit, data: Readings, held: HeldOut | None = None) -> Step:
         """Of a fit to these data; `held`: its residuals at left-out points, where they are known."""
         left_out = held_out(fit, data.point) if held is None else held
         return cls(name, fit, left_out.of_readings(data.tip), data.tip, np.asarray(directions(data.of_tip)))

@@ -32,7 +32,7 @@ from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
 LIKELIHOOD, MEAN_ERROR = OBJECTIVES = ("likelihood", "mean-error")
@@ -40,7 +40,7 @@ LIKELIHOOD, MEAN_ERROR = OBJECTIVES = ("likelihood", "mean-error")
 
 def update(
     machine: Machine,
-    data: Measurements,
+    data: Readings,
     add: Sequence[str] = (),
     *,
     strut_law: bool = False,
@@ -134,7 +134,7 @@ def update(
 
 def update_by_mean_error(
     machine: Machine,
-    data: Measurements,
+    data: Readings,
     *,
     force: bool = False,
     noise: float | tuple[float, float] | None = None,
@@ -215,7 +215,7 @@ def _next(updated: Machine, machine_file: str, asked: Asked, effect_files: Seque
     ]
 
 
-def _bars(machine: Machine, data: Measurements, seed: int, progress: Callable[[str], None] | None) -> BarCurve | None:
+def _bars(machine: Machine, data: Readings, seed: int, progress: Callable[[str], None] | None) -> BarCurve | None:
     """The paper's Figure 3; None where the machine carries bars as an effect."""
     if any(entry.name == "platform_flexibility" for entry in machine.effects):
         return None

@@ -35,7 +35,7 @@ from toolpath_stiff.planning.rivals import rivals_of
 from toolpath_stiff.planning.rows import plan_rows
 from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
@@ -49,7 +49,7 @@ FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect
 
 def diagnose(
     machine: Machine,
-    data: Measurements,
+    data: Readings,
     *,
     noise: float | tuple[float, float] | None = None,
     strut_spread: float = STRUT_SPREAD,
@@ -101,7 +101,7 @@ def diagnose(
             expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
         )
 
-    def judged(data: Measurements) -> Judged:
+    def judged(data: Readings) -> Judged:
         predictor, judgements = Predictor(machine, data, effect_files), {}
         effects = testable_effects(predictor)[0]
         for model in noise_models(data, noise, strut_spread, joint_error):
@@ -148,8 +148,8 @@ Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise mo
 
 
 def _without_slips(
-    judged: Callable[[Measurements], Judged], data: Measurements, progress: Callable[[str], None]
-) -> tuple[dict[str, Judgement], Judgement, Measurements, tuple[slips.SuspectEntry, ...], tuple[slips.SlipSize, ...]]:
+    judged: Callable[[Readings], Judged], data: Readings, progress: Callable[[str], None]
+) -> tuple[dict[str, Judgement], Judgement, Readings, tuple[slips.SuspectEntry, ...], tuple[slips.SlipSize, ...]]:
     """Judgements of the readings without rows that are clearly mistyped, these readings, suspects, slips that show."""
     judgements, main = judged(data)
     if main.question or data.beside is not None:

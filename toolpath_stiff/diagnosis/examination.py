@@ -22,7 +22,7 @@ from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
 
@@ -76,7 +76,7 @@ class Examination:
     plausible: list[str]
     judgements: dict[str, Judgement]
     main: Judgement
-    data: Measurements
+    data: Readings
     machine: Machine
     cannot_test: dict[str, tuple[str, ...]]
     as_given: Fit

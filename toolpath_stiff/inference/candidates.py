@@ -21,7 +21,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.splines import Spline
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.contract import Effect, Parameter
@@ -168,7 +168,7 @@ def choice_text(key: str, value: Any) -> str:
     return f"{key} {value}"
 
 
-def candidates_of(effect: Effect, data: Measurements) -> list[Candidate]:
+def candidates_of(effect: Effect, data: Readings) -> list[Candidate]:
     """The candidates of an effect: one a choice. Of several discrete parameters one at a time leaves its default."""
     real = tuple(Component.of(parameter) for parameter in effect.parameters if not parameter.discrete)
     discrete = [parameter for parameter in effect.parameters if parameter.discrete]

@@ -26,7 +26,7 @@ from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Scatter
-from toolpath_stiff.readings.measurements import Measurements, reading_marks
+from toolpath_stiff.readings.measurements import Readings, reading_marks
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import json_number
@@ -91,13 +91,13 @@ class Drawn:
         )
 
 
-def seen_readings(effects: Sequence[Effect], data: Measurements) -> BoolArray:
+def seen_readings(effects: Sequence[Effect], data: Readings) -> BoolArray:
     """(n,) which readings any of these effects was drawn from."""
     marks = {mark for effect in effects for mark in effect.described_from}
     return np.isin(reading_marks(data), sorted(marks)) if marks else np.zeros(len(data), dtype=bool)
 
 
-def drawn(fit: Fit, others: Mapping[str, Fit], data: Measurements) -> Drawn | None:
+def drawn(fit: Fit, others: Mapping[str, Fit], data: Readings) -> Drawn | None:
     """How an explanation stands if its effects are drawn from the readings; None if none of them is.
 
     Parameters
@@ -129,7 +129,7 @@ def drawn(fit: Fit, others: Mapping[str, Fit], data: Measurements) -> Drawn | No
     return replace(found, gain=gains[rival], rival=rival)
 
 
-def foretold(fit: Fit, data: Measurements, seen: BoolArray, scatter: Scatter) -> float:
+def foretold(fit: Fit, data: Readings, seen: BoolArray, scatter: Scatter) -> float:
     """Log probability of the readings that are not `seen`, each point left out in turn, up to a constant.
 
     Given all other readings r_s, the left-out ones are normal: with A the inverse covariance of all residuals r, their

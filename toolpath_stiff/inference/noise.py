@@ -31,7 +31,7 @@ from toolpath_stiff.hints import both_names
 from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 
 At = TypeVar("At")  # where a fit stands
 
@@ -134,7 +134,7 @@ class Noise:
 
 
 def noise_models(
-    data: Measurements,
+    data: Readings,
     stated: float | tuple[float, float] | None = None,
     strut_spread: float = STRUT_SPREAD,
     joint_error: float = JOINT_ERROR,
@@ -170,7 +170,7 @@ def noise_models(
 
 
 def _noise_of_tip(
-    data: Measurements, stated: float | tuple[float, float] | None, strut_spread: float, joint_error: float
+    data: Readings, stated: float | tuple[float, float] | None, strut_spread: float, joint_error: float
 ) -> tuple[Noise, ...]:
     n, copies = len(data), copied(data)
     repeats = None if copies else from_repeats(data)

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
-from toolpath_stiff.readings.measurements import Measurements, measured_path, mechanical_stiffness, shown_by
+from toolpath_stiff.readings.measurements import Readings, measured_path, mechanical_stiffness, shown_by
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
@@ -55,7 +55,7 @@ class _Prepared:
     `products` (m, 6): what each strut's own compliance counts in a reading, at the tip the squared force.
     """
 
-    data: Measurements
+    data: Readings
     which: NDArray[np.int64]
     path: LoadPath
     forces: FloatArray
@@ -87,7 +87,7 @@ class Predictor:
         What `candidates.table_of` has worked out for these readings: every noise model asks for the same.
     """
 
-    def __init__(self, machine: Machine, data: Measurements, effect_files: Sequence[str | Path] = ()) -> None:
+    def __init__(self, machine: Machine, data: Readings, effect_files: Sequence[str | Path] = ()) -> None:
         self.machine = machine
         self.effect_files = tuple(effect_files)
         self.base = build_model(machine, self.effect_files)
@@ -251,12 +251,12 @@ class Predictor:
         return np.asarray(np.log(self._mechanics(self.base, self._timeless)))
 
 
-def idle_on(model: StiffnessModel, data: Measurements) -> dict[str, str]:
+def idle_on(model: StiffnessModel, data: Readings) -> dict[str, str]:
     """Effects of the model that add nothing to these readings -> a sentence for people."""
     return idle_on_readings(model, data.missing, set(data.setup.tolist()))
 
 
-def _prepare(model: StiffnessModel, data: Measurements, timed: bool) -> _Prepared:
+def _prepare(model: StiffnessModel, data: Readings, timed: bool) -> _Prepared:
     """Rows that differ in nothing that mechanics sees are solved once: repeats cost nothing."""
     setups = np.unique(data.setup, return_inverse=True)[1].astype(float)
     columns = [data.position, data.angles, data.direction, data.force[:, None], data.tool_extension[:, None]]

@@ -15,7 +15,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.inference.minima import bounded_minimum
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 
 # Share of wild readings where repeats do not tell, and how much wider they scatter; assumed. Where repeats tell, their
 # share is expected about the assumed one (sd of its logarithm), within the ends.
@@ -47,7 +47,7 @@ FARTHEST = 1.5 * OUTLIER_WIDTH
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
-def repeat_groups(data: Measurements) -> NDArray[np.int64]:
+def repeat_groups(data: Readings) -> NDArray[np.int64]:
     """(n,) number of each reading's group: the same pose, direction, load, tool, set-up and loop."""
     columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
     columns += [data.force[:, None], data.tool_extension[:, None]]
@@ -57,7 +57,7 @@ def repeat_groups(data: Measurements) -> NDArray[np.int64]:
     return np.asarray(groups.reshape(-1), dtype=np.int64)
 
 
-def copied(data: Measurements) -> bool:
+def copied(data: Readings) -> bool:
     """Whether every repeat is the same number as the reading that it repeats: that tells nothing of any scatter."""
     groups = repeat_groups(data)
     _, first = np.unique(groups, return_index=True)
@@ -93,7 +93,7 @@ class Repeats:
         return WORTH * self.differences
 
 
-def from_repeats(data: Measurements) -> Repeats | None:
+def from_repeats(data: Readings) -> Repeats | None:
     """Noise from repeats, or None without enough of them.
 
     What differs between repeats beside chance, the time since zeroing and the order, is projected out first, so that
@@ -169,7 +169,7 @@ class _Contrasts:
         Whether every reading was clamped by itself: the differences then hold clamping too.
     """
 
-    def __init__(self, data: Measurements, groups: NDArray[np.int64]) -> None:
+    def __init__(self, data: Readings, groups: NDArray[np.int64]) -> None:
         means, clamps = Groups.by(groups), Groups.by(data.clamp)
         sizes = np.bincount(means.of)
 
@@ -211,7 +211,7 @@ class _Contrasts:
         return np.asarray(np.abs(pull) / np.maximum(scale, 1e-12))
 
 
-def _drifts(data: Measurements, stiffness: FloatArray) -> FloatArray:
+def _drifts(data: Readings, stiffness: FloatArray) -> FloatArray:
     """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing.
 
     `stiffness` (n,) is the mean of each reading's repeats: a reading's own would carry its noise into the regressor,

@@ -19,7 +19,7 @@ from toolpath_stiff.inference.detectable import POWER_80
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.noise import Scatter
 from toolpath_stiff.inference.prediction import scaled_law
-from toolpath_stiff.readings.measurements import Measurements, model_stiffness
+from toolpath_stiff.readings.measurements import Readings, model_stiffness
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg
 
@@ -136,7 +136,7 @@ class SuspectEntry:
     left_out: bool
 
 
-def mended(data: Measurements, suspects: Sequence[Suspect]) -> Measurements:
+def mended(data: Readings, suspects: Sequence[Suspect]) -> Readings:
     """The readings with the likeliest slip of each suspect mended."""
     columns = {name: getattr(data, name).copy() for name in (*MENDED, "stiffness")}
     for slip in (suspect.slip for suspect in suspects):
@@ -147,7 +147,7 @@ def mended(data: Measurements, suspects: Sequence[Suspect]) -> Measurements:
     return replace(data, **columns)
 
 
-def alone(data: Measurements, suspects: Sequence[Suspect]) -> tuple[Suspect, ...]:
+def alone(data: Readings, suspects: Sequence[Suspect]) -> tuple[Suspect, ...]:
     """Those whose rows are, with the other suspects' rows, all that there is of a tool, a set-up, a loop or a load.
 
     An effect of that tool, set-up or load would look like their slip, and no other reading says which of the two it is.
@@ -163,7 +163,7 @@ def alone(data: Measurements, suspects: Sequence[Suspect]) -> tuple[Suspect, ...
 
 
 def suspect_entries(
-    suspects: Sequence[Suspect], data: Measurements, left_out: Sequence[Suspect] | None
+    suspects: Sequence[Suspect], data: Readings, left_out: Sequence[Suspect] | None
 ) -> list[SuspectEntry]:
     """Suspects for a document; `left_out`: those that were left out of the judgement, None where there was none."""
     entries = []
@@ -217,7 +217,7 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
     return tuple(suspects)
 
 
-def _words(data: Measurements, ways: Sequence[Slip]) -> str:
+def _words(data: Readings, ways: Sequence[Slip]) -> str:
     """Where rows are, and what may be wrong with them."""
     rows = ways[0].rows
     lines = f"line{'s' if len(rows) > 1 else ''} {', '.join(str(line) for line in data.line[rows])}"
@@ -226,7 +226,7 @@ def _words(data: Measurements, ways: Sequence[Slip]) -> str:
     return f"{lines} of {data.file[rows[0]]} {looks}: {either} would fit all other readings"
 
 
-def _tried(data: Measurements) -> int:
+def _tried(data: Readings) -> int:
     """How many slips of single rows there may be."""
     return len(data) * len(list(_slips_of_row(data, np.array([0]))))
 
@@ -290,7 +290,7 @@ def _inflation(fit: Fit) -> float:
     return float(max(1.0, fit.projected.squares(fit.residual) / freedom))
 
 
-def _slips(data: Measurements, rows: Sequence[Rows], clampings: Sequence[Rows]) -> Iterator[Slip]:
+def _slips(data: Readings, rows: Sequence[Rows], clampings: Sequence[Rows]) -> Iterator[Slip]:
     for row in rows:
         yield from _slips_of_row(data, row)
     for members in clampings:
@@ -304,7 +304,7 @@ def _slips(data: Measurements, rows: Sequence[Rows], clampings: Sequence[Rows]) 
                 yield Slip(np.array([first, second]), "direction", stand, meant, {"direction": data.direction[others]})
 
 
-def _slips_of_row(data: Measurements, row: Rows) -> Iterator[Slip]:
+def _slips_of_row(data: Readings, row: Rows) -> Iterator[Slip]:
     yield from _slips_of_pose(data, row)
     stands = _axis(data.direction[row[0]])
     for name, vector in AXES.items():
@@ -316,7 +316,7 @@ def _slips_of_row(data: Measurements, row: Rows) -> Iterator[Slip]:
         yield Slip(row, "stiffness_N_per_mm", f"{value:.6g}", meant, {}, np.array([np.log(factor)]))
 
 
-def _slips_of_pose(data: Measurements, rows: Rows) -> Iterator[Slip]:
+def _slips_of_pose(data: Readings, rows: Rows) -> Iterator[Slip]:
     """A coordinate or an angle with the wrong sign, or off by a usual slip; the same in all rows."""
     for names, field, steps, si, _ in POSE_STEPS:
         values = getattr(data, field)[rows]

@@ -16,7 +16,7 @@ from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.noise import JOINT_ERROR
 from toolpath_stiff.inference.prediction import JOINT_STEP, Predictor
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
@@ -85,7 +85,7 @@ class Forecast:
 def forecast_all(
     machine: Machine,
     rivals: Sequence[Rival],
-    readings: Measurements,
+    readings: Readings,
     effect_files: Sequence[str | Path] = (),
     strut_spread: float = STRUT_SPREAD,
     joint_error: float = JOINT_ERROR,
@@ -109,7 +109,7 @@ def forecast_all(
     return forecasts, good, principal(np.concatenate([strut_spread * predictor.strut_columns(), joints], axis=1))
 
 
-def joint_columns(model: StiffnessModel, readings: Measurements) -> FloatArray:
+def joint_columns(model: StiffnessModel, readings: Readings) -> FloatArray:
     """(m, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
 
     As `Predictor.joint_columns`, but every pose is solved once for all its directions, without load-dependent effects:

@@ -11,7 +11,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import RAD_PER_DEG
 
 T = TypeVar("T")
@@ -126,7 +126,7 @@ class Menu:
         return replace(self, **given | ({"floors": {}} if "heights" in given else {}))
 
     @classmethod
-    def of(cls, data: Measurements) -> Menu:
+    def of(cls, data: Readings) -> Menu:
         """The menu after some measurements: also their poses, set-ups, tools and loads."""
         poses = np.concatenate([data.position, data.angles], axis=1)
         _, first = np.unique(np.round(poses, 6), axis=0, return_index=True)
@@ -153,7 +153,7 @@ def _by_last_use(values: Iterable[T]) -> tuple[T, ...]:
     return tuple(dict.fromkeys(reversed(list(values))))
 
 
-def _lowest(data: Measurements, setup: str) -> float:
+def _lowest(data: Readings, setup: str) -> float:
     """Lowest tool tip measured in a set-up; in one that was never used, the lowest of all."""
     there = data.setup == setup
     return float(data.position[there if there.any() else slice(None), 2].min())

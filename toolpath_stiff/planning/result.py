@@ -22,7 +22,7 @@ from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.rivals import errors_so_far, fitted_rivals, rivals_of, unfitted_rivals
 from toolpath_stiff.planning.rows import PlanRow, plan_rows, visit_entries
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.units import certain
@@ -53,7 +53,7 @@ class Plan(FolderResult):
     shown_by: ClassVar[str] = "plan"
 
     machine: Machine
-    data: Measurements | None
+    data: Readings | None
     choice: RivalPlan | Campaign
     effect_files: tuple[str | Path, ...]
     seed: int
@@ -119,7 +119,7 @@ class Plan(FolderResult):
 
 def plan(
     machine: Machine,
-    data: Measurements | None = None,
+    data: Readings | None = None,
     menu: Menu | None = None,
     *,
     between: Sequence[str] = (),
@@ -195,7 +195,7 @@ def plan(
     return Plan(machine, data, choice, tuple(effect_files), seed)
 
 
-def usual_menu(data: Measurements | None) -> Menu:
+def usual_menu(data: Readings | None) -> Menu:
     """The menu unless anyone says otherwise: what the data have, before any a bare table and a riser."""
     return Menu(setups=(TABLE, RISER)) if data is None else Menu.of(data)
 

@@ -19,7 +19,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.planning.menu import MINUTE, Menu
 from toolpath_stiff.planning.poses import ROUND, draw_poses, reachable
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import min_from_s
 
 AXES = ("X", "Y", "Z")
@@ -69,7 +69,7 @@ class Visits:
     setup: TextArray
     label: TextArray
     loop: TextArray
-    readings: Measurements
+    readings: Readings
     names: TextArray
     rounds: IntArray
     members: IntArray
@@ -249,7 +249,7 @@ def planned_readings(
     setup: TextArray,
     time: FloatArray,
     loop: TextArray | None = None,
-) -> Measurements:
+) -> Readings:
     """Readings that have not been taken.
 
     Parameters
@@ -268,7 +268,7 @@ def planned_readings(
     missing = {"sd_N_per_mm", "clamp", "repeat", "point", "loop", "temperature_C"}
     missing |= {"time_min"} if np.isnan(time).any() else set()
     missing |= set() if (setup != "").any() else {"setup"}
-    return Measurements(
+    return Readings(
         position=pose[:, :3],
         angles=pose[:, 3:],
         direction=np.array([VECTORS[str(name)] for name in names]).reshape(m, 3),

@@ -40,7 +40,7 @@ RISER_ABOVE = 1.0  # m: of the paper's two planes, 353 and 1268 mm, Figure 6 sho
 
 
 @dataclass(frozen=True)
-class Measurements:
+class Readings:
     """n measured stiffnesses. SI; nan or "" where a reading does not say.
 
     Attributes
@@ -115,7 +115,7 @@ class Measurements:
         return np.ones(len(self), dtype=bool) if self.beside is None else ~self.beside.beside
 
     @property
-    def of_tip(self) -> Measurements:
+    def of_tip(self) -> Readings:
         """The readings of the tip alone."""
         return self if self.beside is None else self.select(self.tip)
 
@@ -137,7 +137,7 @@ class Measurements:
         _, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
         return first, which.reshape(-1)
 
-    def select(self, rows: NDArray[Any]) -> Measurements:
+    def select(self, rows: NDArray[Any]) -> Readings:
         """Some of the rows, by mask or index."""
         chosen = {
             f.name: getattr(self, f.name)[rows] for f in fields(self) if isinstance(getattr(self, f.name), np.ndarray)
@@ -154,7 +154,7 @@ class Measurements:
 
 def read_measurements(
     paths: str | Path | Iterable[str | Path], machine: Machine, planned: bool = False, columns: Mapped = None
-) -> Measurements:
+) -> Readings:
     """Read measurement files.
 
     Parameters
@@ -211,7 +211,7 @@ def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
     return RowFile(rows, table_1.columns | {"setup"}, (*table_1.notes, note))
 
 
-def _columns(files: list[RowFile], machine: Machine) -> Measurements:
+def _columns(files: list[RowFile], machine: Machine) -> Readings:
     """Readings as columns; those of loops in m/N until `with_offsets`."""
     rows = [row for file in files for row in file.rows]
 
@@ -242,7 +242,7 @@ def _columns(files: list[RowFile], machine: Machine) -> Measurements:
     dates = np.array([row.date for row in rows], dtype=str)
     unknown = sum(bool(np.isnan(row.length) and np.isnan(row.position[0])) for row in rows)
     bench = f"{unknown} readings of struts alone say neither length_mm nor a pose: taken at the neutral pose"
-    return Measurements(
+    return Readings(
         position=pose[:, :3],
         angles=pose[:, 3:],
         direction=numbers("direction"),
@@ -266,7 +266,7 @@ def _columns(files: list[RowFile], machine: Machine) -> Measurements:
     )
 
 
-def with_offsets(data: Measurements, machine: Machine, widest: float = WIDEST) -> Measurements:
+def with_offsets(data: Readings, machine: Machine, widest: float = WIDEST) -> Readings:
     """The same with the readings of loops, until then m/N with their sd in m/N, as stiffnesses with offsets.
 
     `widest`: relative sd that no loop reading with its offset has more of.
@@ -347,7 +347,7 @@ def _clampings(rows: list[Row], point: TextArray, setup: TextArray) -> TextArray
     )
 
 
-def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:
+def reading_columns(data: Readings) -> dict[str, NDArray[Any]]:
     """Column -> values of a table of the readings, in the shop's units; those that no file has are left out."""
     pose = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles)], axis=1)
     columns: dict[str, NDArray[Any]] = {"file": data.file, "line": data.line, "point": data.point}
@@ -378,7 +378,7 @@ DIGITS = {
 }  # to which readings are told apart: decimals; of N/m, digits
 
 
-def reading_marks(data: Measurements) -> TextArray:
+def reading_marks(data: Readings) -> TextArray:
     """(n,) what tells a reading from others, however its file is called, sorted or laid out.
 
     The first `MARK` digits of the SHA-256 of its pose (to 0.01 mm and 0.001 degrees), its direction (without sign) and
@@ -399,7 +399,7 @@ def reading_marks(data: Measurements) -> TextArray:
     )
 
 
-def measured_path(model: StiffnessModel, data: Measurements) -> LoadPath:
+def measured_path(model: StiffnessModel, data: Readings) -> LoadPath:
     """What the model's effects see of the measurements; a column that is missing is None there.
 
     A pose is solved once, however often it was measured.
@@ -423,7 +423,7 @@ def measured_path(model: StiffnessModel, data: Measurements) -> LoadPath:
     )
 
 
-def model_stiffness(model: StiffnessModel, data: Measurements) -> FloatArray:
+def model_stiffness(model: StiffnessModel, data: Readings) -> FloatArray:
     """(n,) N/m that the model, its instruments included, says each reading should show.
 
     Raises
@@ -439,7 +439,7 @@ def model_stiffness(model: StiffnessModel, data: Measurements) -> FloatArray:
 
 
 def mechanical_stiffness(
-    model: StiffnessModel, path: LoadPath, data: Measurements, equilibrium: FloatArray | None = None
+    model: StiffnessModel, path: LoadPath, data: Readings, equilibrium: FloatArray | None = None
 ) -> FloatArray:
     """(n,) N/m of the machine alone; of loops beside the tip with their offsets, nan where that is no stiffness.
 
@@ -452,6 +452,6 @@ def mechanical_stiffness(
     return np.asarray(1.0 / np.where(joined > 0.0, joined, np.nan))
 
 
-def shown_by(active: ActiveEffect, stiffness: FloatArray, path: LoadPath, data: Measurements) -> FloatArray:
+def shown_by(active: ActiveEffect, stiffness: FloatArray, path: LoadPath, data: Readings) -> FloatArray:
     """(n,) N/m that an instrument shows; the indicator of a loop beside the tip is another one."""
     return np.where(data.tip, active.reading(stiffness, path), stiffness)

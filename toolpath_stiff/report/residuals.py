@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.readings.measurements import Measurements
+    from toolpath_stiff.readings.measurements import Readings
 
 
 RESIDUAL_MAP = "RdBu"  # red: measured softer than modelled, blue: stiffer
@@ -55,7 +55,7 @@ MAP = 2.05  # inch
 
 @drawn
 def before_after_png(
-    data: Measurements,
+    data: Readings,
     before: FloatArray,
     after: FloatArray,
     last: str,
@@ -105,7 +105,7 @@ def before_after_png(
         return figure
 
 
-def _half(figure: Figure, data: Measurements, residual: FloatArray, left: float, limit: float) -> Any:
+def _half(figure: Figure, data: Readings, residual: FloatArray, left: float, limit: float) -> Any:
     """The maps of one model, `left` inches from the edge: a row a height, a column a direction; its points."""
     width, height = figure.get_size_inches()
     directions, levels = _directions(data), _levels(data)
@@ -132,14 +132,14 @@ def _half_title(name: str, held_out: float | None, residual: FloatArray) -> str:
     return text + (f" (at points left out {percent(held_out, 2)})" if held_out is not None else "")
 
 
-def _directions(data: Measurements) -> NDArray[np.str_]:
+def _directions(data: Readings) -> NDArray[np.str_]:
     """(n,) X, Y, Z, or oblique."""
     along = np.abs(data.direction)
     names = np.array(["X", "Y", "Z"])[np.argmax(along, axis=1)]
     return np.where(along.max(axis=1) > ALONG, names, "oblique")
 
 
-def _levels(data: Measurements) -> NDArray[np.int64]:
+def _levels(data: Readings) -> NDArray[np.int64]:
     """(n,) number of the height group, the highest first: each height its own, or as many equal bands as are shown."""
     height = np.round(data.position[:, 2], 3)
     own = np.unique(height)
@@ -149,7 +149,7 @@ def _levels(data: Measurements) -> NDArray[np.int64]:
     return np.asarray(len(own) - np.searchsorted(own, height), dtype=np.int64)
 
 
-def _level_text(data: Measurements, chosen: NDArray[np.bool_]) -> str:
+def _level_text(data: Readings, chosen: NDArray[np.bool_]) -> str:
     heights = mm_from_m(data.position[chosen, 2])
     low, high = float(heights.min()), float(heights.max())
     return f"z {low:.0f} mm" if high - low < 1.0 else f"z {low:.0f} to {high:.0f} mm"
@@ -162,7 +162,7 @@ def _limit(halves: Sequence[FloatArray]) -> float:
     return max(float(np.quantile(sizes, SHOWN)), 1e-3) if len(sizes) else 1.0
 
 
-def _map(axes: Axes, data: Measurements, residual: FloatArray, chosen: NDArray[np.bool_], limit: float) -> Any:
+def _map(axes: Axes, data: Readings, residual: FloatArray, chosen: NDArray[np.bool_], limit: float) -> Any:
     """One map: a disc a pose, readings of one pose averaged; poses above each other stand side by side."""
     everywhere = mm_from_m(data.position[:, :2])
     poses, which = np.unique(
@@ -187,7 +187,7 @@ def _map(axes: Axes, data: Measurements, residual: FloatArray, chosen: NDArray[n
     return drawn
 
 
-def _reach(data: Measurements) -> float:
+def _reach(data: Readings) -> float:
     """Half the larger extent of the measured positions in X and Y, mm."""
     return 0.5 * float(np.ptp(mm_from_m(data.position[:, :2]), axis=0).max()) or 100.0
 
@@ -205,7 +205,7 @@ def _spread(places: FloatArray, step: float) -> FloatArray:
 
 def _scatter_pair(
     figure: Figure,
-    data: Measurements,
+    data: Readings,
     halves: Sequence[FloatArray],
     directions: NDArray[np.str_],
 ) -> None:

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.portrait.portrait import Portrait, Sized
 from toolpath_stiff.portrait.words import portrait_text, term_words, variable_label
-from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.report.diagnose.pictures import titled_figure
 from toolpath_stiff.report.explanations import probability_text
 from toolpath_stiff.report.figure import (
@@ -59,7 +59,7 @@ def _cells(sized: Sized) -> list[str]:
     return [term_words(term), term.link, kind, f"{size} {term.unit} ({low} to {high})", change]
 
 
-def portrait_png(portrait: Portrait | None, data: Measurements) -> Drawing | None:
+def portrait_png(portrait: Portrait | None, data: Readings) -> Drawing | None:
     """PNG: what is left of the readings over what the leading term varies with; how surely it is which link."""
     if portrait is None or not portrait.terms:
         return None
@@ -72,7 +72,7 @@ def portrait_png(portrait: Portrait | None, data: Measurements) -> Drawing | Non
         return drawing(figure)
 
 
-def _points(axes: Axes, data: Measurements, portrait: Portrait) -> None:
+def _points(axes: Axes, data: Readings, portrait: Portrait) -> None:
     """Every reading before (hollow) and after (dots), over the variable or, of a constant, over the term's change."""
     assert portrait.before is not None and portrait.after is not None and portrait.signature is not None
     label, si = variable_label(portrait.terms[0].term)
