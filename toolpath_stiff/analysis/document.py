@@ -142,8 +142,8 @@ def _higher(first: float | None, second: float | None) -> float | None:
 
 def words_turn_the_platform(program: ReadProgram) -> bool:
     """Whether rotary words were taken for the platform's own angles."""
-    own = not program.kinematics and program.dialect != CUTTER_LOCATION
-    return own and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
+    native = not program.kinematics and program.dialect != CUTTER_LOCATION
+    return native and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
 
 
 def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[tuple[int, float]]:

@@ -207,12 +207,12 @@ def _evaluate_fast(task: _Task, rows: slice, new: BoolArray) -> IntArray:
         stand, sure = Extremes(machine, there, lengths, determinant, turn, tool).reach()
         extrapolated = machine.strut_law.room(lengths).min(axis=0) < 0.0
         for into, (_, known), along in zip(samples, directed, compliance, strict=True):
-            at = _part(into, some)
+            into_rows = _part(into, some)
             certain = sure & good & known[some] & (along > 0.0) & (along < np.inf)
             along[~(stand.reachable & known[some])] = np.nan
-            result.put(at, 1.0 / along, lengths.T, extrapolated, stand)
+            result.put(into_rows, 1.0 / along, lengths.T, extrapolated, stand)
             if not certain.all():
-                left.append(_part(at, np.flatnonzero(~certain)))  # they are looked at one by one
+                left.append(_part(into_rows, np.flatnonzero(~certain)))  # they are looked at one by one
     return np.unique(np.concatenate(left)) if left else np.empty(0, dtype=np.int64)
 
 
@@ -234,9 +234,9 @@ def _rows_of_poses(rows: slice, new: BoolArray) -> list[slice | IntArray]:
 
 def _of_one_tool(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]]:
     """Each tool length, nan counts as one, and the rows that have it."""
-    one = _one_if_equal(tool_length)
-    if isinstance(one, float):
-        return [(one, slice(None))]
+    single = _one_if_equal(tool_length)
+    if isinstance(single, float):
+        return [(single, slice(None))]
     lengths, number = np.unique(tool_length, return_inverse=True)
     return [(float(length), np.flatnonzero(number == i)) for i, length in enumerate(lengths)]
 

@@ -191,14 +191,16 @@ def map_stiffness(
     xs, ys, zs = np.linspace(*x, nx), np.linspace(*y, ny), np.array(heights)
     grid = np.stack(np.meshgrid(zs, ys, xs, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
     turned = np.broadcast_to(np.array(abc), grid.shape)
-    found = evaluate(model, grid, turned, np.zeros_like(grid), load=load, force=force, progress=progress)
-    if not found.reachable.any():
-        nearest = int(np.argmax(found.margin))
+    evaluation = evaluate(model, grid, turned, np.zeros_like(grid), load=load, force=force, progress=progress)
+    if not evaluation.reachable.any():
+        nearest = int(np.argmax(evaluation.margin))
         raise UnreachableError(
-            f"nothing of the map is within reach; the nearest point: {found.reach.describe(nearest)}"
+            f"nothing of the map is within reach; the nearest point: {evaluation.reach.describe(nearest)}"
         )
     shape = (len(zs), ny, nx)
-    return StiffnessMap(model, xs, ys, zs, found.stiffness.reshape(shape), found.reachable.reshape(shape), load, abc)
+    return StiffnessMap(
+        model, xs, ys, zs, evaluation.stiffness.reshape(shape), evaluation.reachable.reshape(shape), load, abc
+    )
 
 
 def _check_map(x: tuple[float, float], y: tuple[float, float], load: Load) -> None:

@@ -96,9 +96,9 @@ def _arc_extremes(arcs: Moves) -> FloatArray:
         for opposite in (0.0, np.pi):
             angle = np.mod(turning + opposite, 2.0 * np.pi)
             last_turn = angle + 2.0 * np.pi * np.floor(np.maximum(sweep - angle, 0.0) / (2.0 * np.pi))
-            for at in (angle, last_turn):
-                inside = at < sweep
-                points.append(points_along(arcs, row[inside], (at / sweep)[inside])[0])
+            for turned in (angle, last_turn):
+                inside = turned < sweep
+                points.append(points_along(arcs, row[inside], (turned / sweep)[inside])[0])
     return np.concatenate(points)
 
 
@@ -302,7 +302,9 @@ def check_program(
             "complete": checked.complete,
             "used": [asdict(code) for code in checked.used],
             "unsupported": [asdict(word) for word in checked.unsupported],
-            "findings": [asdict(finding) for finding in sorted(findings, key=lambda one: (one.line, one.column))],
+            "findings": [
+                asdict(finding) for finding in sorted(findings, key=lambda finding: (finding.line, finding.column))
+            ],
             **asdict(whole),
             "tools": tools,
             "operations": operations,

@@ -174,10 +174,10 @@ def analyze_many(
     ['done', 'failed']
     """
     on = machine_from(machine)
-    own = {name: options.pop(name) for name in arguments_of(analyze) if name in options}
-    compared = own.pop("compare_with", None)
+    path_options = {name: options.pop(name) for name in arguments_of(analyze) if name in options}
+    compared = path_options.pop("compare_with", None)
     other = on.like(compared) if isinstance(compared, str | Path) else compared
-    check_options(**own)  # a mistake in them is one error
+    check_options(**path_options)  # a mistake in them is one error
     check_table(table)
     listed, given = _listed(programs)
     example = Program.from_text("", **options)
@@ -188,7 +188,7 @@ def analyze_many(
     rules = Rules(inputs=(*files_read, *on.inputs, *(other.inputs if other else ())), replace=replace)
     out = Path(folder)
     check_folder(out, names(), rules)
-    run = Run(out.absolute(), str(out), pickle.dumps((on, other)), own, plots, table, show_plunges, replace)
+    run = Run(out.absolute(), str(out), pickle.dumps((on, other)), path_options, plots, table, show_plunges, replace)
     reports = report_folders(listed)
     with _folders_for(out, reports):
         # The overview of an earlier run goes, as its reports do from now on, one after the other.

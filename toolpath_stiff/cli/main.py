@@ -201,17 +201,17 @@ REPORT = f"if that does not explain it, run the command again with {TRACEBACK}=1
 
 def last_resort(error: Exception) -> str:
     """What no command foresaw, in one line: memory, recursion, the file system, a defect of this package."""
-    told = " ".join(str(error).split()) or "no more is known"
+    words = " ".join(str(error).split()) or "no more is known"
     if isinstance(error, MemoryError):
-        return f"out of memory ({told}): take a larger --step, fewer --jobs or fewer data; {REPORT}"
+        return f"out of memory ({words}): take a larger --step, fewer --jobs or fewer data; {REPORT}"
     if isinstance(error, RecursionError):
-        return f"something is nested too deeply ({told}); {REPORT}"
+        return f"something is nested too deeply ({words}); {REPORT}"
     if isinstance(error, OSError):
         files = [repr(str(file)) for file in (error.filename, error.filename2) if file is not None]
-        return f"{': '.join([*files, error.strerror or told])}; {REPORT}"
+        return f"{': '.join([*files, error.strerror or words])}; {REPORT}"
     frames = traceback.extract_tb(error.__traceback__)
     place = f", {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
-    return f"an error that should not be ({type(error).__name__}{place}): {told}; {REPORT}"
+    return f"an error that should not be ({type(error).__name__}{place}): {words}; {REPORT}"
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

@@ -70,8 +70,8 @@ class Command:
         """All arguments by name; of one that several functions take, the first."""
         arguments: dict[str, Argument] = {}
         for part in self.takes:
-            own = {part.name: part} if isinstance(part, Argument) else arguments_of(part)
-            arguments |= {name: argument for name, argument in own.items() if name not in arguments}
+            taken = {part.name: part} if isinstance(part, Argument) else arguments_of(part)
+            arguments |= {name: argument for name, argument in taken.items() if name not in arguments}
         return {name: argument for name, argument in arguments.items() if name not in self.without}
 
     def __call__(self, name: str, words: Sequence[str]) -> int:

@@ -217,9 +217,9 @@ def drawing(figure: Figure) -> Drawing:
     figure.patch.set_visible(False)
     figure.draw(renderer)  # type: ignore[arg-type]
     figure.patch.set_visible(True)
-    found = Drawing(_png(np.asarray(renderer.pixels.buffer_rgba())[:, :, :3], DPI))
-    found.svg = _svg_text(renderer.vectors.text(), *figure.get_size_inches())
-    return found
+    both = Drawing(_png(np.asarray(renderer.pixels.buffer_rgba())[:, :, :3], DPI))
+    both.svg = _svg_text(renderer.vectors.text(), *figure.get_size_inches())
+    return both
 
 
 def _twice(name: str) -> Callable[..., None]:
@@ -431,7 +431,10 @@ def _rasterize(figure: Figure) -> None:
     marks: list[tuple[Artist, int]] = []
     for axes in figure.axes:
         marks += [(line, np.size(line.get_xdata())) for line in axes.lines]
-        marks += [(one, max(np.shape(one.get_offsets())[0], len(one.get_paths()))) for one in axes.collections]
+        marks += [
+            (collection, max(np.shape(collection.get_offsets())[0], len(collection.get_paths())))
+            for collection in axes.collections
+        ]
     if sum(count for _, count in marks) > MOST_MARKS:
         for artist, count in marks:
             if count > FEW_MARKS:

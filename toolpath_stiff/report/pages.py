@@ -142,8 +142,8 @@ def markup(template: str, *values: object) -> Markup:
 
 def _part(name: str, *values: object) -> Markup:
     """What a macro of `parts.html` makes."""
-    found: Markup = getattr(_templates().get_template("parts.html").module, name)(*values)
-    return found
+    html: Markup = getattr(_templates().get_template("parts.html").module, name)(*values)
+    return html
 
 
 def section(title: str, body: Markup) -> Markup:

@@ -96,7 +96,7 @@ def page_tables(summary: Mapping[str, Any], weakest: Sequence[int]) -> list[tupl
     `weakest` holds the page's rows of the weakest places.
     """
     several = len(summary["per_operation"]) > 1
-    found = [
+    tables = [
         ("Tools", _tools(summary["per_tool"]), True),
         ("Operations", _operations(summary["per_operation"]) if several else Markup(), True),
         ("Figures", _figures(summary), False),
@@ -106,7 +106,7 @@ def page_tables(summary: Mapping[str, Any], weakest: Sequence[int]) -> list[tupl
         ("Assumptions", bullets(summary["assumptions"]), False),
         ("Read, but not acted upon", _unsupported(summary["unsupported"]), False),
     ]
-    return [entry for entry in found if entry[1]]
+    return [entry for entry in tables if entry[1]]
 
 
 def _figures(summary: Mapping[str, Any]) -> Markup:

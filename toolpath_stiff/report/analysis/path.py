@@ -103,22 +103,22 @@ def _coloured_lines(
         for which in range(CLASSES - 1, -1, -1)
         if len(rows := np.flatnonzero(~rapid & (classes == which)))
     ]
-    found: list[tuple[FloatArray, dict[str, Any]]] = []
+    others: list[tuple[FloatArray, dict[str, Any]]] = []
 
     def add(rows: BoolArray, **style: object) -> None:
         if rows.any():
-            found.append((_polyline(points, np.flatnonzero(rows)), style))
+            others.append((_polyline(points, np.flatnonzero(rows)), style))
 
     add(rapid, color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), zorder=2)
     plunge = ~rapid & (classes == PLUNGE)
     add(plunge, color=PLUNGE_SLATE, linewidth=STROKE, zorder=2.5, solid_capstyle="round")
     if plunge.any():
         ends = points[1:][plunge & ~np.append(plunge[1:], False)]
-        found.append(
+        others.append(
             (ends, {"color": PLUNGE_SLATE, "linestyle": "none", "marker": ".", "markersize": 6, "zorder": 3.5})
         )
     add(~rapid & (classes == UNREACHABLE), color=UNREACHABLE_RED, linewidth=2.2, zorder=4)
-    return points, strokes, found
+    return points, strokes, others
 
 
 def _merged(points: FloatArray, rapid: BoolArray, classes: IntArray) -> tuple[FloatArray, BoolArray, IntArray]:
@@ -140,9 +140,9 @@ def _thinned(points: FloatArray, strokes: Sequence[tuple[IntArray, Any]], axes: 
     `points` (n, 2) are those of a view. Seen from the side, the passes over a surface lie upon each other, and line by
     line they take longer to draw than to compute. A spot is half a pixel wide.
     """
-    at = np.floor(2.0 * axes.transData.transform(points)).astype(np.int64)
-    at -= at.min(axis=0)
-    spot = at[:, 0] * (at[:, 1].max() + 1) + at[:, 1]
+    halves = np.floor(2.0 * axes.transData.transform(points)).astype(np.int64)
+    halves -= halves.min(axis=0)
+    spot = halves[:, 0] * (halves[:, 1].max() + 1) + halves[:, 1]
     between = np.minimum(spot[1:], spot[:-1]) * (spot.max() + 1) + np.maximum(spot[1:], spot[:-1])
     drawn = np.concatenate([rows for rows, _ in strokes[::-1]])
     shown = np.zeros(len(between), dtype=bool)

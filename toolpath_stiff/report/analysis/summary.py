@@ -134,7 +134,11 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
 def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> str:
     """Two machines side by side, the difference in percent of the first."""
     figures, plunges = compared_rows(summary, other, TITLES, "plunges N/mm")
-    rows = [["", *(shortened(machine_text(one), 32) for one in (summary, other)), "difference"], *figures, *plunges]
+    rows = [
+        ["", *(shortened(machine_text(side), 32) for side in (summary, other)), "difference"],
+        *figures,
+        *plunges,
+    ]
     places = [s["weakest"] for s in (summary, other)]
     rows.append(["weakest line", *(str(place["line"]) if place else "-" for place in places), ""])
     rows.append(["extrapolated", *(f"{s['extrapolated_share']:.1%}" for s in (summary, other)), ""])

@@ -217,7 +217,9 @@ def _table(good: Sequence[Outcome]) -> dict[str, Any] | None:
     second = _scale(good, with_plunges=True) if beside else None
     columns = [
         Column("program", "", _link),
-        Column("", "bar", lambda one: ("", [_bar(one, scale), *([_bar(one, second, True)] if second else [])])),
+        Column(
+            "", "bar", lambda outcome: ("", [_bar(outcome, scale), *([_bar(outcome, second, True)] if second else [])])
+        ),
         _figure("min\nN/mm", "min_N_per_mm", "lowest on a cutting move"),
         _figure("mean\nN/mm", "mean_N_per_mm", "by cutting length"),
         _figure("max\nN/mm", "max_N_per_mm"),
@@ -228,7 +230,7 @@ def _table(good: Sequence[Outcome]) -> dict[str, Any] | None:
         *([_figure("change\n%", "compare_mean_difference_percent", CHANGE, 1)] if other is not None else []),
         Column("weakest line", "num text", _place),
         _figure("cutting\nmm", "cutting_length_mm", digits=1),
-        Column("time", "num", lambda one: (_sorted_by(one, "time_s"), duration(one.figure("time_s")))),
+        Column("time", "num", lambda outcome: (_sorted_by(outcome, "time_s"), duration(outcome.figure("time_s")))),
         _figure("out of\nreach", "out_of_reach_samples", "cutting samples that were left out", flag=True),
         _figure("warn-\nings", "warnings", "in the program's own report", flag=True),
     ]

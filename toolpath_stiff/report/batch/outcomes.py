@@ -105,7 +105,9 @@ class Outcome:
 
 def good_and_failed(outcomes: Sequence[Outcome]) -> tuple[list[Outcome], list[Outcome]]:
     """The programs that have figures, and those that failed."""
-    good, failed = ([one for one in outcomes if bool(one.figures) is analyzed] for analyzed in (True, False))
+    good, failed = (
+        [outcome for outcome in outcomes if bool(outcome.figures) is analyzed] for analyzed in (True, False)
+    )
     return good, failed
 
 
