@@ -29,8 +29,8 @@ def discrepancy_forms(predictor: Predictor) -> dict[str, FloatArray]:
             words: kernel.features(MOST_POINTS if words == POINT_TO_POINT else MOST_FEATURES)
             for words, kernel in kernels.items()
         }
-    found: dict[str, FloatArray] = predictor.tables[key]
-    return found
+    forms: dict[str, FloatArray] = predictor.tables[key]
+    return forms
 
 
 POINT_TO_POINT = "from point to point, different by direction"

@@ -110,23 +110,23 @@ def drawn(fit: Fit, others: Mapping[str, Fit], data: Readings) -> Drawn | None:
         The n readings.
     """
 
-    def drawn_here(one: Fit) -> list[Effect]:
-        return [c.effect for c in one.candidates if seen_readings([c.effect], data).any()]
+    def drawn_here(other: Fit) -> list[Effect]:
+        return [c.effect for c in other.candidates if seen_readings([c.effect], data).any()]
 
     effects = drawn_here(fit)
     if not effects:
         return None
     seen = seen_readings(effects, data)
-    found = Drawn(tuple(effect.name for effect in effects), int(seen.sum()), int((~seen).sum()))
+    standing = Drawn(tuple(effect.name for effect in effects), int(seen.sum()), int((~seen).sum()))
     if len(np.unique(data.point[~seen])) < FEWEST_POINTS:
-        return found
+        return standing
     gains = {
-        name: foretold(fit, data, seen, one.scatter) - foretold(one, data, seen, one.scatter)
-        for name, one in others.items()
-        if not drawn_here(one)
+        name: foretold(fit, data, seen, other.scatter) - foretold(other, data, seen, other.scatter)
+        for name, other in others.items()
+        if not drawn_here(other)
     }
     rival = min(gains, key=lambda name: gains[name])
-    return replace(found, gain=gains[rival], rival=rival)
+    return replace(standing, gain=gains[rival], rival=rival)
 
 
 def foretold(fit: Fit, data: Readings, seen: BoolArray, scatter: Scatter) -> float:

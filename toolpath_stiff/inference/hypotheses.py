@@ -95,16 +95,16 @@ def tables_of(problem: Problem, effect: Effect) -> list[Table]:
 
 def signatures(problem: Problem, tables: Iterable[Table]) -> list[list[FloatArray]]:
     """One-sided small-size signatures d ln k / d size of every candidate: subsets of columns (n, p), sizes >= 0."""
-    found = []
+    signs = []
     for table in tables:
         columns = -table.columns / problem.base_compliance[:, None]
         components = table.candidate.components
         if len(components) == 1:
-            found.append([columns * sign for sign in components[0].signs])
+            signs.append([columns * sign for sign in components[0].signs])
         else:
             toward = np.array([c.signs[-1] for c in components])
-            found.append([(columns * toward)[:, list(subset)] for subset in table.candidate.subsets()])
-    return found
+            signs.append([(columns * toward)[:, list(subset)] for subset in table.candidate.subsets()])
+    return signs
 
 
 def probabilities(log_evidence: Mapping[str, float], prior: Mapping[str, float]) -> dict[str, float]:
@@ -114,8 +114,8 @@ def probabilities(log_evidence: Mapping[str, float], prior: Mapping[str, float])
     if not names or logs.max() <= 0.5 * NOTHING:
         return dict.fromkeys(log_evidence, 0.0)
     weights = np.exp(logs - logs.max())
-    found = dict(zip(names, (weights / weights.sum()).tolist(), strict=True))
-    return {name: found.get(name, 0.0) for name in log_evidence}
+    posterior = dict(zip(names, (weights / weights.sum()).tolist(), strict=True))
+    return {name: posterior.get(name, 0.0) for name in log_evidence}
 
 
 SHARE = 0.95
@@ -139,8 +139,8 @@ def averaged_interval(family: Family, j: int) -> FloatArray | None:
     parts, absent = [], 0.0
     for (score, _), share in zip(family.subsets, shares, strict=True):
         if j in score.free:
-            at = 2 + score.free.index(j)
-            sd = float(np.sqrt(max(score.covariance[at, at], 1e-300)))
+            row = 2 + score.free.index(j)
+            sd = float(np.sqrt(max(score.covariance[row, row], 1e-300)))
             parts.append((float(share), float(score.sizes[0][j]), sd))
         else:
             absent += float(share)
@@ -194,11 +194,13 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[fl
     gains = []
     order = np.argsort(structure.surprises(loads)[0])[::-1][:FORMS] if forms.names else np.zeros(0, dtype=int)
     for index in order.tolist():
-        own, turn = np.linalg.eigh(structure.inner(index))
-        own = np.maximum(own, 0.0)
+        values, turn = np.linalg.eigh(structure.inner(index))
+        values = np.maximum(values, 0.0)
         turned = (turn.T @ loads[0, forms.slices[index]]) ** 2
         squared = AMPLITUDES[:, None] ** 2
-        each = -0.5 * np.log1p(squared * own).sum(axis=1) + 0.5 * (squared * turned / (1.0 + squared * own)).sum(axis=1)
+        each = -0.5 * np.log1p(squared * values).sum(axis=1) + 0.5 * (squared * turned / (1.0 + squared * values)).sum(
+            axis=1
+        )
         gains.append(float(np.logaddexp.reduce(each)) - np.log(len(AMPLITUDES)))
     if not gains:
         return score.log_evidence, ""

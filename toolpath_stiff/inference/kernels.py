@@ -41,16 +41,16 @@ class Kernel:
         """
         scale = float(self.diagonal.mean())
         left = self.diagonal / scale
-        found = np.empty((min(most, len(left)), len(left)))
-        for r in range(len(found)):
-            at = int(np.argmax(left))
-            if left.sum() <= LEFT * len(left) or left[at] <= 0.0:
-                return found[:r].T
-            column = self.column(at) / scale - found[:r, at] @ found[:r]
-            found[r] = column / np.sqrt(left[at])
-            left = np.maximum(left - found[r] ** 2, 0.0)
-            left[at] = 0.0
-        return found.T
+        rows = np.empty((min(most, len(left)), len(left)))
+        for r in range(len(rows)):
+            pivot = int(np.argmax(left))
+            if left.sum() <= LEFT * len(left) or left[pivot] <= 0.0:
+                return rows[:r].T
+            column = self.column(pivot) / scale - rows[:r, pivot] @ rows[:r]
+            rows[r] = column / np.sqrt(left[pivot])
+            left = np.maximum(left - rows[r] ** 2, 0.0)
+            left[pivot] = 0.0
+        return rows.T
 
 
 def gaussian_kernel(x: FloatArray) -> Kernel:

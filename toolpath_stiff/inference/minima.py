@@ -50,16 +50,16 @@ def bounded_minimum(function: Callable[[float], float], low: float, high: float,
             before = (low if best >= middle else high) - best
             step = GOLDEN * before
         trial = best + (step if abs(step) >= least else least if step >= 0.0 else -least)
-        found = function(trial)
-        if found <= at_best:
+        value = function(trial)
+        if value <= at_best:
             low, high = (best, high) if trial >= best else (low, best)
-            third, at_third, second, at_second, best, at_best = second, at_second, best, at_best, trial, found
+            third, at_third, second, at_second, best, at_best = second, at_second, best, at_best, trial, value
         else:
             low, high = (trial, high) if trial < best else (low, trial)
-            if found <= at_second or second == best:
-                third, at_third, second, at_second = second, at_second, trial, found
-            elif found <= at_third or third in (best, second):
-                third, at_third = trial, found
+            if value <= at_second or second == best:
+                third, at_third, second, at_second = second, at_second, trial, value
+            elif value <= at_third or third in (best, second):
+                third, at_third = trial, value
     return float(best)
 
 
@@ -72,26 +72,26 @@ def bounded_step(information: FloatArray, gradient: FloatArray, low: FloatArray,
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     matrix, pull = information / np.outer(scale, scale), gradient / scale
     low, high = low * scale, high * scale
-    at, held = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
+    x, held = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
     for _ in range(10 * len(pull)):
         free = np.flatnonzero(~held)
-        wanted = at.copy()
+        wanted = x.copy()
         if len(free):
-            rest = pull[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ at[held]
+            rest = pull[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ x[held]
             wanted[free] = np.linalg.pinv(matrix[np.ix_(free, free)], rcond=1e-12, hermitian=True) @ rest
         over = np.where(wanted > high, high, np.where(wanted < low, low, wanted))
         out = wanted != over
         if out.any():
-            shares = np.where(out, (over - at) / np.where(out, wanted - at, 1.0), np.inf)
+            shares = np.where(out, (over - x) / np.where(out, wanted - x, 1.0), np.inf)
             first = int(np.argmin(shares))
-            at = at + shares[first] * (wanted - at)
-            at[first], held[first] = over[first], True
+            x = x + shares[first] * (wanted - x)
+            x[first], held[first] = over[first], True
             continue
-        at = wanted
-        slope = pull - matrix @ at  # downhill
-        leave = np.where(held, np.where(at >= high, -slope, slope), 0.0)
+        x = wanted
+        slope = pull - matrix @ x  # downhill
+        leave = np.where(held, np.where(x >= high, -slope, slope), 0.0)
         worst = int(np.argmax(leave))
         if leave[worst] <= 1e-12 * max(float(np.abs(pull).max()), 1e-300):
             break
         held[worst] = False
-    return np.asarray(at / scale)
+    return np.asarray(x / scale)

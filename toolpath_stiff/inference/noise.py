@@ -208,9 +208,9 @@ def _noise_of_tip(
             origin += f", and from sd_N_per_mm of {int(rows.sum())} readings, {_percent(*_shared(total))}"
         return (model("measured", repeat, repeats.clamping, freedom, origin, remark),)
     if rows.any():
-        own, clamping = _parts(relative[rows])
-        repeat = np.full(n, np.sqrt(np.mean(own**2)))
-        repeat[rows] = own
+        stating, clamping = _parts(relative[rows])
+        repeat = np.full(n, np.sqrt(np.mean(stating**2)))
+        repeat[rows] = stating
         origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of "
         origin += f"which {100 * clamping:.2g} % is assumed to be clamping"
         if not rows.all():
@@ -350,8 +350,8 @@ class Scatter:
         diagonal, pull, taken = precision.diagonal, precision.times(residual), np.zeros(len(residual))
         taken[wild] = -np.inf
         for _ in range(int(self.most * len(residual)) + 1):
-            own = 1.0 + self.widening * diagonal
-            gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price + taken
+            inflated = 1.0 + self.widening * diagonal
+            gain = self.widening * pull**2 / inflated - np.log(inflated) - 2.0 * self.price + taken
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
@@ -409,16 +409,16 @@ def gauss_newton(
     -------
     The last point, and the equations of the last step.
     """
-    at = start
+    point = start
     for _ in range(steps):
-        here = equations(at)
-        moved = move(at, here)
+        here = equations(point)
+        moved = move(point, here)
         if moved is None:
             break
-        at, step = moved
+        point, step = moved
         if np.abs(step * here.scale).max() < tolerance:
             break
-    return at, here
+    return point, here
 
 
 def scaled_inverse(matrix: FloatArray) -> FloatArray:

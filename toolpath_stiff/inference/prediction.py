@@ -91,9 +91,9 @@ class Predictor:
         self.machine = machine
         self.effect_files = tuple(effect_files)
         self.base = build_model(machine, self.effect_files)
-        own = failures(own_effects(self.base, self.effect_files), machine)
-        told = (*own, *data.warnings, *idle_on(self.base, data).values())
-        self.data = replace(data, warnings=tuple(dict.fromkeys(told)))
+        failed = failures(own_effects(self.base, self.effect_files), machine)
+        warnings = (*failed, *data.warnings, *idle_on(self.base, data).values())
+        self.data = replace(data, warnings=tuple(dict.fromkeys(warnings)))
         self._timeless = _prepare(self.base, data, timed=False)
         self._timed = _prepare(self.base, data, timed=True)
         self.tables: dict[tuple[Any, ...], Any] = {}

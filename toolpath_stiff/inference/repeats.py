@@ -110,8 +110,8 @@ def from_repeats(data: Readings) -> Repeats | None:
         contrasts = _Contrasts(data.select(kept), groups[kept])
         if contrasts.count < FEWEST_CONTRASTS:
             break
-        repeat, clamping, found = _maximum_likelihood(contrasts)
-        result = Repeats(repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found, OUTLIERS)
+        repeat, clamping, clamps = _maximum_likelihood(contrasts)
+        result = Repeats(repeat, clamping if clamps else min(CLAMPING, repeat), contrasts.count, clamps, OUTLIERS)
         wild = contrasts.deviations(result.repeat, result.clamping) > WILD
         if not wild.any():
             break
@@ -134,13 +134,13 @@ def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, fl
     """
     squared, wide = np.minimum(deviations, FARTHEST)[:, None, None] ** 2, OUTLIER_WIDTH**2
     factors, shares = FACTORS[:, None], SHARES
-    own = 1.0 - 1.0 / size[:, None, None]  # of the variance of a deviation
+    own_share = 1.0 - 1.0 / size[:, None, None]  # of the variance of a deviation
     total = np.zeros(np.broadcast_shapes(squared.shape, factors.shape, shares.shape))
     for mine, chance in ((wide, shares), (1.0, 1.0 - shares)):
         for others, odds in ((wide, shares), (1.0, 1.0 - shares)):
-            sd = factors * np.sqrt(own * mine + (1.0 - own) * others)
+            sd = factors * np.sqrt(own_share * mine + (1.0 - own_share) * others)
             total = total + chance * odds * np.exp(-0.5 * squared / sd**2) / sd
-    logs = (np.log(np.maximum(total, 1e-300)) * own).sum(axis=0)
+    logs = (np.log(np.maximum(total, 1e-300)) * own_share).sum(axis=0)
     logs = logs - 0.5 * (np.log(shares / OUTLIERS) / OUTLIER_SPREAD) ** 2
     weights = np.exp(logs - logs.max())
     of_factor, of_share = weights.sum(axis=1) / weights.sum(), weights.sum(axis=0) / weights.sum()

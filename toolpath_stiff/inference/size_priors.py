@@ -157,8 +157,8 @@ def likely_interval(sizes: FloatArray, log_likelihood: FloatArray) -> FloatArray
     _, cumulative = _log_integral(sizes, log_likelihood)
     at_bounds = [float(log_likelihood[end] - log_likelihood.max()) > -0.5 * LIKELY for end in (0, -1)]
     if at_bounds[0] == at_bounds[1]:
-        found = np.interp([0.025, 0.975], cumulative, sizes)
-        return np.array([sizes[0], sizes[-1]]) if at_bounds[0] else found
+        ends = np.interp([0.025, 0.975], cumulative, sizes)
+        return np.array([sizes[0], sizes[-1]]) if at_bounds[0] else ends
     low, high = np.interp([0.05, 0.95], cumulative, sizes)
     return np.array([sizes[0], high]) if at_bounds[0] else np.array([low, sizes[-1]])
 

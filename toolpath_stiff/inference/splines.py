@@ -26,11 +26,11 @@ class Spline:
         """The spline through values (g, n) at knots (g,), at least two."""
         return cls(knots, values, _slopes(knots, values))
 
-    def __call__(self, at: FloatArray) -> FloatArray:
+    def __call__(self, positions: FloatArray) -> FloatArray:
         """(..., n) at positions (...,); beyond the ends the last pieces go on."""
-        piece = np.clip(np.searchsorted(self.knots, at, side="right") - 1, 0, len(self.knots) - 2)
+        piece = np.clip(np.searchsorted(self.knots, positions, side="right") - 1, 0, len(self.knots) - 2)
         step = (self.knots[piece + 1] - self.knots[piece])[..., None]
-        share = (at - self.knots[piece])[..., None] / step
+        share = (positions - self.knots[piece])[..., None] / step
         rest = 1.0 - share
         start, end = self.values[piece], self.values[piece + 1]
         bend = rest * (self.slopes[piece] * step - (end - start)) - share * (

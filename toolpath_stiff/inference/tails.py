@@ -39,11 +39,11 @@ def surprise(value: FloatArray, freedom: FloatArray) -> FloatArray:
     log_gamma = np.array([math.lgamma(half) if half > 0.0 else math.inf for half in (0.5 * freedom).tolist()])
     front = np.broadcast_to(log_gamma, x.shape) + x - a * np.log(x)  # -ln(x^a e^-x / Gamma(a))
     near = x < a + 1.0
-    found = np.empty(x.shape)
+    surprises = np.empty(x.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found[near] = -np.log1p(-np.minimum(_series(a[near], x[near]) * np.exp(-front[near]), 1.0))
-    found[~near] = front[~near] - np.log(_fraction(a[~near], x[~near]))
-    return np.where(np.isnan(found), np.inf, found)  # no degrees of freedom: any value is too much
+        surprises[near] = -np.log1p(-np.minimum(_series(a[near], x[near]) * np.exp(-front[near]), 1.0))
+    surprises[~near] = front[~near] - np.log(_fraction(a[~near], x[~near]))
+    return np.where(np.isnan(surprises), np.inf, surprises)  # no degrees of freedom: any value is too much
 
 
 def _series(a: FloatArray, x: FloatArray) -> FloatArray:

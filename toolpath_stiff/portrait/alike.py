@@ -115,9 +115,9 @@ def _size(selection: Selection, term: Term, scaled: float) -> float:
 def _itself(ground: Ground, terms: list[Term], named: Fit, change: FloatArray) -> NDArray[np.bool_]:
     """(G,) whether a term is what the named effect does, in its own link; `change` (n,) m/N is what it adds."""
     links = {candidate.effect.link for candidate in named.candidates}
-    own = [CATALOGUE_LINKS.get(term.link, term.link) in links for term in terms]
+    in_link = [CATALOGUE_LINKS.get(term.link, term.link) in links for term in terms]
     return np.array(
-        [mine and _correlation(ground.column(t), change) > ITSELF for t, mine in zip(terms, own, strict=True)]
+        [mine and _correlation(ground.column(t), change) > ITSELF for t, mine in zip(terms, in_link, strict=True)]
     )
 
 

@@ -262,11 +262,11 @@ class Ground:
 
     def _turned(self, term: Term, tangents: FloatArray, shapes: FloatArray) -> FloatArray:
         """(s, n) of `turning`, at the term's size or, where it has none, at one as it is usually found."""
-        found = []
+        rows = []
         for tangent, shape in zip(tangents, shapes, strict=True):
             size = term.size or TURNED / max(float(np.sqrt(np.mean((tangent / self.compliance) ** 2))), 1e-12)
-            found.append(self._turned_by(_each(shape, term), min(size, term.bounds[1] * term.si))[0])
-        return np.array(found).reshape(tangents.shape)
+            rows.append(self._turned_by(_each(shape, term), min(size, term.bounds[1] * term.si))[0])
+        return np.array(rows).reshape(tangents.shape)
 
     def slope(self, term: Term) -> FloatArray:
         """(n,) m/N by which what a term adds grows with its size; its `column` unless it is not linear in it."""
@@ -299,10 +299,10 @@ class Ground:
         if share.ndim == 1:
             return np.asarray(share * shapes)
         if shapes.ndim == 3:
-            found = np.einsum("ni,sni->sn", share, shapes)
+            columns = np.einsum("ni,sni->sn", share, shapes)
         else:
-            found = (share.sum(axis=1) if term.where is None else share[:, term.where - 1]) * shapes
-        return self._turned(term, found, shapes) if term.action == "turning" else np.asarray(found)
+            columns = (share.sum(axis=1) if term.where is None else share[:, term.where - 1]) * shapes
+        return self._turned(term, columns, shapes) if term.action == "turning" else np.asarray(columns)
 
     def column(self, term: Term) -> FloatArray:
         """(n,) m/N per unit (SI) of a term's size."""

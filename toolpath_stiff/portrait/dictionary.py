@@ -305,18 +305,18 @@ def products(term: Term, ground: Ground) -> list[Term]:
 
 def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Constants]]:
     """A shape for links that give only, or whose stiffness may change to both sides, as it says the same there."""
-    at = term.constants
-    if (len(term.signs) > 1) == signed or "power" in at:
+    constants = term.constants
+    if (len(term.signs) > 1) == signed or "power" in constants:
         return [(term.shape, term.at)]
     if term.shape == "slope" and signed:  # it begins where it is 0
-        return [("threshold", (("from", at["start"]), ("end", at["end"])))]
-    if term.shape == "threshold" and "from" in at:
-        return [("slope", (("start", at["from"]), ("end", at["end"])))]
+        return [("threshold", (("from", constants["start"]), ("end", constants["end"])))]
+    if term.shape == "threshold" and "from" in constants:
+        return [("slope", (("start", constants["from"]), ("end", constants["end"])))]
     values = ground.values(term.variable, term.column)
     low, high = float(values.min()), float(values.max())
     if term.shape == "slope":  # a straight line to both sides: up or down over the range
         return [("slope", (("start", one), ("end", other))) for one, other in ((low, high), (high, low))]
-    if "side" in at and not signed:  # more on one side is less on the other
+    if "side" in constants and not signed:  # more on one side is less on the other
         return [
             (term.shape, tuple((name, side if name == "side" else value) for name, value in term.at))
             for side in (1.0, -1.0)

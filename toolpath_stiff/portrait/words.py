@@ -53,10 +53,10 @@ MOST_SAID = 3  # terms in a sentence on what else would look the same; a documen
 
 def term_words(term: Term) -> str:
     """What gives way and what it varies with: a clause, without its size."""
-    said = f"{_cause(term)}{_with(term, len(term.signs) > 1)}"
+    clause = f"{_cause(term)}{_with(term, len(term.signs) > 1)}"
     if term.second is None:
-        return said
-    return f"{said}, and this {_with(term.second, signed=False).removeprefix(',').strip()}"
+        return clause
+    return f"{clause}, and this {_with(term.second, signed=False).removeprefix(',').strip()}"
 
 
 def _cause(term: Term) -> str:
@@ -176,7 +176,7 @@ def portrait_text(portrait: Portrait) -> str:
     first, *others = portrait.terms
     parts = [f"What is missing looks like this: {term_words(first.term)}; {size_words(first)}."]
     if others:
-        parts.append(f"Beside it: {'; '.join(f'{term_words(one.term)}, {size_words(one)}' for one in others)}.")
+        parts.append(f"Beside it: {'; '.join(f'{term_words(sized.term)}, {size_words(sized)}' for sized in others)}.")
     parts.append(
         f"This takes {100.0 * portrait.explained:.0f} % of the misfit; rms error at points left out "
         f"{100.0 * portrait.held_out_rms:.2f} % (noise alone {100.0 * portrait.noise_floor:.2f} %, a smooth unknown "
@@ -184,7 +184,7 @@ def portrait_text(portrait: Portrait) -> str:
     )
     parts.append(_sets(portrait))
     if portrait.alike:
-        alike = [f"{term_words(one.term)} ({100.0 * (one.probability or 0.0):.0f} %)" for one in portrait.alike]
+        alike = [f"{term_words(sized.term)} ({100.0 * (sized.probability or 0.0):.0f} %)" for sized in portrait.alike]
         parts.append(f"The same would be seen if {'; or if '.join(alike)}.")
     return " ".join(parts)
 
@@ -204,9 +204,9 @@ def _named(names: Sequence[tuple[str, float]]) -> str:
 
 def alike_text(name: str, alike: Alike) -> str:
     """What else would look the same as a named effect."""
-    told = "; or if ".join(term_words(term) for term, _ in alike.terms[:MOST_SAID])
+    terms = "; or if ".join(term_words(term) for term, _ in alike.terms[:MOST_SAID])
     links = joined([link for link, _ in alike.links]).replace(" and ", " or ")
-    return f"These readings fit as well, without {name}, if {told}. By link: {links}."
+    return f"These readings fit as well, without {name}, if {terms}. By link: {links}."
 
 
 def variable_label(term: Term) -> tuple[str, float]:
