@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from toolpath_stiff.errors import InputError, InputErrors, TableError
+from toolpath_stiff.errors import InputErrors, TableError
 from toolpath_stiff.grid import SPREADSHEET_ERROR, Rows
 
 PLAIN = re.compile(r"[+-]?\d+(?:e[+-]?\d+)?", re.IGNORECASE)
@@ -13,7 +13,6 @@ ONE_MARK = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:e[+-]?\d+)?", re.IGNORECAS
 LIKE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[.,'’ \u00a0\u202f]\d{3})+(?:[.,]\d*)?")
 REMOVE_THEM = "write numbers without thousands separators"
-Cell = tuple[int, str, str]  # line, column, text
 
 
 def refuse_spreadsheet_errors(heading: Sequence[str], rows: Rows, file: str) -> None:
@@ -53,62 +52,40 @@ def with_points(
         Thousands separators, two kinds of decimal marks, or numbers that can be read in two ways.
     """
     cells = [(line, heading[i], row[i]) for line, row in rows for i in numbers if i < len(row)]
-    _refuse_grouped(cells, file)
-    marked = [cell for cell in cells if ONE_MARK.fullmatch(cell[2])]
-    commas = [cell for cell in marked if "," in cell[2]]
-    points = [cell for cell in marked if "." in cell[2]]
-    if commas and points:
-        raise _two_marks(commas, points, file)
-    if commas and all(LIKE_THOUSANDS.fullmatch(text) for _, _, text in commas):
-        raise _ambiguous(commas[0], file)
-    if separator == ";":
-        _refuse_doubtful_points(cells, points, file)
-    if not commas:
-        return rows, False
-    chosen = frozenset(numbers)
-    return [(line, [_with_point(c) if i in chosen else c for i, c in enumerate(row)]) for line, row in rows], True
-
-
-def _with_point(cell: str) -> str:
-    return cell.replace(",", ".") if ONE_MARK.fullmatch(cell) else cell
-
-
-def _refuse_grouped(cells: list[Cell], file: str) -> None:
     grouped = [cell for cell in cells if THOUSANDS.fullmatch(cell[2]) and not ONE_MARK.fullmatch(cell[2])]
     if grouped:
         raise InputErrors(
             TableError(f"{name} = {text!r} has thousands separators", hint=REMOVE_THEM, file=file, line=line)
             for line, name, text in grouped
         )
-
-
-def _refuse_doubtful_points(cells: list[Cell], points: list[Cell], file: str) -> None:
-    """A column in which only numbers from 1000 up have a point."""
-    whole = {name for _, name, text in cells if PLAIN.fullmatch(text)}
-    sure = {name for _, name, text in points if not LIKE_THOUSANDS.fullmatch(text)}
-    for cell in points:
-        if cell[1] in whole and cell[1] not in sure:
-            raise _ambiguous(cell, file)
-
-
-def _two_marks(commas: list[Cell], points: list[Cell], file: str) -> InputError:
-    rare, usual = (commas, points) if len(commas) < len(points) else (points, commas)
-    (line, name, text), (other_line, other_name, other) = rare[0], usual[0]
-    return TableError(
-        f"{name} = {text!r} and {other_name} = {other!r} (line {other_line}) have different decimal marks",
-        expected="decimal points, or decimal commas, in the whole file",
-        hint=REMOVE_THEM,
-        file=file,
-        line=line,
-    )
-
-
-def _ambiguous(cell: Cell, file: str) -> InputError:
-    line, name, text = cell
-    return TableError(
-        f"{name} = {text!r} could be {text.replace(',', '.')} or {re.sub('[.,]', '', text)}",
-        expected="a number that can be read in one way",
-        hint=f"{REMOVE_THEM}, decimals with a point",
-        file=file,
-        line=line,
-    )
+    marked = [cell for cell in cells if ONE_MARK.fullmatch(cell[2])]
+    commas = [cell for cell in marked if "," in cell[2]]
+    points = [cell for cell in marked if "." in cell[2]]
+    if commas and points:
+        rare, usual = (commas, points) if len(commas) < len(points) else (points, commas)
+        (line, name, text), (other_line, other_name, other) = rare[0], usual[0]
+        raise TableError(
+            f"{name} = {text!r} and {other_name} = {other!r} (line {other_line}) have different decimal marks",
+            expected="decimal points, or decimal commas, in the whole file",
+            hint=REMOVE_THEM,
+            file=file,
+            line=line,
+        )
+    doubtful = commas[:1] if all(LIKE_THOUSANDS.fullmatch(text) for _, _, text in commas) else []
+    if separator == ";":  # a column in which only numbers from 1000 up have a point
+        whole = {name for _, name, text in cells if PLAIN.fullmatch(text)}
+        whole -= {name for _, name, text in points if not LIKE_THOUSANDS.fullmatch(text)}
+        doubtful += [cell for cell in points if cell[1] in whole]
+    if doubtful:
+        line, name, text = doubtful[0]
+        raise TableError(
+            f"{name} = {text!r} could be {text.replace(',', '.')} or {re.sub('[.,]', '', text)}",
+            expected="a number that can be read in one way",
+            hint=f"{REMOVE_THEM}, decimals with a point",
+            file=file,
+            line=line,
+        )
+    if not commas:
+        return rows, False
+    pointed = {(line, i) for line, row in rows for i in numbers if i < len(row) and ONE_MARK.fullmatch(row[i])}
+    return [(n, [c.replace(",", ".") if (n, i) in pointed else c for i, c in enumerate(row)]) for n, row in rows], True

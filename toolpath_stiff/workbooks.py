@@ -7,6 +7,7 @@ import math
 import os
 import re
 import warnings
+import zipfile
 from typing import Any
 
 from toolpath_stiff.errors import InputError, InputErrors, TableError
@@ -59,38 +60,33 @@ def sheet_grid(content: bytes, file: str, sheet: str = "") -> Grid:
     return Grid([(line, row) for line, row in rows if counts(row)], "", tuple(notes), merged)
 
 
-def _filled(workbook: Any, file: str) -> list[Any]:
-    """Sheets with something in them. Raises `InputError` where one is too large to be looked through."""
-    for sheet in workbook.worksheets:
-        if sheet.max_row * sheet.max_column > LARGEST_CELLS:
-            raise _too_large(f"sheet {sheet.title!r} has {sheet.max_row} rows and {sheet.max_column} columns", file)
-    return [sheet for sheet in workbook.worksheets if any(v is not None for row in sheet.values for v in row)]
-
-
-def _too_large(found: str, file: str) -> InputError:
+def _too_large(size: str, file: str) -> InputError:
     expected = f"at most {LARGEST_CELLS:,} cells, empty ones among them"
-    return TableError(found, expected=expected, hint="delete the empty ones, or save the sheet as CSV", file=file)
+    return TableError(size, expected=expected, hint="delete the empty ones, or save the sheet as CSV", file=file)
 
 
 def _chosen_sheet(workbook: Any, file: str, sheet: str) -> tuple[Any, list[str]]:
     """The sheet of that name, or the first that is not empty, and a note where there are others."""
-    filled = _filled(workbook, file)
-    names = [one.title for one in filled]
+    for page in workbook.worksheets:
+        if page.max_row * page.max_column > LARGEST_CELLS:
+            raise _too_large(f"sheet {page.title!r} has {page.max_row} rows and {page.max_column} columns", file)
+    filled = {
+        page.title: page for page in workbook.worksheets if any(v is not None for row in page.values for v in row)
+    }
     if not filled:
         raise TableError("the workbook is empty", file=file)
-    if sheet and sheet not in names:
-        found = f"the workbook has no sheet {sheet!r} with cells"
-        raise TableError(found, expected=f"one of {', '.join(names)}", file=file)
-    chosen = filled[names.index(sheet) if sheet else 0]
-    if len(filled) == 1 or sheet:
-        return chosen, []
-    others = ", ".join(names[1:])
-    return chosen, [f"sheet {chosen.title!r} is read, not {others}; {file}#SHEET names another"]
+    if sheet:
+        if sheet not in filled:
+            absent = f"the workbook has no sheet {sheet!r} with cells"
+            raise TableError(absent, expected=f"one of {', '.join(filled)}", file=file)
+        return filled[sheet], []
+    first, *others = filled
+    if not others:
+        return filled[first], []
+    return filled[first], [f"sheet {first!r} is read, not {', '.join(others)}; {file}#SHEET names another"]
 
 
 def _refuse_large(content: bytes, file: str) -> None:
-    import zipfile
-
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             names = archive.namelist()
@@ -108,22 +104,14 @@ def _refuse_large(content: bytes, file: str) -> None:
 
 
 def _open(content: bytes, file: str, values: bool) -> Any:
-    try:
-        import openpyxl
-    except ImportError:
-        raise TableError(
-            "reading .xlsx needs openpyxl, which is not installed",
-            hint="install it (`pip install openpyxl`), or save the sheet as CSV",
-            file=file,
-        ) from None
+    import openpyxl
+
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it leaves out (validations, pictures) is nothing of ours
             return openpyxl.load_workbook(io.BytesIO(content), data_only=values)
     except Exception as error:  # whatever a damaged file makes of the library
-        reason = (
-            str(error.__cause__ or error).partition("\n")[0] or type(error).__name__
-        )  # the library's has three lines
+        reason = str(error.__cause__ or error).partition("\n")[0] or type(error).__name__  # the library's: three lines
         raise TableError(f"an Excel workbook that cannot be read: {reason}", hint=SAVE_AS, file=file) from None
 
 

@@ -20,9 +20,9 @@ from toolpath_stiff.comparison.compare import Comparison, compare
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.readings.measurements import Measurements
+from toolpath_stiff.report.compare.load_path import load_path_png
 from toolpath_stiff.report.compare.page import PICTURES, QUESTIONS, compare_html, residuals_csv
 from toolpath_stiff.report.compare.page import text as terminal_text
-from toolpath_stiff.report.compare.variables import load_path_png
 
 NASTY = '<script>alert("1")</script>$x^2$'
 

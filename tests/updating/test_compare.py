@@ -12,7 +12,7 @@ from tests.conftest import seeds
 from tests.stiffness.cases import nist, orthogonal_hexapod
 from tests.updating.cases import active, campaign, read_text, readings_by_hand, table_1
 from toolpath_stiff.comparison.compare import Comparison, compare
-from toolpath_stiff.comparison.principles import load_path_shares
+from toolpath_stiff.comparison.load_path import load_path_shares
 from toolpath_stiff.comparison.residuals import directions, planes, radius, zones
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.errors import error_figures

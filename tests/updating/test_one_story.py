@@ -34,9 +34,9 @@ from toolpath_stiff.planning.rivals import errors_so_far, rivals_of
 from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.report import explanations as diagnose_report
 from toolpath_stiff.report.compare import page as compare_report
+from toolpath_stiff.report.compare.load_path import stiffness_deviation_percent
 from toolpath_stiff.report.compare.page import QUESTIONS as COMPARE_QUESTIONS
 from toolpath_stiff.report.compare.page import compare_html
-from toolpath_stiff.report.compare.variables import stiffness_deviation_percent
 from toolpath_stiff.report.diagnose.page import diagnose_html
 from toolpath_stiff.report.explanations import headline
 from toolpath_stiff.report.update import page as update_report

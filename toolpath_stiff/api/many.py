@@ -14,21 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from toolpath_stiff.api.hand_out import Run, Task, answers
-from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.programs import (
-    JOBS,
-    Compared,
-    Partial,
-    RequiredStiffness,
-    ShowPlunges,
-    Table,
-    path_options,
-)
-from toolpath_stiff.defaults import FORCE, LOAD, job_count
+from toolpath_stiff.api.programs import JOBS, ShowPlunges, Table, analyze, check_options
+from toolpath_stiff.defaults import job_count
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.program import Program
-from toolpath_stiff.options import checked
+from toolpath_stiff.options import arguments_of, checked
 from toolpath_stiff.report.analysis.summary import check_table
 from toolpath_stiff.report.batch.index import files, names
 from toolpath_stiff.report.batch.outcomes import Outcome, columns_of, terminal_summary
@@ -125,15 +116,8 @@ def analyze_many(
     table: Table = "csv",
     show_plunges: ShowPlunges = False,
     replace: bool = False,
-    origin_mm_deg: Origin = None,
-    load: LoadDirection = LOAD,
-    step_mm: Step = 1.0,
-    force_N: Force = FORCE,
-    partial: Partial = False,
-    require_N_per_mm: RequiredStiffness = None,
-    compare_with: Compared = None,
     progress: Progress | None = None,
-    **reading: Any,
+    **options: Any,
 ) -> ManyAnalyses:
     r"""Stiffness along the path of many programs: each gets its report, all get one overview.
 
@@ -157,13 +141,12 @@ def analyze_many(
         available CPU.
     plots, table, show_plunges, replace
         As of `Analysis.save`.
-    origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm, compare_with
-        As of `analyze`.
     progress
         Called with the program that is done, programs done, programs in all; first with 0 done, when all arguments
         have been found right.
-    **reading
-        How files are read: the options of `Program.read`.
+    **options
+        Those of `analyze` (origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm, compare_with) and of
+        `Program.read`.
 
     Raises
     ------
@@ -191,15 +174,13 @@ def analyze_many(
     ['done', 'failed']
     """
     on = machine_from(machine)
-    other = on.like(compare_with) if isinstance(compare_with, str | Path) else compare_with
-    options: dict[str, Any] = {
-        "origin_mm_deg": origin_mm_deg, "load": load, "step_mm": step_mm, "force_N": force_N, "partial": partial,
-        "require_N_per_mm": require_N_per_mm,
-    }  # fmt: skip
-    path_options(**options)  # a mistake in them is one error
+    own = {name: options.pop(name) for name in arguments_of(analyze) if name in options}
+    compared = own.pop("compare_with", None)
+    other = on.like(compared) if isinstance(compared, str | Path) else compared
+    check_options(**own)  # a mistake in them is one error
     check_table(table)
     listed, given = _listed(programs)
-    example = Program.from_text("", **reading)
+    example = Program.from_text("", **options)
     each = [example, *given.values()]
     _check_shared(on, other, each)
     count = job_count(jobs, len(listed))
@@ -207,7 +188,7 @@ def analyze_many(
     rules = Rules(inputs=(*files_read, *on.inputs, *(other.inputs if other else ())), replace=replace)
     out = Path(folder)
     check_folder(out, names(), rules)
-    run = Run(out.absolute(), str(out), pickle.dumps((on, other)), options, plots, table, show_plunges, replace)
+    run = Run(out.absolute(), str(out), pickle.dumps((on, other)), own, plots, table, show_plunges, replace)
     reports = report_folders(listed)
     with _folders_for(out, reports):
         # The overview of an earlier run goes, as its reports do from now on, one after the other.

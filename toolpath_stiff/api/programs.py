@@ -13,13 +13,9 @@ from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
-from toolpath_stiff.options import Option, checked
+from toolpath_stiff.options import Option, arguments_of, checked
 from toolpath_stiff.results import Progress, counter
-from toolpath_stiff.units import (
-    m_from_mm,
-    m_per_s_from_mm_per_min,
-    n_per_m_from_n_per_mm,
-)
+from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, n_per_m_from_n_per_mm
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
@@ -114,48 +110,34 @@ def analyze(
     """
     from toolpath_stiff.analysis import analyze
 
-    first, part = machine_from(machine), program_from(program)
-    second = None
-    if compare_with is not None:
-        second = compare_with if isinstance(compare_with, Machine) else first.like(compare_with)
-    options, required = path_options(origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm)
+    first, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
+    second = first.like(compare_with) if isinstance(compare_with, str | Path) else compare_with
 
     def on(machine: Machine, other: Machine | None, progress: Callable[[int, int], None] | None) -> Analysis:
         model = machine.running(part, [other] if other else [])
-        read = part.moves(options["origin"], model.machine.default_origin)
-        return analyze(model, read, progress=progress, **options)
+        read = part.moves(origin, model.machine.default_origin)
+        step = m_from_mm(step_mm)
+        return analyze(
+            model, read, origin=origin, load=load, step=step, force=force_N, partial=partial, progress=progress
+        )
 
     return replace(
         on(first, second, counter(progress, f"{part.name}: samples")),
         on_other=None if second is None else on(second, first, None),
-        required=required,
+        required=None if require_N_per_mm is None else n_per_m_from_n_per_mm(require_N_per_mm),
         inputs=(*part.inputs, *first.inputs, *(second.inputs if second else ())),
     )
 
 
-def path_options(
-    origin_mm_deg: Sequence[float] | None,
-    load: str,
-    step_mm: float,
-    force_N: float,
-    partial: bool,
-    require_N_per_mm: float | None,
-) -> tuple[dict[str, Any], float | None]:
-    """What an analysis is asked, checked and in SI, and the stiffness required; arguments and errors of `analyze`."""
+def check_options(origin_mm_deg: Sequence[float] | None = None, load: str = LOAD, **others: Any) -> None:
+    """Hold options of `analyze` against what they may be, before any program is read. Raises `InputError`."""
     from toolpath_stiff.analysis.loads import parse_load
 
+    origin_si(origin_mm_deg)
     parse_load(load)
-    options: dict[str, Any] = {
-        "origin": origin_si(origin_mm_deg),
-        "load": load,
-        "step": m_from_mm(step_mm),
-        "force": force_N,
-        "partial": partial,
-    }
-    required = None
-    if require_N_per_mm is not None:
-        required = n_per_m_from_n_per_mm(require_N_per_mm)
-    return options, required
+    for name, value in others.items():
+        if value is not None:
+            arguments_of(analyze)[name].check(value)
 
 
 @checked

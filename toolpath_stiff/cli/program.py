@@ -114,7 +114,7 @@ def _analyze_many(args: Namespace, files: Sequence[Found], counts: Sequence[Fold
                 plots=not args.no_plots,
                 replace=args.replace,
                 progress=progress,
-                **given(args, tps.analyze_many, tps.Program.read),
+                **given(args, tps.analyze, tps.analyze_many, tps.Program.read),
             )
     finally:
         say("")

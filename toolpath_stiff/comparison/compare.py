@@ -16,11 +16,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.comparison.answers import Answer, summary_of
+from toolpath_stiff.comparison.load_path import LinkShares, load_path_shares
 from toolpath_stiff.comparison.loop_readings import BesideTip, beside_tip, strut_history
-from toolpath_stiff.comparison.principles import Check, LinkShares, assess, load_path_shares, model_free_checks
+from toolpath_stiff.comparison.principles import Check, assess, model_free_checks
 from toolpath_stiff.comparison.residuals import Label, Residuals, Variable
 from toolpath_stiff.comparison.structure import Scattering, find_structure
-from toolpath_stiff.comparison.summary import Answer, ComparisonSummary, summary_of
+from toolpath_stiff.comparison.summary import ComparisonSummary
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError

@@ -13,7 +13,7 @@ Every check is a combination of ln readings that has mean zero if the principle 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -25,9 +25,7 @@ from toolpath_stiff.comparison.residuals import directions, radius
 from toolpath_stiff.inference.covariances import Covariance
 from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.readings.measurements import Measurements, measured_path
-from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.readings.measurements import Measurements
 from toolpath_stiff.units import mm_from_m
 
 SAME = 1e-3  # m, poses and joints closer than this are one
@@ -274,65 +272,3 @@ def _setups(data: Measurements) -> Iterator[Check]:
                     f"{name} in set-up {a or '(unnamed)'} against {b or '(unnamed)'}, same pose: {{percent}}",
                     "the set-ups themselves differ in stiffness",
                 )
-
-
-@dataclass(frozen=True)
-class LinkShares:
-    """Compliance by link.
-
-    Attributes
-    ----------
-    links
-        "strut 1" to "strut 6", then names of effects.
-    compliance
-        (3, links) m/N along X, Y, Z, mean over the measured poses.
-    poses
-        How many poses.
-    """
-
-    links: tuple[str, ...]
-    compliance: FloatArray
-    poses: int
-
-
-def load_path_shares(model: StiffnessModel, data: Measurements) -> LinkShares:
-    """Shares at the measured poses, each counted once."""
-    setup = np.unique(data.setup, return_inverse=True)[1]
-    keys = np.concatenate([data.position, data.angles, data.tool_extension[:, None], setup[:, None]], axis=1)
-    distinct = data.select(np.unique(np.round(keys, 9), axis=0, return_index=True)[1])
-    by_axis = []
-    for axis in np.eye(3):
-        rows = replace(distinct, direction=np.broadcast_to(axis, (len(distinct), 3)).copy())
-        by_axis.append(_by_link(model, rows).mean(axis=0))
-    names = tuple(f"strut {i + 1}" for i in range(6)) + tuple(active.effect.name for active in model.effects)
-    return LinkShares(names, np.array(by_axis), len(distinct))
-
-
-def _by_link(model: StiffnessModel, data: Measurements) -> FloatArray:
-    """(n, links) m/N along each row's direction."""
-    loaded = exact.under_load(model, measured_path(model, data), data.direction)
-    path, links, f = loaded.path, loaded.links, loaded.forces
-    w = np.concatenate([data.direction, np.zeros((len(data), 3))], axis=1)
-    loads = np.concatenate([f, w], axis=1)
-    columns = [*(f**2 / path.machine.strut_law.stiffness(path.struts.lengths)).T]
-    for active in model.effects:
-        energy = np.zeros(len(data))
-        series, form = active.adds("strut_compliance", path), active.adds("load_compliance", path)
-        beside = active.adds("parallel_stiffness", path)
-        if series is not None:
-            energy += (series * f**2).sum(axis=1)
-        if form is not None:
-            energy += np.einsum("ni,nij,nj->n", loads, form, loads)
-        if beside is not None:
-            motion = _platform_motion(path.struts.jacobian, links, f, w)
-            energy += np.einsum("ni,nij,nj->n", motion, beside, motion)
-        columns.append(energy)
-    return np.stack(columns, axis=1)
-
-
-def _platform_motion(jacobian: FloatArray, links: exact.Links, f: FloatArray, w: FloatArray) -> FloatArray:
-    """(n, 6) x from J x = Q_ff f + Q_fw w."""
-    stretch = links.strut * f
-    if links.loads is not None:
-        stretch = stretch + np.einsum("nij,nj->ni", links.loads[:, :6], np.concatenate([f, w], axis=1))
-    return np.asarray(np.linalg.solve(jacobian, stretch[..., None])[..., 0])

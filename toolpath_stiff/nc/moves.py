@@ -237,7 +237,7 @@ class Arcs:
 
     @staticmethod
     def of(arcs: Mapping[int, Arc]) -> Arcs:
-        """Of arcs by their rows."""
+        """Columns of arcs that are given by their rows."""
         columns = (
             zip(*((arc.center, arc.normal, arc.sweep) for arc in arcs.values()), strict=True) if arcs else ((),) * 3
         )

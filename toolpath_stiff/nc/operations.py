@@ -89,7 +89,7 @@ def headings(lines: Sequence[str]) -> list[Heading]:
 
 
 def heading_of(block: Sequence[str], line: int) -> Heading | None:
-    """What a block of comments names: what the post marks, else the first line with letters, else a tool."""
+    """The heading of a block of comments: what the post marks, else the first line with letters, else a tool."""
     named = tool = number = None
     for comment in block:
         name = plain_name(comment)
@@ -236,7 +236,7 @@ def find_operations(
 
 @dataclass
 class _Beginning:
-    """What stands between two cuts: the first move after it, headings passed, the tool that cuts, its tool change."""
+    """The gap between two cuts: the first move after it, headings passed, the tool that cuts, its tool change."""
 
     move: int
     heads: list[Heading]
@@ -245,7 +245,7 @@ class _Beginning:
 
     @property
     def line(self) -> int:
-        """Where its heading or its tool change stands; the largest number there is without any."""
+        """The line of its heading or its tool change; the largest number there is without any."""
         lines = [head.line for head in self.heads] + ([self.change[0]] if self.change else [])
         return min(lines, default=np.iinfo(np.int64).max)
 
@@ -383,7 +383,7 @@ def _tool_change(lines: Sequence[str], stretches: list[tuple[int, int]]) -> tupl
 
 
 def _name(begin: _Beginning, title: str, remarks: dict[int, str], alone: bool) -> str:
-    """What the post marks, else the first heading, else the tool; of a lone operation rather the title; "" if none."""
+    """The name: what the post marks, else the first heading, else the tool; of a lone one rather the title, or ""."""
     names: dict[str, list[str]] = {MARKED: [], NAMED: [], TOOL: []}
     for head in begin.heads:
         names[head.kind].append(head.name)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from functools import cached_property
 
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.units import Pose, ShopPose, pose_in_mm
 
@@ -81,10 +84,17 @@ class Request:
 
     @property
     def zero(self) -> tuple[ShopPose | None, ShopPose]:
-        """Where G54's zero sits, mm and degrees, as the caller says, and by default.
+        """G54's zero, mm and degrees, as the caller says, and by default.
 
         A program that was posted for another machine is read in that one's coordinates first.
         """
         if self.posted is not None:
             return None, ZERO
         return None if self.origin is None else pose_in_mm(self.origin), pose_in_mm(self.default_origin)
+
+    def start(self) -> State:
+        """The control as the program finds it."""
+        frames = Frames(copy.deepcopy(self.work_offsets), *self.zero, posted=self.posted)
+        state = State(self.name, frames, copy.deepcopy(self.tool_table), self.controller.dialect)
+        state.feed = self.controller.feed
+        return state

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 WORSE = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
 ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
 AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
+OFFSETS = ("linuxcnc", "linuxcnc_reason", "fanuc", "fanuc_reason")  # as placement.json has them
 NAMES = ("x", "y", "z", "tilt-a", "tilt-b", "rotate")
 
 
@@ -253,12 +254,7 @@ class Placement(FolderResult, SearchedFront):
                     {"limit": first, "smallest_margin": smallest},
                     *({"limit": name} for name in others),
                 ],
-                "offset_blocks": {
-                    "linuxcnc": offsets.linuxcnc or None,
-                    "linuxcnc_reason": offsets.linuxcnc_reason or None,
-                    "fanuc": offsets.fanuc or None,
-                    "fanuc_reason": offsets.fanuc_reason or None,
-                },
+                "offset_blocks": {name: getattr(offsets, name) or None for name in OFFSETS},
                 "written": self.written,
                 "search": self.search,
                 "assumptions": self.best.assumptions,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, count, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -23,7 +23,7 @@ from toolpath_stiff.planning.choice import choose, why_of
 from toolpath_stiff.planning.forecasts import Forecast, principal
 from toolpath_stiff.planning.gaps import pair_shares
 from toolpath_stiff.planning.outlook import SETTLED
-from toolpath_stiff.planning.rows import POSE, plan_csv, plan_rows
+from toolpath_stiff.planning.rows import POSE, PlanRow, plan_csv, plan_rows
 from toolpath_stiff.planning.tables import Tables
 from toolpath_stiff.planning.visits import Visits
 from toolpath_stiff.readings.mapping import mapped_table
@@ -94,7 +94,7 @@ class NextVisit(Result):
         return not self.unlike and max(self.weights.values()) >= SETTLED
 
     @cached_property
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[PlanRow]:
         """Rows of the next visit, as of plan.csv; none where there is no next visit."""
         if self.visit is None:
             return []
@@ -212,10 +212,8 @@ def next_visit(
 
 def own_files(folder: str | Path) -> tuple[str, ...]:
     """A plan's own measurement files: plan.csv, and next_1.csv and so on as far as there are any."""
-    chosen: list[str] = []
-    while (file := Path(folder) / f"next_{len(chosen) + 1}.csv").exists():
-        chosen.append(str(file))
-    return (str(Path(folder) / "plan.csv"), *chosen)
+    further = takewhile(Path.exists, (Path(folder) / f"next_{number}.csv" for number in count(1)))
+    return tuple(map(str, (Path(folder) / "plan.csv", *further)))
 
 
 def conditioned(tables: Tables, taken: Taken) -> tuple[tuple[Forecast, ...], list[tuple[int, float]]]:

@@ -8,7 +8,7 @@ cheap.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -183,17 +183,11 @@ def possible_visits(machine: Machine, menu: Menu, matters: Matters, rng: Generat
         np.flatnonzero(np.isin(names, some) & np.isin(forces, under) & (rounds <= last))
         for some, under, last in product(named, load_choices, every_round)
     ]
-    return visits_of(
-        menu,
-        (poses[which], extension, setup),
-        np.broadcast_to(names, slots.shape),
-        np.broadcast_to(forces, slots.shape),
-        wait[:, None] + slots * READING_EVERY,
-        rounds=rounds,
-        wait=wait,
-        label=np.array([*menu.labels, *[""] * len(new)], dtype=str)[which],
-        choices=choices,
-    )
+    names, forces = np.broadcast_to(names, slots.shape), np.broadcast_to(forces, slots.shape)
+    time = wait[:, None] + slots * READING_EVERY
+    visits = visits_of(menu, (poses[which], extension, setup), names, forces, time, rounds, choices)
+    labels, owner = np.array([*menu.labels, *[""] * len(new)], dtype=str), np.repeat(range(len(places)), len(choices))
+    return replace(visits, wait=wait[owner], label=labels[which][owner])
 
 
 def visits_of(
@@ -202,10 +196,7 @@ def visits_of(
     names: TextArray,
     force: FloatArray,
     time: FloatArray,
-    *,
     rounds: IntArray | int = 1,
-    wait: FloatArray | None = None,
-    label: TextArray | None = None,
     choices: Sequence[IntArray] | None = None,
 ) -> Visits:
     """Visits to p places with k readings each, or with some of these.
@@ -220,8 +211,6 @@ def visits_of(
         (p, k) directions, N, s (or (k,)).
     rounds
         (p, k) or (k,): which reading it is of its kind.
-    wait, label
-        (p,) s; names of points.
     choices
         Each place is a visit for every choice of its readings; None: one with all of them.
     """
@@ -233,9 +222,9 @@ def visits_of(
         menu=menu,
         pose=pose[place],
         extension=extension[place],
-        wait=np.zeros(len(place)) if wait is None else wait[place],
+        wait=np.zeros(len(place)),
         setup=setup[place],
-        label=np.full(len(place), "") if label is None else label[place],
+        label=np.full(len(place), ""),
         loop=np.full(len(place), ""),
         readings=planned_readings(
             np.repeat(pose, k, axis=0),

@@ -18,8 +18,9 @@ from toolpath_stiff.files import Content, read_bytes, write_atomically
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.loop_figures import LoopFigures, in_tension, reduce_loops
 from toolpath_stiff.readings.mapping import mapped_table
-from toolpath_stiff.readings.raw_history import remarks, struts_over_dates
+from toolpath_stiff.readings.raw_history import struts_over_dates
 from toolpath_stiff.readings.raw_records import COLUMNS, Loop, is_table, read_raw, read_stiffnesses
+from toolpath_stiff.readings.raw_remarks import remarks
 from toolpath_stiff.readings.raw_rows import loop_entry, measurement_csv
 from toolpath_stiff.results import Result
 from toolpath_stiff.tables import Table

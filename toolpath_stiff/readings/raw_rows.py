@@ -10,8 +10,9 @@ from typing import Any
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.loop_figures import LoopFigures
-from toolpath_stiff.readings.raw_history import BEYOND, sided
+from toolpath_stiff.readings.raw_history import BEYOND
 from toolpath_stiff.readings.raw_records import CONDITIONS, PLACE, Loop
+from toolpath_stiff.readings.raw_remarks import sided
 from toolpath_stiff.units import certain, n_per_mm_from_n_per_m, um_from_m
 
 

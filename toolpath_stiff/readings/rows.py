@@ -319,7 +319,7 @@ def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planne
         )
     size, side = abs(force), math.copysign(1.0, force)
     sd = m_from_um(sd) / size
-    return replace(row, force=size, sd=sd, compliance=compliance, length=m_from_mm(length), side=side)
+    return replace(row, force=size, sd=sd, compliance=compliance, length=1e-3 * length, side=side)
 
 
 def _stiffness(record: Mapping[str, str], force: float, planned: bool) -> float:

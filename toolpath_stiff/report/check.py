@@ -1,4 +1,4 @@
-"""What `tps check` prints, with its tables of tools and operations: plain text, at most 98 columns."""
+"""The text of `tps check`, with its tables of tools and operations: plain text, at most 98 columns."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _figures(row: Mapping[str, Any]) -> list[str]:
 
 
 def text(check: ProgramCheck) -> str:
-    """What `--json` prints, for people."""
+    """The document of `--json`, for people."""
     document = check.to_dict()
     posted = f", posted for {document['kinematics']}" if document["kinematics"] else ""
     lines = [f"{document['program']}, read as {document['dialect']}{posted}"]

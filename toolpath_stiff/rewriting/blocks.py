@@ -217,7 +217,7 @@ def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
 
 
 def _piece_count(controls: Controls) -> int:
-    """Into how many pieces a move must be cut; those that must be are refused, unless it was asked for."""
+    """Number of pieces into which a move must be cut; those that must be are refused, unless it was asked for."""
     motion, start, end, arc = controls.trace[-1]
     off_plane = arc is not None and controls.image(controls.source.plane) is None
     leaning = 0.0

@@ -106,7 +106,7 @@ class LineEdit:
 
     @property
     def moves(self) -> bool:
-        """Whether the line holds an axis word."""
+        """True where the line holds an axis word."""
         return any(word.letter in AXES for word in self._words)
 
     def _add(self, letter: str, text: str) -> None:
@@ -163,9 +163,9 @@ class Controls:
         if sentence not in self.notes:
             self.notes.append(sentence)
 
-    def refusal(self, found: str, hint: str = "") -> InputError:
-        """Why the current block cannot be rewritten."""
-        return ProgramError(found, hint=hint, file=self.source.name, line=self.block.line)
+    def refusal(self, problem: str, hint: str = "") -> InputError:
+        """The error for the current block, which cannot be rewritten."""
+        return ProgramError(problem, hint=hint, file=self.source.name, line=self.block.line)
 
     @property
     def digits(self) -> int:

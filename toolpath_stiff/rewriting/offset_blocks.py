@@ -29,7 +29,7 @@ USE_WRITE = "use --write, which transforms the program itself"
 
 @dataclass(frozen=True)
 class OffsetBlocks:
-    """What to key in, "" where the control cannot express the placement; the reason is then beside it."""
+    """Blocks to key in, "" where the control cannot express the placement; the reason is then beside it."""
 
     linuxcnc: str
     fanuc: str
@@ -89,7 +89,7 @@ def offset_blocks(program: ReadProgram, placement: Pose, *, decimals: int = 4) -
 
 
 def _not_about_z(program: ReadProgram, placement: Pose) -> str:
-    """Why a turn of X and Y cannot express the placement, or ""."""
+    """The reason why a turn of X and Y cannot express the placement, or ""."""
     if max(abs(placement[3]), abs(placement[4])) > VERTICAL:
         return f"the set-up is tilted, and work offsets turn X and Y alone: {USE_WRITE}"
     moves = program.moves
@@ -101,7 +101,7 @@ def _not_about_z(program: ReadProgram, placement: Pose) -> str:
 
 
 def _not_g54_alone(program: ReadProgram) -> str:
-    """Why setting G54 would not move the whole program, or ""."""
+    """The reason why setting G54 would not move the whole program, or ""."""
     for number, text in enumerate(program.source, 1):
         if not MAY_BE_OFFSET.search("".join(COMMENTS.sub("", text).split())):
             continue

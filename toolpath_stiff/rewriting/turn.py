@@ -76,7 +76,7 @@ class Turn:
         return [float(v) for v in best]
 
     def keeps(self, abc: Sequence[float]) -> bool:
-        """Whether rotary words stay as they are: a vertical platform never yaws with the work."""
+        """True where rotary words stay as they are: a vertical platform never yaws with the work."""
         return self._never_yaws and (not self.turns or max(abs(abc[0]), abs(abc[1])) < UPRIGHT)
 
     def in_program(self, rotation: float) -> FloatArray:
@@ -144,7 +144,7 @@ class Row(NamedTuple):
     arc: Arc | None
 
     def short(self, unit: float) -> bool:
-        """Whether rounding to `unit` may make it vanish."""
+        """True where rounding to `unit` may make it vanish."""
         moved = max(abs(e - s) for s, e in zip(self.start, self.end, strict=True))
         return self.arc is None and moved < SHORTEST_UNITS * unit
 
@@ -156,14 +156,14 @@ def cutting_rows(recorder: Recorder, first: int) -> list[Row]:
 
 
 class Difference(NamedTuple):
-    """How a written cutting move differs from the placed one: in what (`START`, `END`, `AXIS`, `SHAPE`), in words."""
+    """A difference of a written move from the placed one: its kind (`START`, `END`, `AXIS`, `SHAPE`), its words."""
 
     kind: str
     words: str
 
 
 def differences(turn: Turn, wanted: list[Row], written: list[Row], unit: float) -> Difference | None:
-    """How the written cutting moves of a block differ from the placed ones beyond the rounding to `unit` mm.
+    """The first difference of a block's written cutting moves from the placed ones beyond the rounding to `unit` mm.
 
     Straight moves of a few units may vanish by rounding, or come to be.
     """
@@ -184,7 +184,7 @@ def differences(turn: Turn, wanted: list[Row], written: list[Row], unit: float) 
 
 
 def difference(turn: Turn, wanted: Row, written: Row, unit: float) -> Difference | None:
-    """How a written cutting move differs from the placed one beyond the rounding to `unit` mm.
+    """The difference of a written cutting move from the placed one beyond the rounding to `unit` mm.
 
     For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them.
     """

@@ -48,7 +48,7 @@ IN_PLANE = 12  # over half a circle of the directions in which one strut is idle
 def is_closed_form(model: StiffnessModel) -> bool:
     """Whether struts on a rigid platform are all that acts, so that the closed form holds."""
     acting = replace(model, effects=acting_effects(model))
-    return acting.is_plain and bool(np.isinf(acting.platform_bars))
+    return acting.is_plain and all(np.isinf(active.values["bar_stiffness"]) for active in acting.effects)
 
 
 def choose_route(model: StiffnessModel, poses: int) -> str:

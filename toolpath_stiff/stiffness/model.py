@@ -79,14 +79,6 @@ class StiffnessModel:
         return any(active.effect.load_dependent for active in self.effects)
 
     @property
-    def platform_bars(self) -> float:
-        """Stiffness of the platform bars in N/m, inf if rigid; only meaningful if `is_plain`."""
-        for active in self.effects:
-            if isinstance(active.effect, PlatformFlexibility):
-                return float(active.values["bar_stiffness"])
-        return float(np.inf)
-
-    @property
     def is_plain(self) -> bool:
         """Whether struts and platform bars are all there is, so that the fast kernels apply."""
         return all(type(active.effect) is PlatformFlexibility for active in self.effects)

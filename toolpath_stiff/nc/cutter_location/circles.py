@@ -13,13 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from toolpath_stiff.nc.geometry import (
-    RELATIVE_TOLERANCE,
-    ArcError,
-    Point2,
-    Vector,
-    check_bulge,
-)
+from toolpath_stiff.nc.geometry import RELATIVE_TOLERANCE, ArcError, Point2, Vector, check_bulge
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -132,7 +126,7 @@ def turned_as(center: Vector, axis: Vector, start: Vector, direction: Vector) ->
 
 
 def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which: int) -> Vector:
-    """Where a motion along the circle meets a line for the first or second time. Raises `ArcError`.
+    """The point where a motion along the circle meets a line for the first or second time. Raises `ArcError`.
 
     Parameters
     ----------

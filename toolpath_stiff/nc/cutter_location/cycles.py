@@ -63,7 +63,7 @@ def cycle(state: State, statement: Statement) -> None:
 
 
 def _name_in_cycle(state: State, key: Argument) -> str:
-    """What a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
+    """The quantity that a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
     name = ALIASES.get(key.text.upper(), key.text.upper())
     if name in FEED_UNITS:
         return "feed"

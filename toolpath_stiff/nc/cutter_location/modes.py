@@ -217,6 +217,6 @@ def heading(state: State, statement: Statement) -> None:
 
 
 def fini(state: State, statement: Statement) -> None:
-    """What follows is not read."""
+    """The end: what follows is not read."""
     state.no_circle("FINI")
     state.ended = True

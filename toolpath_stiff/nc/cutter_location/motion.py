@@ -90,7 +90,7 @@ def godlta(state: State, statement: Statement) -> None:
 
 
 def from_(state: State, statement: Statement) -> None:
-    """Where the tool stands."""
+    """The point at which the tool stands."""
     numbers = state.numbers(statement, 3, 6)
     axis = _axis_of(state, numbers)
     if len(state.recorder):

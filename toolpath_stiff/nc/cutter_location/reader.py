@@ -116,7 +116,7 @@ def run(state: State, lines: tuple[str, ...], most_errors: int = 1) -> list[Inpu
 
 
 def _take_comment(state: State, lines: tuple[str, ...], index: int) -> None:
-    """What CAM systems say in comments: CATIA's operations, CATIA's and Creo's coordinate systems."""
+    """Take what CAM systems tell in comments: CATIA's operations, CATIA's and Creo's coordinate systems."""
     operation, frame = OPERATION.match(lines[index]), frame_in_comment(lines, index)
     if operation:
         state.marks.append((index + 1, operation[1]))
@@ -163,7 +163,7 @@ def unsupported(state: State) -> tuple[Unsupported, ...]:
 
 
 def in_force(state: State) -> dict[str, str]:
-    """What is in force, names to words."""
+    """The modes in force, names to words."""
     i, j, k = state.next_axis
     feed = "none" if state.feed is None else f"{state.feed:g} mm/{'rev' if state.per_revolution else 'min'}"
     return {

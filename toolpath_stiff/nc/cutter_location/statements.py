@@ -56,7 +56,7 @@ _POINT = re.compile(rf"\s*GOTO\s*/{_FIRST}{_NEXT * 2}(?:{_NEXT * 3})?\s*$", re.I
 
 @dataclass(frozen=True)
 class Argument:
-    """What stands between two commas, and where it begins."""
+    """A text between two commas, and where it begins."""
 
     text: str
     line: int
@@ -93,7 +93,7 @@ def plain_point(line: str) -> list[float] | None:
 
 
 def is_number(text: str) -> bool:
-    """Whether an argument is a number."""
+    """True for a text that is a number."""
     return NUMBERS.fullmatch(text) is not None
 
 
@@ -196,7 +196,7 @@ def _parse(joined: str, starts: list[tuple[int, int, int]], name: str) -> Statem
 
 
 def _arguments(joined: str, begin: int, place: Callable[[int], tuple[int, int]]) -> tuple[Argument, ...]:
-    """What stands between the commas outside parentheses, from `begin` on."""
+    """The texts between the commas outside parentheses, from `begin` on."""
     if not joined[begin:].strip():
         return ()
     arguments, depth, start = [], 0, begin

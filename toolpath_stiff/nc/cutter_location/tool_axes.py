@@ -55,7 +55,7 @@ def angle_of(first: Vector, second: Vector) -> float:
 
 
 def division(first: Vector, second: Vector) -> int:
-    """Into how many equal parts a turn of the tool axis is divided. Raises `ArcError` where it turns over."""
+    """Number of equal parts into which a turn of the tool axis is divided. Raises `ArcError` where it turns over."""
     chord = math.dist(first, second)
     if chord < 0.008 and abs(first[1]) < 0.9 and abs(second[1]) < 0.9:
         return 1  # half a degree and less, of a tool well away from Y: what most moves turn by

@@ -98,9 +98,9 @@ class Follower:
                     self.line = self.reading
             action(inner)
 
-    def fail(self, line: int, found: str, expected: str = "", hint: str = "") -> InputError:
+    def fail(self, line: int, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error of a line of the program."""
-        return ProgramError(found, expected=expected, hint=hint, file=self.name, line=line or None)
+        return ProgramError(problem, expected=expected, hint=hint, file=self.name, line=line or None)
 
     def _point(self, inner: str) -> Vector:
         """X, Y, Z as printed in mm, A, B, C in degrees."""
@@ -136,7 +136,7 @@ class Follower:
         self.frame_changed = True
 
     def _no_length(self, words: str) -> InputError:
-        """Of a G43 without a length: which tool's, unless H is computed."""
+        """The error for a G43 without a length, with its tool unless H is computed."""
         missing = "and there is no tool table" if self.tools is None else "which the tool table does not give"
         named, hint = LENGTH_WORD.search(words), "give it in a tool table (--tools FILE)"
         if self.tools is None and (named or "H" not in words):
@@ -346,7 +346,7 @@ class Follower:
             end[2] += self.lost
 
     def _machine_flags(self, start: Vector, end: Vector) -> tuple[bool, bool]:
-        """Whether start and end were given in machine coordinates (G53, G28, G30), axis by axis as in `Frames`."""
+        """Two flags: start and end were given in machine coordinates (G53, G28, G30), axis by axis as in `Frames`."""
         if not self.tagged or (self.cycle and start == end):
             return (False, False)
         was = self.frames.bound

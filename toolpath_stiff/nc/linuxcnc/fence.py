@@ -1,4 +1,4 @@
-"""What `rs274` is never given, and what only confuses it.
+"""Programs that `rs274` is never given, and words that only confuse it.
 
 LinuxCNC executes Python in comments (`;py,...`, `(py,...)`, `(pyrun,...)`), user M codes (M100 to M199) as executables,
 and subprograms of other files. A program with these is refused here, before anything is started. The copy that rs274
@@ -46,9 +46,9 @@ def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
             )
 
 
-def _refused(found: str, place: Place) -> ProgramError:
+def _refused(problem: str, place: Place) -> ProgramError:
     return place.fail(
-        f"{found}: LinuxCNC's interpreter is not started on such a program",
+        f"{problem}: LinuxCNC's interpreter is not started on such a program",
         "a program that runs no other",
         "remove it, or read the program with --interpreter builtin",
     )

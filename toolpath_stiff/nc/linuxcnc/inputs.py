@@ -1,4 +1,4 @@
-"""What `rs274` is given: a copy of the program, a tool table, a parameter file.
+"""Files that `rs274` is given: a copy of the program, a tool table, a parameter file.
 
 Comments are how LinuxCNC is told to run Python, to open files and to print messages; none reaches it but `(abort,...)`,
 which ends a program. Lines keep their places, so that a line number in one of its messages is that of the file.
@@ -109,7 +109,7 @@ def _cut_comments(text: str, place: Place) -> tuple[str, tuple[tuple[int, str], 
 
 
 def needs_tags(lines: Iterable[Line]) -> bool:
-    """Whether the copy must carry its line numbers as comments too, which stay in order with the moves."""
+    """True where the copy must carry its line numbers as comments too, which stay in order with the moves."""
     return any("G" in line.words and NEEDS_TAGS.search(line.words) for line in lines)
 
 
@@ -150,8 +150,8 @@ def _numbered_line(line: Line, words: str, name: str, tags: bool) -> str:
         comment = f"({line.number})"
     text = f"N{line.number}{words}{comment}"
     if len(text) > LONGEST_LINE:
-        found = f"a line of {len(text)} characters without blanks and comments"
-        raise place.fail(found, f"at most {LONGEST_LINE}, as LinuxCNC reads")
+        problem = f"a line of {len(text)} characters without blanks and comments"
+        raise place.fail(problem, f"at most {LONGEST_LINE}, as LinuxCNC reads")
     return text
 
 
@@ -161,7 +161,7 @@ COORDINATE = re.compile(r"([XYZ])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
 
 
 def step_in_words(lines: Sequence[Line], number: int, axes: Sequence[str]) -> list[float] | None:
-    """How far a line (from 1) moves along some axes in G90, by the words alone, in program units.
+    """Distances by which a line (from 1) moves along some axes in G90, by the words alone, in program units.
 
     None where the words do not say it: they are computed, or other codes stand between the two numbers of an axis.
     """

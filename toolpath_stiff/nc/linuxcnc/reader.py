@@ -69,7 +69,7 @@ def _checked(source: Sequence[str], name: str) -> tuple[list[Line], list[Dropped
 
 
 def refusal(source: Sequence[str], name: str) -> InputError | None:
-    """Why the second interpreter is not started on a program; None if it may be."""
+    """The error with which the second interpreter is not started on a program; None if it may be."""
     try:
         _checked(source, name)
     except InputError as error:
@@ -124,7 +124,7 @@ class _Session:
         return any(codes.search(line.plain) for line in self.lines)
 
     def _shift(self, origin: ShopPose | None, default_origin: ShopPose) -> Sequence[float]:
-        """How far all work offsets must be moved for machine coordinates to be those of the machine; mm.
+        """The shift of all work offsets for machine coordinates to be those of the machine; mm.
 
         It matters to G53, G28 and G30 alone. G10 writes offsets that are machine coordinates already: then none.
         """
@@ -235,7 +235,7 @@ class _Session:
         return before, g54.given or any(OFFSET_CODES.search(words) and SETS_G54.search(words) for words in early)
 
     def _turning(self) -> dict[str, int]:
-        """What makes the program look like a lathe's, with its line."""
+        """Codes that make the program look like a lathe's, with their lines."""
         signs: dict[str, int] = {}
         for line in self.lines:
             for number in TURNING.findall(line.plain) if "G" in line.words else ():
@@ -272,7 +272,7 @@ class _Session:
         return unsupported
 
     def _column(self, line: Line, word: str) -> int:
-        """Where a word stands in its line, whatever blanks are within it."""
+        """Column of a word in its line, whatever blanks are within it."""
         text = self.request.lines[line.number - 1]
         for start, comment in line.comments:
             text = text[: start - 1] + " " * (len(comment) + 1) + text[start + len(comment) :]

@@ -34,7 +34,7 @@ LIMITER = Path(__file__).with_name("limiter.py").resolve()
 
 @dataclass(frozen=True)
 class Limits:
-    """What a run may use: processor time, memory, and size of any file it writes."""
+    """Limits of a run: processor time, memory, and size of any file it writes."""
 
     seconds: int = 60
     memory_bytes: int = 1 << 30
@@ -51,7 +51,7 @@ class StoppedError(TpsError):
 
 @dataclass(frozen=True)
 class Run:
-    """What rs274 left: its canonical commands, its message ("" if it went well), its parameter file."""
+    """Output of rs274: its canonical commands, its message ("" if it went well), its parameter file."""
 
     canon: str
     message: str
@@ -136,7 +136,7 @@ def _wait(process: subprocess.Popen[bytes], folder: Path, limits: Limits) -> int
 
 
 def _ended(process: subprocess.Popen[bytes], seconds: float) -> bool:
-    """Whether it ends within a time: at once when it does, where the kernel tells (`wait` looks every so often)."""
+    """True if it ends within a time: at once when it does, where the kernel tells (`wait` looks every so often)."""
     try:
         handle = os.pidfd_open(process.pid)
     except (AttributeError, OSError):  # Linux before 5.3, or not Linux
@@ -152,7 +152,7 @@ def _ended(process: subprocess.Popen[bytes], seconds: float) -> bool:
 
 
 def _exceeded(code: int, limits: Limits) -> str:
-    """Which limit an exit code stands for; a shell's or bubblewrap's 128 + n is signal n."""
+    """The limit that an exit code stands for; a shell's or bubblewrap's 128 + n is signal n."""
     number = -code if code < 0 else code - 128
     limit: dict[int, str] = {signal.SIGXFSZ: f"{limits.file_bytes / 1e6:.0f} MB of output"}
     limit |= dict.fromkeys((signal.SIGXCPU, signal.SIGKILL), f"{limits.seconds} s of processor time")

@@ -13,9 +13,10 @@ from toolpath_stiff.comparison.residuals import Variable, directions, planes
 from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors, RefittedHint
 from toolpath_stiff.files import Content
 from toolpath_stiff.inference.errors import deviation_percent
+from toolpath_stiff.report.compare.load_path import load_path_png
 from toolpath_stiff.report.compare.machine import machine_png
 from toolpath_stiff.report.compare.pictures import measured_modelled_png, planes_png, strips_png
-from toolpath_stiff.report.compare.variables import load_path_png, variables_png
+from toolpath_stiff.report.compare.variables import variables_png
 from toolpath_stiff.report.history import history_section, history_text
 from toolpath_stiff.report.loops import loops_section, loops_text
 from toolpath_stiff.report.pages import bullets, markup, picture, readings_page, section, table

@@ -1,0 +1,308 @@
+"""Answers under each noise model, and the summary that they make together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
+from toolpath_stiff.comparison.loop_readings import BesideTip
+from toolpath_stiff.comparison.principles import CheckOutcome, NotChecked
+from toolpath_stiff.comparison.residuals import Residuals, directions, planes
+from toolpath_stiff.comparison.structure import (
+    EXCESSES,
+    SIGNIFICANT,
+    FoundPattern,
+    FoundPatterns,
+    Pattern,
+    Scattering,
+    far_off,
+)
+from toolpath_stiff.comparison.summary import (
+    AllErrors,
+    ComparisonSummary,
+    FarReading,
+    GroupErrors,
+    LawFigures,
+    LawRefitted,
+    ModelFree,
+    NoiseFigures,
+    PatternHint,
+    PatternTest,
+    PlaneErrors,
+    RefittedHint,
+    Statistic,
+)
+from toolpath_stiff.comparison.words import sentence
+from toolpath_stiff.inference.errors import deviation_percent, error_figures, errors_text
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.inference.prediction import scaled_law
+from toolpath_stiff.inference.question import question
+from toolpath_stiff.inference.slips import suspect_entries, suspect_rows
+from toolpath_stiff.readings.history import StrutHistory
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
+
+HINTS = 3  # patterns named where none stands out
+
+
+MOST_ALIKE = 6  # patterns named as not to be told apart
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Everything under one noise model."""
+
+    noise: Noise
+    scattering: Scattering
+    structure: FoundPatterns
+    refitted: FoundPatterns | None
+    law: Fit | None
+    model_free: list[CheckOutcome]
+    problem: Problem
+
+    def least_p(self, pattern: Pattern) -> float:
+        """Smallest adjusted probability that a pattern got, tested alone or beside others."""
+        tests = (*self.structure.tests, *self.structure.found)
+        return min((test.p_adjusted for test in tests if test.pattern is pattern), default=1.0)
+
+
+def summary_of(
+    residuals: Residuals,
+    answers: Sequence[Answer],
+    cannot: list[NotChecked],
+    beside: tuple[BesideTip, StrutHistory],
+    seed: int,
+    following: list[str],
+) -> ComparisonSummary:
+    """The content of compare.json, its figures not rounded yet.
+
+    Parameters
+    ----------
+    residuals
+        Of n readings.
+    answers
+        One a noise model.
+    cannot
+        Checks without a model that the data do not allow.
+    beside
+        Readings of other loops; struts alone over their dates.
+    seed
+        Of the simulated scatter.
+    following
+        Commands that go on from here.
+    """
+    data, last, values = residuals.predictor.data, answers[-1], residuals.values
+    asked = question(residuals.predictor)
+
+    def by(label: TextArray) -> dict[str, GroupErrors]:
+        return {str(level): _errors(values, answers, label == level) for level in np.unique(label)}
+
+    where, along = planes(data), directions(data)
+    heights = {str(name): float(mm_from_m(data.position[where == name, 2]).mean()) for name in np.unique(where)}
+    baseline = _baseline(values, answers)
+    by_noise = {
+        one.noise.name: [_finding(f, values, one, first=i == 0) for i, f in enumerate(one.structure.found)]
+        for one in answers
+    }
+    findings, tests = _shared_findings(answers, by_noise), _tests(answers)
+    noises = [NoiseFigures.of(one.noise) for one in answers]
+    suspects = suspect_entries([] if last.law is None else suspect_rows(last.problem, last.law), data, left_out=None)
+    doubts = [*dict.fromkeys(one.noise.remark for one in answers if one.noise.remark)]
+    doubts += [suspect.words for suspect in suspects]
+    text = [asked, overall_text(baseline, noises, pattern=bool(findings))]
+    text += [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in doubts]
+    return ComparisonSummary(
+        machine=residuals.predictor.machine.name,
+        effects=residuals.predictor.effects_that_act,
+        data=list(dict.fromkeys(data.file.tolist())),
+        readings=len(data),
+        seed=seed,
+        baseline=baseline,
+        by_direction=by(along),
+        by_plane={
+            name: PlaneErrors(**vars(errors), z_mm=heights[name])
+            for name, errors in sorted(by(where).items(), key=lambda plane: heights[plane[0]])
+        },
+        by_setup=by(data.setup),
+        by_plane_and_direction=by(np.array([f"{p} / {d}" for p, d in zip(where, along, strict=True)])),
+        findings=findings,
+        by_noise=by_noise,
+        tests=tests,
+        outliers=_far_readings(residuals, last),
+        loops=beside[0],
+        history=beside[1],
+        model_free=ModelFree(_checks(answers), cannot),
+        noise=noises,
+        not_tested=[*(f"no column {name}" for name in data.missing), *residuals.notes],
+        assumptions=_assumptions([one.noise for one in answers]),
+        warnings=list(data.warnings),
+        notes=[*data.notes, *doubts],
+        suspect_rows=suspects,
+        hints=[] if findings else _hints(last, tests, values),
+        text=" ".join(filter(None, text)),
+        question=asked,
+        next=following,
+    )
+
+
+def _errors(values: FloatArray, answers: Sequence[Answer], rows: BoolArray) -> GroupErrors:
+    """Errors of some readings, and what scatter alone would give."""
+    squares = {one.noise.name: float(one.scattering.square[rows].mean()) for one in answers}
+    measured = max(float((values[rows] ** 2).mean()), 1e-300)
+    return GroupErrors(
+        readings=int(rows.sum()),
+        **error_figures(values[rows]),
+        scatter_rms_percent={name: 100.0 * square**0.5 for name, square in squares.items()},
+        explained_by_scatter_percent={name: 100.0 * min(1.0, s / measured) for name, s in squares.items()},
+    )
+
+
+def _baseline(values: FloatArray, answers: Sequence[Answer]) -> AllErrors:
+    """The machine file as it stands, over all readings."""
+    return AllErrors(
+        **vars(_errors(values, answers, np.ones(len(values), dtype=bool))),
+        probability={one.noise.name: one.structure.probability for one in answers},
+        excess_scatter_percent={one.noise.name: 100.0 * one.structure.excess for one in answers},
+        strut_law_refitted=_refitted(answers[-1]),
+    )
+
+
+def _refitted(last: Answer) -> LawRefitted | None:
+    """What refitting the strut law's constants would leave, as in a diagnosis; None with too few readings."""
+    if last.law is None:
+        return None
+    law = scaled_law(last.problem.predictor.machine.strut_law, last.law.law)
+    count = len(law.parameters)  # of a constant law one, which belongs to no length
+    return LawRefitted(
+        **error_figures(last.law.residual),
+        strut_law=LawFigures(
+            [] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)],
+            [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][:count],
+        ),
+        excess_scatter_percent=None if last.refitted is None else 100.0 * last.refitted.excess,
+    )
+
+
+def _checks(answers: Sequence[Answer]) -> list[CheckOutcome]:
+    """The checks without a model; one holds if it does under any noise model."""
+    checks = []
+    for outcomes in zip(*(one.model_free for one in answers), strict=True):
+        holds, p = any(one.holds for one in outcomes), max(one.p_adjusted for one in outcomes)
+        text = [one.text for one in outcomes if one.holds == holds][-1]
+        checks.append(replace(outcomes[-1], holds=holds, p_adjusted=p, text=text))
+    return checks
+
+
+def _tests(answers: Sequence[Answer]) -> list[PatternTest]:
+    """Every pattern on its own, the strongest first; probabilities are the larger of the noise models."""
+    p = [{test.pattern: test.p_adjusted for test in one.structure.tests} for one in answers]
+    tests = [
+        PatternTest(
+            *_about(test.pattern),
+            same=list(test.pattern.same),
+            statistic=test.statistic,
+            p_adjusted=max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in p),
+        )
+        for test in answers[-1].structure.tests
+    ]
+    return sorted(tests, key=lambda test: -abs(test.statistic))
+
+
+def _about(pattern: Pattern) -> tuple[str, str, str, str, int]:
+    return pattern.name, pattern.variable, pattern.direction, pattern.kind, int(pattern.rows.sum())
+
+
+def _hint(test: FoundPattern, values: FloatArray, *, first: bool) -> PatternHint:
+    """A pattern as compare.json has it; `first` as of `sentence`."""
+    text, size = sentence(test, values, first)
+    alike = [*test.pattern.same, *(other.name for other in test.alike)][:MOST_ALIKE]
+    return PatternHint(text, test.statistic, test.p_adjusted, *_about(test.pattern), size, alike)
+
+
+def _finding(found: FoundPattern, values: FloatArray, answer: Answer, *, first: bool) -> PatternHint:
+    """The same, with its statistic beside the refitted strut law where the data tell that."""
+    hint = _hint(found, values, first=first)
+    if answer.refitted is None:
+        return hint
+    test = next((test for test in answer.refitted.tests if test.pattern is found.pattern), None)
+    after = None if test is None else Statistic(test.statistic, test.p_adjusted)
+    return RefittedHint(**vars(hint), after_strut_law_refit=after)
+
+
+def _shared_findings(answers: Sequence[Answer], by_noise: dict[str, list[PatternHint]]) -> list[PatternHint]:
+    """Findings that hold under every noise model, with the larger of their probabilities."""
+    fewest = min(answers, key=lambda one: len(one.structure.found))
+    kept = []
+    for found, finding in zip(fewest.structure.found, by_noise[fewest.noise.name], strict=True):
+        others = [one.least_p(found.pattern) for one in answers if one is not fewest]
+        worst = max([finding.p_adjusted, *others])
+        if worst < SIGNIFICANT:
+            kept.append(replace(finding, p_adjusted=worst))
+    return kept
+
+
+def _hints(last: Answer, tests: list[PatternTest], values: FloatArray) -> list[PatternHint]:
+    """The strongest patterns, each of another variable and not like one before, where nothing stands out."""
+    kept: list[PatternHint] = []
+    alike: set[Pattern] = set()
+    p = {test.pattern: test.p_adjusted for test in tests}
+    for test in sorted(last.structure.tests, key=lambda test: -abs(test.statistic)):
+        if len(kept) < HINTS and test.pattern not in alike and test.pattern.variable not in {h.variable for h in kept}:
+            kept.append(replace(_hint(test, values, first=True), p_adjusted=p[test.pattern.name]))
+            alike |= {*test.alike}
+    return kept
+
+
+def _far_readings(residuals: Residuals, last: Answer) -> list[FarReading]:
+    rest, far, ratio = far_off(residuals.values, last.scattering, last.structure)
+    data = residuals.predictor.data
+    along = directions(data)
+    return [
+        FarReading(
+            file=str(data.file[i]),
+            line=int(data.line[i]),
+            reading=i + 1,
+            point=str(data.point[i]),
+            direction=str(along[i]),
+            deviation_percent=float(deviation_percent(rest[i])),
+            standard_deviations=float(ratio[i]),
+        )
+        for i in far.tolist()
+    ]
+
+
+def _assumptions(noises: Sequence[Noise]) -> list[str]:
+    noise = noises[0]
+    return [
+        *(f"noise, {one.name}: {one.origin}" for one in noises),
+        f"struts alike to {100 * noise.strut_spread:.2g} %, joints where the machine file has them to "
+        f"{mm_from_m(noise.joint_error):.2g} mm (standard deviations, assumed)",
+        f"{100 * noise.outliers:.2g} % of the readings wild, {noise.outlier_width:g} times wider (assumed)",
+        "findings and pictures: the machine file as given, its strut law not refitted",
+        f"scatter from place to place beyond the noise is looked for from {100 * EXCESSES[1]:.2g} % up",
+    ]
+
+
+def overall_text(figures: AllErrors, noises: Sequence[NoiseFigures], *, pattern: bool) -> str:
+    """Error, bias and what scatter explains, in a few sentences; `pattern`: one stands out."""
+    bias, refit = figures.bias_percent, figures.strut_law_refitted
+    side = f"{abs(bias):.1f} % {'softer' if bias < 0.0 else 'stiffer'}"
+    balance = "neither softer nor stiffer" if abs(bias) < 0.05 else side
+    errors = errors_text(figures.mean_abs_error_percent, None if refit is None else refit.mean_abs_error_percent)
+    parts = []
+    for name in (noise.name for noise in noises):
+        guesses = {"low": "with the low guess of the noise", "high": "with the high guess"}
+        parts.append(
+            f"{guesses.get(name, f'with the noise as {name}')}, scatter alone would leave "
+            f"{figures.scatter_rms_percent[name]:.1f} % rms, {figures.explained_by_scatter_percent[name]:.0f} % of the "
+            f"mean square (p = {figures.probability[name]:.2g})"
+        )
+    scatter = "; ".join(parts)
+    return (
+        f"Mean error {errors} ({figures.readings} reading{'' if figures.readings == 1 else 's'}). As given, "
+        f"{balance} than modelled on balance, rms {figures.rms_percent:.1f} %. {scatter[0].upper()}{scatter[1:]}."
+        + ("" if pattern else " No pattern stands out from scatter.")
+    )
