@@ -42,10 +42,10 @@ def harmless(text: str) -> str:
 LONGEST_QUOTE = 2000  # characters of what was found: a line, a number or a name may have a million
 
 
-def _cut(found: str) -> str:
+def _cut(text: str) -> str:
     """What was found, cut in its middle where it is endless."""
     half = LONGEST_QUOTE // 2
-    return found if len(found) <= LONGEST_QUOTE else f"{found[:half]} ... {found[-half:]}"
+    return text if len(text) <= LONGEST_QUOTE else f"{text[:half]} ... {text[-half:]}"
 
 
 class TpsError(Exception):
@@ -144,16 +144,16 @@ def _told_once(errors: Iterable[InputError]) -> list[str]:
     groups: dict[tuple[str | None, str, str, str], list[InputError]] = {}
     for error in errors:
         groups.setdefault((error.file, error.found, error.expected, error.hint), []).append(error)
-    told = []
+    messages = []
     for error in errors:
         group = groups[error.file, error.found, error.expected, error.hint]
-        lines = [one.line for one in group if one.line is not None]
+        lines = [same.line for same in group if same.line is not None]
         if len(group) <= SAME or len(lines) < len(group):
-            told.append(str(error))
+            messages.append(str(error))
         elif error is group[0]:
             where = f"{error.file}: " if error.file else ""
-            told += [str(error), f"{where}the same in {len(group) - 1} further lines: {_ranges(lines[1:])}"]
-    return told
+            messages += [str(error), f"{where}the same in {len(group) - 1} further lines: {_ranges(lines[1:])}"]
+    return messages
 
 
 def _ranges(lines: list[int]) -> str:
@@ -164,7 +164,7 @@ def _ranges(lines: list[int]) -> str:
             runs[-1][1] = line
         else:
             runs.append([line, line])
-    return ", ".join(f"{one}" if one == other else f"{one}-{other}" for one, other in runs)
+    return ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in runs)
 
 
 class FileError(InputError):

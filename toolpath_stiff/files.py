@@ -164,7 +164,7 @@ def sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def exchange(one: Path, other: Path) -> bool:
+def exchange(new: Path, old: Path) -> bool:
     """Exchange two folders of one file system in one step; False where that cannot be done."""
     if sys.platform != "linux":
         return False
@@ -173,12 +173,12 @@ def exchange(one: Path, other: Path) -> bool:
     rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
     if rename is None:
         return False
-    if rename(AT_FDCWD, os.fsencode(one), AT_FDCWD, os.fsencode(other), RENAME_EXCHANGE) == 0:
+    if rename(AT_FDCWD, os.fsencode(new), AT_FDCWD, os.fsencode(old), RENAME_EXCHANGE) == 0:
         return True
     code = ctypes.get_errno()
     if code in NOT_EXCHANGED:
         return False
-    raise OSError(code, os.strerror(code), str(other))
+    raise OSError(code, os.strerror(code), str(old))
 
 
 def encoded(content: Content) -> Iterator[bytes]:

@@ -68,12 +68,12 @@ def parted(text: str) -> tuple[str, str]:
 
 def options(**given: object) -> list[str]:
     """`--name value` of everything that is given: not None, not False; lists once an entry, True without a value."""
-    words: list[str] = []
+    line: list[str] = []
     for name, value in given.items():
         option = "--" + name.replace("_", "-")
-        for one in value if isinstance(value, list | tuple) else [value]:
-            words += [] if one is None or one is False else [option] if one is True else [option, str(one)]
-    return words
+        for word in value if isinstance(value, list | tuple) else [value]:
+            line += [] if word is None or word is False else [option] if word is True else [option, str(word)]
+    return line
 
 
 @dataclass(frozen=True)

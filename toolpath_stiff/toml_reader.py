@@ -48,8 +48,8 @@ class TomlReader:
             place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
             line, column = (int(place[1]), int(place[2])) if place else (len(self.lines), None)  # at its end
             reason = str(error).split(" (at ")[0]
-            found = f"{what} is not TOML: {reason}" if what else f"not valid TOML: {reason}"
-            raise kind(found, file=file, line=line, column=column) from None
+            fault = f"{what} is not TOML: {reason}" if what else f"not valid TOML: {reason}"
+            raise kind(fault, file=file, line=line, column=column) from None
         except RecursionError:
             raise self._too_deep(self._deepest_line()) from None
         except ValueError:  # an integer of thousands of digits
@@ -69,7 +69,7 @@ class TomlReader:
         for _ in range(DEEPEST):
             if not level:
                 return
-            inner = [value for one in level for value in (one.values() if isinstance(one, dict) else one)]
+            inner = [value for table in level for value in (table.values() if isinstance(table, dict) else table)]
             for value in inner:
                 if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
                     raise self._too_large(re.compile(r"[\da-fA-F][\d_a-fA-F]{15,}"))

@@ -36,7 +36,8 @@ from toolpath_stiff.case.files import (
     without_lines,
     write_files,
 )
-from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES, read_case, recorded
+from toolpath_stiff.case.history import recorded
+from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES, read_case
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import FileError, InputError, TpsError
 from toolpath_stiff.files import read_bytes
@@ -152,7 +153,7 @@ class Case(BlindExercise):
         name = free_name(self.folder, f"machines/{Path(machine).stem}.toml")
         write_files(self.folder, {name: text})
         try:
-            Machine.load(self.path(name), effects=[self.path(one) for one in self.state.effects])
+            Machine.load(self.path(name), effects=[self.path(file) for file in self.state.effects])
         except TpsError:
             drop(self.folder, name)
             raise
@@ -230,16 +231,16 @@ class Case(BlindExercise):
     def _take_effects(self, new: str, old: str, text: str) -> None:
         """Put a file of the case among the effects, in place of `old` if there is one; drop it where it is at fault."""
         state, recorded = self.state, self.recorded
-        files = [*(one for one in state.effects if one != old), new]
+        files = [*(file for file in state.effects if file != old), new]
         try:
-            Machine.load(self.path(state.machine), effects=[self.path(one) for one in files])
+            Machine.load(self.path(state.machine), effects=[self.path(file) for file in files])
             agree((self.folder / new).read_bytes(), new)
         except TpsError:
             drop(self.folder, new)
             raise
         lost = set(state.on) - set(self._known(state.on, files)) if old else set()
         change = {
-            "effects": (*(one for one in recorded.effects if one != old), new),
+            "effects": (*(file for file in recorded.effects if file != old), new),
             "on": {name: keys for name, keys in recorded.on.items() if name not in lost},
         }
         self.record("effects", text, change=change, files=[new], command=command_line("effects", "check", new))
@@ -309,13 +310,13 @@ class Case(BlindExercise):
             name = free_name(self.folder, "machines/by-hand.toml")
             self.machine_with(acting).save(self.folder / name)
         sizes = ", ".join(f"{key} {_short(value)}" for key, value in (values or {}).items())
-        asked = self.question("compare", name) if self.state.data else command_line("machine", "check", name)
+        command = self.question("compare", name) if self.state.data else command_line("machine", "check", name)
         self.record(
             "switch",
             f"{effect} off" if values is None else f"{effect} on: {sizes}",
             change={"on": on},
             files=[name] if name != self.state.machine else [],
-            command=asked,
+            command=command,
         )
 
     @recorded
@@ -446,7 +447,7 @@ class Case(BlindExercise):
         return draft
 
     def _check_effect(self, name: str, values: Mapping[str, Any], on: bool) -> None:
-        effect = find_effect(name, [self.path(one) for one in self.state.effects])
+        effect = find_effect(name, [self.path(file) for file in self.state.effects])
         if on:
             read_parameters(effect, EffectEntry(name, dict(values)), "by hand")
             if name in self.machine.effects:

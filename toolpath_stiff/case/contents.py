@@ -12,7 +12,8 @@ from toolpath_stiff.api.by_hand import Preview, preview, with_effects
 from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.case.files import used_name
-from toolpath_stiff.case.steps import TABLES, History
+from toolpath_stiff.case.history import History
+from toolpath_stiff.case.steps import TABLES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.file import load_machine
@@ -30,7 +31,7 @@ def reading_arguments(folder: Path, reading: Mapping[str, Any]) -> Reading:
     """The same as arguments of `Program.read`."""
     given = {name: str(folder / value) if name in TABLES else value for name, value in reading.items()}
     if isinstance(switches := given.get("block_delete"), str):
-        given["block_delete"] = [int(one) for one in switches.split(",")]
+        given["block_delete"] = [int(switch) for switch in switches.split(",")]
     return cast("Reading", given)
 
 
@@ -119,23 +120,23 @@ class Contents(History):
         """Folder of the latest result of a kind among the steps that hold; "" without one."""
         return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
 
-    def question(self, name: str, machine: str = "", **own: Any) -> str:
+    def question(self, name: str, machine: str = "", **given: Any) -> str:
         """The command line that asks this of the readings in use."""
-        return self._line(name, self.data_files, machine, **own)
+        return self._line(name, self.data_files, machine, **given)
 
     def program_line(
-        self, name: str = "analyze", machine: str = "", change: Mapping[str, Any] = NO_CHANGE, **own: Any
+        self, name: str = "analyze", machine: str = "", change: Mapping[str, Any] = NO_CHANGE, **given: Any
     ) -> str:
         """The command line that asks this of the program, after a change of the state; "" without a program."""
         state = replace(self.state, **change)
         if not state.program:
             return ""
         if name == "analyze":
-            own |= {"partial": True, "require": f"{state.require:g}" if state.require else None}
+            given |= {"partial": True, "require": f"{state.require:g}" if state.require else None}
         origin = ",".join(f"{value:.10g}" for value in state.origin) or None
         reading = options(**{name.removesuffix("_mm_per_min"): value for name, value in state.reading.items()})
-        return self._line(name, [state.program], machine, *reading, origin=origin, **own)
+        return self._line(name, [state.program], machine, *reading, origin=origin, **given)
 
-    def _line(self, name: str, files: Sequence[str], machine: str = "", *last: str, **own: Any) -> str:
-        given = options(machine=machine or self.state.machine, **own, effects=list(self.state.effects))
-        return command_line(*name.split(), *files, *given, *last)
+    def _line(self, name: str, files: Sequence[str], machine: str = "", *last: str, **given: Any) -> str:
+        words = options(machine=machine or self.state.machine, **given, effects=list(self.state.effects))
+        return command_line(*name.split(), *files, *words, *last)

@@ -7,7 +7,7 @@ from typing import Any
 
 from toolpath_stiff.case.files import free_name, write_files
 from toolpath_stiff.case.findings import Findings
-from toolpath_stiff.case.steps import recorded
+from toolpath_stiff.case.history import recorded
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.report.words import counted

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import toolpath_stiff as tps
 from toolpath_stiff.case.contents import Contents
 from toolpath_stiff.case.files import write_files
-from toolpath_stiff.case.steps import recorded
+from toolpath_stiff.case.history import recorded
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import arguments_of, low_high
 from toolpath_stiff.results import Progress
@@ -50,30 +50,30 @@ class Findings(Contents):
     def find(self, kind: str, result: str, progress: Progress | None = None, **given: Any) -> tuple[Any, str]:
         """A result of this kind, kept in a folder of the case without a step; and the command that gives it."""
         if kind in ("analyze", "draft", "set_up"):
-            found, command = getattr(self, f"_{kind}")(result, progress, **given)
-            return found, command
+            kept, command = getattr(self, f"_{kind}")(result, progress, **given)
+            return kept, command
         if kind == "place":
             bounds: dict[str, Any] = {
                 name: tuple(bound) if isinstance(bound, list) else bound for name, bound in given.items()
             }
             origin = self.state.origin or None
-            found = tps.place(self.program, self.machine, origin_mm_deg=origin, progress=progress, **bounds)
+            kept = tps.place(self.program, self.machine, origin_mm_deg=origin, progress=progress, **bounds)
             command = self.program_line(kind, **words_of(tps.place, bounds))
         elif kind == "plan":
-            found = tps.plan(self.data if self.state.data else None, self.machine, **given)
+            kept = tps.plan(self.data if self.state.data else None, self.machine, **given)
             command = self.question(kind, **given)
         else:
             named = {"machine_file": self.path(f"{result}/machine.toml")} if kind == "update" else {}
-            found = getattr(tps, kind)(self.data, self.machine, progress=progress, **named, **given)
+            kept = getattr(tps, kind)(self.data, self.machine, progress=progress, **named, **given)
             command = self.question(kind, **given)
-        found.save(self.folder / result, plots=self.plots)
-        return found, command
+        kept.save(self.folder / result, plots=self.plots)
+        return kept, command
 
     def _step(self, kind: str, progress: Progress | None = None, **given: Any) -> Any:
         result = self.next_result(kind)
-        found, command = self.find(kind, result, progress, **given)
-        self.record(kind, found._short(), command=command, result=result)
-        return found
+        kept, command = self.find(kind, result, progress, **given)
+        self.record(kind, kept._short(), command=command, result=result)
+        return kept
 
     @recorded
     def compare(self, progress: Progress | None = None) -> Comparison:
@@ -142,17 +142,17 @@ class Findings(Contents):
         state = self.state
         if len(state.origin) < 3:
             raise InputError("the program sits where it always did", hint="put it somewhere with place_at first")
-        at: dict[str, Any] = dict(zip(PLACE, (*state.origin, 0.0, 0.0, 0.0), strict=False))
+        place: dict[str, Any] = dict(zip(PLACE, (*state.origin, 0.0, 0.0, 0.0), strict=False))
         name, written = Path(state.program).name, ""
         try:
-            placement = tps.place(self.program, self.machine, write=name, progress=progress, **at)
+            placement = tps.place(self.program, self.machine, write=name, progress=progress, **place)
             beside, written = {name: placement.program_bytes}, f"{result}/{name}"
         except InputError as error:
-            placement = tps.place(self.program, self.machine, progress=progress, **at)
+            placement = tps.place(self.program, self.machine, progress=progress, **place)
             beside = {"not_written.txt": f"{error}\n".encode()}
         placement.save(self.folder / result)
         write_files(self.folder / result, beside)
-        words = {**words_of(tps.place, at), "out": result, "write": written or None}
+        words = {**words_of(tps.place, place), "out": result, "write": written or None}
         return placement, self.program_line("place", change={"origin": ()}, **words)
 
     def _draft(self, result: str, progress: Progress | None) -> tuple[tps.EffectDraft, str]:

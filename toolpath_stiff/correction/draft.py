@@ -155,7 +155,7 @@ def draft_text(
     """
     seen = [sized for sized in portrait.terms if sized.term.acts]
     entries = list(zip(sizes_of([sized.term for sized in seen]), seen, strict=True))
-    alike = [f"{term_words(one.term)} ({100.0 * (one.probability or 0.0):.0f} %)" for one in portrait.alike]
+    alike = [f"{term_words(sized.term)} ({100.0 * (sized.probability or 0.0):.0f} %)" for sized in portrait.alike]
     heading = ["The model lacks, by its readings (a description, no finding):", "", portrait_text(portrait)]
     if alike:
         heading += ["", "What would look the same on these readings, as far as they can tell:"]

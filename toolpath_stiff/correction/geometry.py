@@ -1,4 +1,4 @@
-"""The paper's machine recovered: six lengths fitted to the modelled stiffnesses that its Table 1 prints."""
+"""The paper's machine figures: six lengths fitted to the modelled stiffnesses that its Table 1 prints."""
 
 from __future__ import annotations
 
@@ -171,24 +171,24 @@ def _scale_effect(lengths: FloatArray, position: FloatArray) -> float:
     return float(np.abs(blown - plain).max())
 
 
-def recovery_text(found: dict[str, Any]) -> str:
+def recovery_text(fit: dict[str, Any]) -> str:
     """What `recover_geometry` found, for the terminal."""
     lines = [f"{'fitted to the 42 modelled values of Table 1':<44} {'mm':>10}  standard error"]
-    for unknown in found["unknowns"]:
+    for unknown in fit["unknowns"]:
         lines.append(f"  {unknown['name']:<42} {unknown['mm']:10.3f}  {unknown['standard_error_mm']:.3f}")
-    one, two = found["centre_strut_lengths_m"]
-    angles = found["freed_hexagon_angles_deg"]
+    lower, top = fit["centre_strut_lengths_m"]
+    angles = fit["freed_hexagon_angles_deg"]
     lines += [
         "  (standard errors: from the table's rounding to 1 N/mm)",
-        f"starts that end in this geometry: {found['starts_that_agree']} of {found['starts']} (seed {found['seed']})",
-        f"residuals: largest {found['largest_residual_N_per_mm']:.2f}, rms {found['rms_residual_N_per_mm']:.2f} N/mm; "
-        f"{found['values_to_the_printed_digit']} of {found['values']} values to the printed digit",
-        f"mean strut length on the axis, never fitted: {one:.5f} m and {two:.5f} m (the paper: 2.5616 and 3.2132 m)",
+        f"starts that end in this geometry: {fit['starts_that_agree']} of {fit['starts']} (seed {fit['seed']})",
+        f"residuals: largest {fit['largest_residual_N_per_mm']:.2f}, rms {fit['rms_residual_N_per_mm']:.2f} N/mm; "
+        f"{fit['values_to_the_printed_digit']} of {fit['values']} values to the printed digit",
+        f"mean strut length on the axis, never fitted: {lower:.5f} m and {top:.5f} m (the paper: 2.5616 and 3.2132 m)",
         f"freed as well: hexagon at {angles[0]:.3f} and {angles[1]:.3f} degrees, struts "
-        f"{found['freed_stiffness_1_N_per_um']:.3f} and {found['freed_stiffness_2_N_per_um']:.3f} N/um "
+        f"{fit['freed_stiffness_1_N_per_um']:.3f} and {fit['freed_stiffness_2_N_per_um']:.3f} N/um "
         "(the paper: 46.5 and 32.5)",
         "not identified: the platform's scale about the tip. Blown up by a tenth, frame joints moved along, the",
-        f"  values change by {found['unidentified_scale_changes_N_per_mm']:.1e} N/mm; both joints of a vertex are put",
+        f"  values change by {fit['unidentified_scale_changes_N_per_mm']:.1e} N/mm; both joints of a vertex are put",
         "  in the vertex's radial plane to fix it, and tilted poses depend on that. Nor does the table tell platform",
         "  bars stiffer than about 1e12 N/m from rigid ones, or the strut law outside 2.5616 to 3.2132 m.",
     ]

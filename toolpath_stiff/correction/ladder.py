@@ -142,8 +142,8 @@ def _check(
         present.add("platform_flexibility")
     for name in names:
         if names.count(name) > 1 or name in present:
-            found = "is given twice" if names.count(name) > 1 else f"is in machine {machine.name} already"
-            raise InputError(f"--add {name}: the effect {found}", hint="a machine carries an effect once")
+            fault = "is given twice" if names.count(name) > 1 else f"is in machine {machine.name} already"
+            raise InputError(f"--add {name}: the effect {fault}", hint="a machine carries an effect once")
 
 
 @dataclass(frozen=True)

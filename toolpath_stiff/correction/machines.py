@@ -22,10 +22,10 @@ from toolpath_stiff.workbooks import split_name
 
 def data_hash(files: Sequence[str]) -> str:
     """SHA-256 of the measurement files' bytes, one after the other."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for file in files:
-        found.update(_bytes(file))
-    return found.hexdigest()
+        digest.update(_bytes(file))
+    return digest.hexdigest()
 
 
 def _bytes(file: str) -> bytes:
@@ -65,7 +65,7 @@ def fitted_machine(
             "origins": {**machine.origins, "strut_law": "fitted"},
             "remarks": {**machine.remarks, "strut_law": remark},
         }
-    if any(SETUP in one.effect.conditions(one.values) for one in fit.effects):
+    if any(SETUP in active.effect.conditions(active.values) for active in fit.effects):
         known = sorted({*setups} - {"", *machine.setups})
         changes["setups"] = (*machine.setups, *known)
     return machine.with_changes(**changes, uncertainty=_uncertainty(machine, fit, widened))

@@ -119,13 +119,13 @@ def update(
             machine, data, additions, strut_law=strut_law, keep_law=keep_strut_law, auto=auto, **common
         )
     # Where its results go does not matter to the command that repeats the fit.
-    own = options(
+    words = options(
         add=list(add), strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force,
         objective=objective if objective == MEAN_ERROR else None, seed=seed or None,
     )  # fmt: skip
     result = replace(
         result, names=files, seed=seed, machine_file=machine_file,
-        provenance=_provenance(result, files, asked.command("update", *own)),
+        provenance=_provenance(result, files, asked.command("update", *words)),
     )  # fmt: skip
     if result.corrected is None:
         return result

@@ -22,12 +22,12 @@ NOT_OURS = (TypeError, ValueError, KeyError, OverflowError, AttributeError)  # o
 LONGEST_NAME = 200  # bytes: what a file system takes, and what is put before it
 
 
-def do(session: Session, asked: Mapping[str, Any]) -> dict[str, Any]:
+def do(session: Session, question: Mapping[str, Any]) -> dict[str, Any]:
     """Do what a page asks. Raises `InputError` for what cannot be done."""
-    name = str(asked.get("do"))
+    name = str(question.get("do"))
     if name not in ACTIONS:
         raise InputError(f"nothing called {name!r} can be done")
-    given = {key: value for key, value in asked.items() if key != "do"}
+    given = {key: value for key, value in question.items() if key != "do"}
     with session.lock:
         session.message = ""
         try:
@@ -42,9 +42,9 @@ def do(session: Session, asked: Mapping[str, Any]) -> dict[str, Any]:
 
 def _by_hand(session: Session, on: Mapping[str, Any]) -> dict[str, Any]:
     # Which readings are wild is found out when the slider is let go.
-    found = session.case.preview.at(on, strut_law=bool(on), near=session.case.state.on or None)
-    return {**found, "deviation_percent": [round(one, 3) for one in found["deviation_percent"]],
-            "modelled_N_per_mm": [round(one) for one in found["modelled_N_per_mm"]]}  # fmt: skip
+    errors = session.case.preview.at(on, strut_law=bool(on), near=session.case.state.on or None)
+    return {**errors, "deviation_percent": [round(percent, 3) for percent in errors["deviation_percent"]],
+            "modelled_N_per_mm": [round(stiffness) for stiffness in errors["modelled_N_per_mm"]]}  # fmt: skip
 
 
 def _aside(session: Session, file: str, line: int) -> None:
@@ -146,9 +146,9 @@ def _kind(suffix: str, content: bytes) -> str:
 def _word(effect: tps.Effect, keys: Mapping[str, Any]) -> str:
     """An effect as --add takes it: with what it acts on."""
     chosen = [
-        f"{one.name}={keys[one.key]}"
-        for one in effect.parameters
-        if one.discrete and keys.get(one.key) not in ("", None)
+        f"{parameter.name}={keys[parameter.key]}"
+        for parameter in effect.parameters
+        if parameter.discrete and keys.get(parameter.key) not in ("", None)
     ]
     return f"{effect.name}:{','.join(chosen)}" if chosen else effect.name
 

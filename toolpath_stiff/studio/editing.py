@@ -54,7 +54,7 @@ class Editing:
     def look(self) -> bool:
         """Load every working copy that was saved since the last look; whether there was one."""
         changed = False
-        for name in [one for one in self._open if one in self.case.state.effects]:
+        for name in [name for name in self._open if name in self.case.state.effects]:
             file, known = self._open[name]
             try:
                 now = sha256(file.read_bytes())
@@ -79,13 +79,13 @@ class Editing:
 
         `off`: its code is not run, as this user has not agreed to it.
         """
-        found, off = list[dict[str, str | bool]](), self.case.not_agreed
+        files, off = list[dict[str, str | bool]](), self.case.not_agreed
         for name in self.case.recorded.effects:
             copy = None if name in off else self._open.get(name, (None, ""))[0]
             text = (copy or self.case.folder / name).read_text("utf-8", "replace")
             fault, path = self.faults.get(name, ""), str(copy.resolve()) if copy else ""
-            found.append({"file": name, "text": text, "copy": path, "fault": fault, "off": name in off})
-        return found
+            files.append({"file": name, "text": text, "copy": path, "fault": fault, "off": name in off})
+        return files
 
     def follow(self, looked: Callable[[], None]) -> None:
         """Call `looked` every half second in a thread until `close`."""

@@ -29,8 +29,8 @@ def exported(session: Session) -> str:
 
 
 def _document(state: str, connect: str, title: str) -> str:
-    found = page_colours()
-    colours = json.dumps({"light": found["colours"], "dark": found["colours_dark"]})
+    palette = page_colours()
+    colours = json.dumps({"light": palette["colours"], "dark": palette["colours_dark"]})
     text = "".join([*map(asset, SHARED), *map(_own, OWN)])
     script = f'\n"use strict";\n(() => {{\nconst COLOURS = {colours};\n{text}}})();\n'
     policy = (

@@ -90,11 +90,11 @@ def _of(document: Document, *names: str) -> Picture:
 
 def readings(session: Session, now: Picture | None) -> Picture:
     """All readings; deviation and model are None for those that are set aside."""
-    found, aside = session.readings(), set(session.case.state.aside)
-    out = [f"{file}:{line}" in aside for file, line in zip(found["file"], found["line"], strict=True)]
+    columns, aside = session.readings(), set(session.case.state.aside)
+    out = [f"{file}:{line}" in aside for file, line in zip(columns["file"], columns["line"], strict=True)]
     deviation, modelled = iter(now["deviation_percent"] if now else ()), iter(now["modelled_N_per_mm"] if now else ())
     return {
-        **found,
+        **columns,
         "aside": out,
         "deviation": [None if gone else round(next(deviation), 3) for gone in out],
         "modelled": [None if gone else round(next(modelled)) for gone in out],
@@ -219,29 +219,29 @@ def _setups(session: Session) -> list[str]:
 
 def fit(session: Session) -> Picture | None:
     """The last fit, if it is of these readings."""
-    found = session.found("update")
-    if not found:
+    latest = session.found("update")
+    if not latest:
         return None
-    told = _of(found["document"], "verdict", "text", "steps", "support", "warnings")
-    return {**told, "accepted": found["accepted"], "holds": session.is_fitted, "result": found["result"]}
+    parts = _of(latest["document"], "verdict", "text", "steps", "support", "warnings")
+    return {**parts, "accepted": latest["accepted"], "holds": session.is_fitted, "result": latest["result"]}
 
 
 def plan(session: Session) -> Picture | None:
     """What to measure next."""
-    found = session.found("plan")
-    if not found:
+    latest = session.found("plan")
+    if not latest:
         return None
     names = ("text", "visits", "poses", "readings", "minutes", "notes")
-    return {**_of(found["document"], *names), "file": f"{found['result']}/plan.csv"}
+    return {**_of(latest["document"], *names), "file": f"{latest['result']}/plan.csv"}
 
 
 def compare(session: Session) -> Picture | None:
     """Where the model fails: planes by direction, findings; the folder with its page."""
-    found = session.found("compare")
-    if not found:
+    latest = session.found("compare")
+    if not latest:
         return None
     names = ("text", "by_plane_and_direction", "by_direction", "findings", "outliers", "warnings")
-    return {**_of(found["document"], *names), "result": found["result"]}
+    return {**_of(latest["document"], *names), "result": latest["result"]}
 
 
 def program(session: Session) -> Picture | None:
@@ -250,7 +250,7 @@ def program(session: Session) -> Picture | None:
     if not state.program:
         return None
     lines = session.once("lines", session.program_key, lambda: list(session.case.program.lines))
-    found, error = session.found("analyze"), session.failed("analyze")
+    analysis, error = session.found("analyze"), session.failed("analyze")
     shown = {
         "name": state.program.rpartition("/")[2],
         "lines": lines[:MOST_LINES],
@@ -258,13 +258,13 @@ def program(session: Session) -> Picture | None:
         "require": state.require,
         "placed": bool(state.origin),
     }
-    if not found:
+    if not analysis:
         return {**shown, "path": None, "error": error}
     summary = _of(
-        found["document"], "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "weakest", "plunges",
+        analysis["document"], "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "weakest", "plunges",
         "warnings", "out_of_reach_samples", "per_operation", "required",
     )  # fmt: skip
-    return {**shown, "path": found["path"], "summary": summary, "result": found["result"], "error": ""}
+    return {**shown, "path": analysis["path"], "summary": summary, "result": analysis["result"], "error": ""}
 
 
 def origin(session: Session) -> list[float]:
@@ -299,5 +299,5 @@ def set_up(session: Session) -> Picture | None:
     if not entry:
         return None
     files = {"sheet": "setup.pdf", "written": entry["written"], "page": "report.html"}
-    told = _of(entry["document"], "warnings", "offset_blocks", "chosen", "before", "worse")
-    return told | {name: f"{entry['result']}/{file}" for name, file in files.items()}
+    parts = _of(entry["document"], "warnings", "offset_blocks", "chosen", "before", "worse")
+    return parts | {name: f"{entry['result']}/{file}" for name, file in files.items()}

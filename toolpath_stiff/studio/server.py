@@ -150,8 +150,6 @@ class Handler(BaseHTTPRequestHandler):
             self._json({"error": reason(error)})
         return None
 
-    # -- who may ask ---------------------------------------------------------------------------------------------------
-
     @property
     def _cookie_name(self) -> str:
         return f"tps_studio_{self.server.server_port}"
@@ -176,8 +174,6 @@ class Handler(BaseHTTPRequestHandler):
             hmac.compare_digest(given.encode(), known)
             or (cookie is not None and hmac.compare_digest(cookie.value.encode(), known))
         )
-
-    # -- answers -------------------------------------------------------------------------------------------------------
 
     def _get(self) -> None:
         parts, session = urlsplit(self.path), self.server.session
@@ -214,11 +210,11 @@ class Handler(BaseHTTPRequestHandler):
             query = {name: values[0] for name, values in parse_qs(parts.query).items()}
             return self._json(take_file(session, query.get("name", "file"), body, query.get("run") == "yes"))
         try:
-            asked = json.loads(body, parse_float=_number, parse_constant=_number)
+            question = json.loads(body, parse_float=_number, parse_constant=_number)
         except (ValueError, RecursionError):
             raise InputError("the question is no JSON") from None
-        if parts.path == "/do" and isinstance(asked, dict):
-            return self._json(do(session, asked))
+        if parts.path == "/do" and isinstance(question, dict):
+            return self._json(do(session, question))
         return self._send(HTTPStatus.NOT_FOUND, "there is no such page", "text/plain")
 
     def _events(self) -> None:

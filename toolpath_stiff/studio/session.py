@@ -11,7 +11,8 @@ from typing import Any, TypeVar
 
 import toolpath_stiff as tps
 from toolpath_stiff.case.case import Case
-from toolpath_stiff.case.steps import Step, python_line
+from toolpath_stiff.case.history import python_line
+from toolpath_stiff.case.steps import Step
 from toolpath_stiff.documents import Document
 from toolpath_stiff.studio.editing import Editing
 from toolpath_stiff.studio.work import Job
@@ -93,10 +94,10 @@ class Session:
     def path_key(self) -> tuple[Any, ...]:
         """What the analysis of the program hangs on."""
         state = self.case.state
-        own = tuple((name, tuple(keys.items())) for name, keys in state.on.items())
-        fitted = bool(own) and self.is_fitted  # a fit knows how well it knows: its machine has a band
-        on = self.data_key if own else (state.machine, state.effects)
-        return (on, own, fitted, self.program_key, state.origin, state.require)
+        switches = tuple((name, tuple(keys.items())) for name, keys in state.on.items())
+        fitted = bool(switches) and self.is_fitted  # a fit knows how well it knows: its machine has a band
+        on = self.data_key if switches else (state.machine, state.effects)
+        return (on, switches, fitted, self.program_key, state.origin, state.require)
 
     @property
     def program_key(self) -> tuple[Any, ...]:
@@ -128,8 +129,8 @@ class Session:
 
     def document(self, kind: str) -> Document | None:
         """The document of what was found last, if it still holds."""
-        found = self.found(kind)
-        return found["document"] if found else None
+        latest = self.found(kind)
+        return latest["document"] if latest else None
 
     def catalogue(self) -> tps.EffectCatalogue:
         """The effects that can be switched on."""
@@ -287,7 +288,7 @@ class Session:
             files = [self.case.path(name) for name in state.data]
             frame = tps.Measurements(files).to_frame(self.machine)
             names = dict(zip(files, state.data, strict=True))
-            frame["file"] = [names[one] for one in frame["file"]]
+            frame["file"] = [names[file] for file in frame["file"]]
             return {"file": frame["file"].tolist(), "line": frame["line"].tolist(), "point": frame["point"].tolist(),
                     **{name: frame[name].round(4).tolist() for name in READING}}  # fmt: skip
 

@@ -43,11 +43,11 @@ class Job:
         self._process.start()
         theirs.close()
 
-    def follow(self, told: Callable[[], None], done: Callable[[Job, Any, str], None]) -> None:
+    def follow(self, reported: Callable[[], None], done: Callable[[Job, Any, str], None]) -> None:
         """In a thread: `told` after every report, `done` with the answer, or None and what went wrong."""
-        threading.Thread(target=self._listen, args=(told, done), daemon=True).start()
+        threading.Thread(target=self._listen, args=(reported, done), daemon=True).start()
 
-    def _listen(self, told: Callable[[], None], done: Callable[[Job, Any, str], None]) -> None:
+    def _listen(self, reported: Callable[[], None], done: Callable[[Job, Any, str], None]) -> None:
         answer, error = None, "stopped"
         try:
             while True:
@@ -56,7 +56,7 @@ class Job:
                     answer, error = (content, "") if word == "done" else (None, content)
                     break
                 self.progress = content
-                told()
+                reported()
         except (EOFError, OSError):
             pass
         self._process.join()
@@ -103,31 +103,31 @@ def answer(
     """What the page needs of a result that is kept in the case; `first`: the machine to hold an analysis against."""
     case.plots = kind == "compare"  # the only one whose page is opened from the studio
     tell(kind, 0, 0)
-    found, command = case.find(kind, result, tell, **given)
-    told: dict[str, Any] = {"text": repr(found), "command": command}
+    kept, command = case.find(kind, result, tell, **given)
+    reply: dict[str, Any] = {"text": repr(kept), "command": command}
     if kind == "draft":
-        file = f"{result}/{found.name}.toml" if found.text else ""
-        return {**told, "document": {"reason": found.reason, "file": file}}
-    told["document"] = found.to_dict()
+        file = f"{result}/{kept.name}.toml" if kept.text else ""
+        return {**reply, "document": {"reason": kept.reason, "file": file}}
+    reply["document"] = kept.to_dict()
     if kind == "update":
-        told["accepted"] = found.accepted
+        reply["accepted"] = kept.accepted
     elif kind == "set_up":
         names = (case.program.name, "not_written.txt")
-        told["written"] = next(name for name in names if (case.folder / result / name).is_file())
+        reply["written"] = next(name for name in names if (case.folder / result / name).is_file())
     elif kind == "analyze":
         origin = case.state.origin or None
         given_machine = case.machine_of(first)
         before = tps.analyze(case.program, given_machine, origin_mm_deg=origin, partial=True, progress=tell)
-        told["path"] = _columns(found, before)
-    return told
+        reply["path"] = _columns(kept, before)
+    return reply
 
 
-def _columns(found: Any, before: Any) -> dict[str, Any]:
+def _columns(analysis: Any, before: Any) -> dict[str, Any]:
     """What the page draws of a path: at most so many samples, the lowest and the highest of every stretch."""
-    frame, given = found.to_frame(), before.to_frame()["stiffness_N_per_mm"].to_numpy()
+    frame, given = analysis.to_frame(), before.to_frame()["stiffness_N_per_mm"].to_numpy()
     stiffness = frame["stiffness_N_per_mm"].to_numpy()
     rows = _thinned(stiffness, np.flatnonzero(np.diff(frame["line"], prepend=-1, append=-1)[:-1]))
-    band = found.deviation_N_per_mm
+    band = analysis.deviation_N_per_mm
     columns = {
         name: _plain(frame[name].to_numpy()[rows], 4)
         for name in ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "s_mm", "t_s", "margin")
@@ -159,4 +159,4 @@ def _thinned(values: Any, starts: Any) -> Any:
 
 def _plain(values: Any, digits: int) -> list[float | None]:
     """Rounded numbers as JSON has them."""
-    return [float(one) if np.isfinite(one) else None for one in np.round(values, digits)]
+    return [float(value) if np.isfinite(value) else None for value in np.round(values, digits)]

@@ -59,15 +59,15 @@ def error_ladder_png(update: Update) -> Figure:
 
 def _draw_steps(axes: Axes, held: FloatArray, inside: FloatArray, taken: int) -> None:
     """Errors at left-out points and in sample: the first `taken` joined, those that were not taken apart."""
-    at = np.arange(len(held))
-    axes.plot(at[:taken], held[:taken], "o-", color=BLUE, lw=2.0, ms=9, label="at points left out", zorder=4)
-    axes.plot(at[:taken], inside[:taken], "s--", color=MUTED, lw=1.3, ms=6, mfc="white", label="in sample", zorder=3)
+    x = np.arange(len(held))
+    axes.plot(x[:taken], held[:taken], "o-", color=BLUE, lw=2.0, ms=9, label="at points left out", zorder=4)
+    axes.plot(x[:taken], inside[:taken], "s--", color=MUTED, lw=1.3, ms=6, mfc="white", label="in sample", zorder=3)
     if taken < len(held):
         axes.axvspan(taken - 0.5, len(held) - 0.3, color=WITHIN, lw=0, zorder=0)
         axes.text(taken - 0.45, 0.97, "tried from there, not taken", color=MUTED, size=9, va="top",
                   transform=axes.get_xaxis_transform())  # fmt: skip
-        axes.plot(at[taken:], held[taken:], "o", color=BLUE, ms=9, mfc="white", zorder=4)
-        axes.plot(at[taken:], inside[taken:], "s", color=MUTED, ms=6, mfc="white", zorder=3)
+        axes.plot(x[taken:], held[taken:], "o", color=BLUE, ms=9, mfc="white", zorder=4)
+        axes.plot(x[taken:], inside[taken:], "s", color=MUTED, ms=6, mfc="white", zorder=3)
 
 
 def _name_values(axes: Axes, values: FloatArray, style: dict[str, Any]) -> None:
@@ -90,13 +90,13 @@ def figure3_png(curve: BarCurve) -> Figure:
 
     With the machine's own strut law, and with the one that makes the error smallest for each platform.
     """
-    bars, own, refitted = curve.bars[:-1], 100.0 * curve.error[:-1], 100.0 * curve.error_refitted[:-1]
+    bars, given, refitted = curve.bars[:-1], 100.0 * curve.error[:-1], 100.0 * curve.error_refitted[:-1]
     with house_style():
         figure = new_figure(11.0, 5.2)
         figure.text(0.03, 0.93, "How stiff must the platform be taken?", size=14, weight="bold")
         figure.text(0.03, 0.88, "Figure 3 of Clinton, Zhang and Wavering (1997), computed here", size=9.5, color=MUTED)
         axes = figure.add_axes((0.09, 0.13, 0.87, 0.68))
-        axes.plot(bars, own, color=BLUE, lw=2.0, label="with the machine file's strut law")
+        axes.plot(bars, given, color=BLUE, lw=2.0, label="with the machine file's strut law")
         axes.plot(bars, refitted, color=MUTED, lw=1.5, ls="--", label="strut law refitted for each platform")
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(lambda value, _: significant(value, 1))
