@@ -89,7 +89,7 @@ def reading(report: Report, lines: int, rounds: int) -> None:
 def one_by_one(text: str) -> None:
     """Our reader without its fast way."""
     from toolpath_stiff.nc.frames import Frames
-    from toolpath_stiff.nc.interpreter import ProgramRun
+    from toolpath_stiff.nc.program_run import ProgramRun
     from toolpath_stiff.nc.request import ZERO
     from toolpath_stiff.nc.state import State
     from toolpath_stiff.nc.tables import Offsets

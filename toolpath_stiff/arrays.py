@@ -28,7 +28,7 @@ def product(left: FloatArray, right: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Columns:
+class ArrayColumns:
     """Arrays with a row each for the same things; a field that is no array holds for all of them."""
 
     def take(self, rows: IntArray | BoolArray | slice) -> Self:

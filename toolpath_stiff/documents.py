@@ -18,7 +18,7 @@ def to_dict(value: Any) -> Any:
         return {key: to_dict(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
         return [to_dict(part) for part in value]
-    return value.tolist() if hasattr(value, "tolist") else value  # numpy is not imported: help texts need none
+    return value.tolist() if hasattr(value, "tolist") else value  # of numpy, which is not imported for it
 
 
 def without_nan(value: Any) -> Any:

@@ -132,13 +132,13 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
     >>> placed.end[:, :3].round(9).tolist()  # m
     [[0.1, 0.04, 0.8]]
     """
-    at = np.asarray(origin, dtype=float)
-    turn = rotation_matrices(at[3:])
+    zero = np.asarray(origin, dtype=float)
+    turn = rotation_matrices(zero[3:])
 
     def placed(pose: FloatArray) -> FloatArray:
         # Plain addition where nothing turns: a multiplication by the unit matrix would cost the last digit.
-        point = product(pose[:, :3], turn.T) if at[3:].any() else pose[:, :3]
-        return np.concatenate([point + at[:3], pose[:, 3:]], axis=1)
+        point = product(pose[:, :3], turn.T) if zero[3:].any() else pose[:, :3]
+        return np.concatenate([point + zero[:3], pose[:, 3:]], axis=1)
 
     placed_moves = replace(moves, start=placed(moves.start), end=placed(moves.end))
     if not moves.arc_sweep.any():  # a long program of straight moves need not hold its zeros twice
@@ -146,7 +146,7 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
     arc = (moves.arc_sweep != 0.0)[:, None]
     return replace(
         placed_moves,
-        arc_center=np.where(arc, product(moves.arc_center, turn.T) + at[:3], 0.0),
+        arc_center=np.where(arc, product(moves.arc_center, turn.T) + zero[:3], 0.0),
         arc_normal=product(moves.arc_normal, turn.T),
     )
 
@@ -316,10 +316,7 @@ def _turn(moves: Moves) -> FloatArray:
 def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> FloatArray:
     """(n,) whole numbers from 1, into how many pieces the samples divide each move. Raises `InputError`."""
     # A length that is a whole number of steps up to rounding must not gain a step.
-    pieces = np.maximum(
-        np.ceil(length * _fastest_part(moves) / step - 1e-9),
-        np.ceil(turn / ANGULAR_STEP - 1e-9),
-    )
+    pieces = np.maximum(np.ceil(length * _fastest_part(moves) / step - 1e-9), np.ceil(turn / ANGULAR_STEP - 1e-9))
     pieces = np.maximum(pieces, 1.0)
     total = float(pieces.sum()) + len(moves)
     if total > MOST_SAMPLES:

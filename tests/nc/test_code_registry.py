@@ -14,7 +14,7 @@ from toolpath_stiff.nc.codes.code import EVERYWHERE, Code, holds_anyway
 from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED, code_meaning, table
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.groups import STEPS
-from toolpath_stiff.nc.plain_lines import MODE_NAMES
+from toolpath_stiff.nc.plain_moves import MODE_NAMES
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
 

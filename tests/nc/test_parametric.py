@@ -292,7 +292,7 @@ def test_a_loop_in_which_nothing_changes_is_refused_at_once(text, controller, li
 
 
 def test_a_loop_without_an_end_is_stopped(monkeypatch):
-    monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_IDLE", 500)
+    monkeypatch.setattr("toolpath_stiff.nc.parametric.endless.MOST_IDLE", 500)
     error = refusal("#1=0\no1 while [1]\n#1=[#1+1]\no1 endwhile\n", LINUXCNC)
     assert "500 blocks of loops" in error.found and error.line == 4
     monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_STEPS", 900)

@@ -10,12 +10,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import frames, geometry, interpreter, plain_lines, plain_words
+from toolpath_stiff.nc import frames, geometry, plain_lines, plain_words, program_run
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.codes import modes, points
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.interpreter import ProgramRun
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.nc.words import read_lines, split_lines
@@ -28,7 +28,7 @@ ZERO = (0.0,) * 6
 @pytest.fixture(autouse=True)
 def _runs_of_any_length(monkeypatch):
     monkeypatch.setattr(plain_lines, "FEWEST", 1)
-    monkeypatch.setattr(interpreter, "FEWEST_LINES", 1)
+    monkeypatch.setattr(program_run, "FEWEST_LINES", 1)
 
 
 def outcome(lines, dialect, fast):
@@ -37,7 +37,7 @@ def outcome(lines, dialect, fast):
     control = State("p", axes, copy.deepcopy(TOOLS), DIALECTS[dialect])
     run = ProgramRun(control, lines, "p", frozenset(), fast=fast)
     executed = []
-    run._executed = lambda at, rows: executed.append(len(rows))
+    run._tally_plain = lambda at, rows: executed.append(len(rows))
     error = None
     try:
         warnings = run.run()
@@ -172,7 +172,7 @@ def test_random_programs_are_checked_alike(blocks):
     lines = split_lines("F300\n" + "\n".join(blocks), "p")
     fast = check_lines(lines, "p", controller=Controller())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(interpreter, "FEWEST_LINES", len(lines) + 1)
+        patch.setattr(program_run, "FEWEST_LINES", len(lines) + 1)
         slow = check_lines(lines, "p", controller=Controller())
     for found in (fast, slow):
         assert found.used == slow.used

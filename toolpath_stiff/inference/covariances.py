@@ -249,9 +249,10 @@ class Precision:
 
         Share v / (1 + v c_row) of column c for the variance v (Sherman and Morrison 1950).
         """
-        unit = np.zeros(len(self))
-        unit[row] = 1.0
-        column = self.times(unit)
+        group = self.groups.of[row]
+        column = -(self.factors[:, row] @ self.factors)
+        column -= (self.groups.of == group) * (self.pull[group] / self.own[row]) / self.own
+        column[row] += 1.0 / self.own[row]
         share = variance / (1.0 + variance * float(column[row]))
         return replace(self, factors=np.concatenate([self.factors, np.sqrt(share) * column[None]])), column, share
 

@@ -10,7 +10,7 @@ chapters 27 and 28). An effect of several parameters is tried with each subset o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -254,9 +254,9 @@ class Problem:
         Gauss-Newton from the law of `start`, then Laplace's approximation. `sizes`: where to begin, with the scatter of
         `start`; else at 0.
         """
-        parts = [(table, j) for table in tables for j in range(len(table.candidate.components))]
-        chosen = [parts[i] for i in free]
-        x, unknowns = np.concatenate([start.law, np.zeros(len(parts))]), [0, 1, *(2 + i for i in free)]
+        every = [(table, j) for table in tables for j in range(len(table.candidate.components))]
+        chosen = [every[i] for i in free]
+        x, unknowns = np.concatenate([start.law, np.zeros(len(every))]), [0, 1, *(2 + i for i in free)]
         if sizes is not None:
             x[unknowns[2:]] = sizes[list(free)]
         scatter = self.scatter if sizes is None else start.scatter
@@ -283,9 +283,10 @@ class Problem:
         if not possible and len(free) > 1:
             return None
         peak = float(scatter.log_likelihood(residual)) - 0.5 * float(law @ law) / LAW_PRIOR**2 - 2.0 * np.log(LAW_PRIOR)
+        candidates, parts = zip(*((table.candidate, part) for table, part in split(tables, x[2:].copy())), strict=True)
         return Fit(
-            tuple(table.candidate for table in tables), tuple(split(tables, x[2:])), free, law.copy(), residual,
-            equations.jacobian, covariance, scatter, tables=tuple(tables), possible=possible,
+            candidates, parts, free, law.copy(), residual, equations.jacobian, covariance, scatter,
+            tables=tuple(tables), possible=possible,
             log_evidence=self._integrated(peak, tables, chosen, fitted, deviations, equations.information),
         )  # fmt: skip
 
@@ -333,15 +334,14 @@ class Problem:
         """
 
         def added(x: FloatArray) -> FloatArray:
-            deltas = (table.delta(sizes) for table, sizes in zip(tables, split(tables, x[2:]), strict=True))
+            deltas = (table.delta(sizes) for table, sizes in split(tables, x[2:]))
             return sum(deltas, np.zeros(len(self.observed)))
 
         def equations(x: FloatArray) -> NormalEquations:
             part, by_law = self.predictor.strut_part_and_slopes(x[:2])
             compliance = self._held(part + added(x))
-            slopes = [table.slope(sizes) for table, sizes in zip(tables, split(tables, x[2:]), strict=True)]
-            columns = np.concatenate([by_law.T, *slopes], axis=1)[:, unknowns]
-            jacobian = -columns / compliance[:, None]
+            slopes = [table.slope(sizes) for table, sizes in split(tables, x[2:])]
+            jacobian = -np.concatenate([by_law.T, *slopes], axis=1)[:, unknowns] / compliance[:, None]
             return normal_equations(jacobian, self.observed + np.log(compliance), x[:2], precision)
 
         def move(x: FloatArray, here: NormalEquations) -> tuple[FloatArray, FloatArray]:
@@ -362,10 +362,13 @@ class Problem:
         return x, self.observed + np.log(self.compliance(x[:2], added(x))), last
 
 
-def split(tables: Sequence[Table], sizes: FloatArray) -> list[FloatArray]:
-    """Sizes (p,) of all tables, each by itself."""
-    ends = np.cumsum([len(table.candidate.components) for table in tables])[:-1]
-    return np.split(sizes.copy(), ends)
+def split(tables: Sequence[Table], sizes: FloatArray) -> Iterator[tuple[Table, FloatArray]]:
+    """Each table with its own of the sizes (p,)."""
+    start = 0
+    for table in tables:
+        end = start + len(table.candidate.components)
+        yield table, sizes[start:end]
+        start = end
 
 
 def _just_beyond(component: Component, size: float) -> bool:

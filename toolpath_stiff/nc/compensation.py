@@ -116,15 +116,34 @@ class Step:
     way: tuple[Point2, ...] = ()
 
 
+def enter(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> tuple[Step, Point2]:
+    """The first move, and its direction (Fanuc's and LinuxCNC's arcs have none). Raises `ArcError`."""
+    if cutter.straight:
+        return enter_fanuc(cutter, target, arc), (0.0, 0.0)
+    if arc is not None:
+        return enter_arc(cutter, start, target, arc.center, arc.turn), (0.0, 0.0)
+    return enter_straight(cutter, start, target)
+
+
+def go_on(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> Step:
+    """A further move. Raises `ArcError`."""
+    if cutter.straight:
+        return go_on_fanuc(cutter, start, target, arc)
+    return _go(cutter, start, target, arc, CORNER)
+
+
+def _go(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None, least: float) -> Step:
+    if arc is None:
+        return go_straight(cutter, start, target, least)
+    return go_round(cutter, start, target, arc.center, arc.turn, least)
+
+
 def _beside(point: Point2, length: float, angle: float) -> Point2:
     return point[0] + length * math.cos(angle), point[1] + length * math.sin(angle)
 
 
 def _angle(tail: Point2, head: Point2) -> float:
     return math.atan2(head[1] - tail[1], head[0] - tail[0])
-
-
-# -- entry -------------------------------------------------------------------------------------------------------------
 
 
 def enter_straight(cutter: Cutter, start: Point2, target: Point2) -> tuple[Step, Point2]:
@@ -169,9 +188,6 @@ def check_fits(cutter: Cutter, radius: float) -> None:
     """Raise `ArcError` for an arc that the tool, inside it, cannot follow."""
     if radius <= cutter.radius:
         raise ArcError(f"an inside arc of radius {radius:.4f} mm", f"more than the tool's radius, {cutter.radius:g} mm")
-
-
-# -- further moves -----------------------------------------------------------------------------------------------------
 
 
 def go_straight(cutter: Cutter, start: Point2, target: Point2, least: float = CORNER) -> Step:
@@ -223,9 +239,6 @@ def go_round(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn
     if corner > least:
         return Step(end, corner=_beside(start, cutter.radius, inward if inside else inward + math.pi))
     return Step(end)
-
-
-# -- concave corners ---------------------------------------------------------------------------------------------------
 
 
 def _within(value: float) -> float:
@@ -286,7 +299,7 @@ def go_on_fanuc(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | 
             raise ArcError("a move along the tool right after the first move of cutter compensation", "it before G41")
         cutter.entering = False
         return Step(_end(cutter, start, target, arc), trim=beside)
-    before = math.atan2(cutter.center[1] - start[1], cutter.center[0] - start[0]) - cutter.side * math.pi / 2.0
+    before = _angle(start, cutter.center) - cutter.side * math.pi / 2.0
     turn = math.remainder(along - before, math.tau)
     if abs(turn) <= TURNED:
         return Step(_end(cutter, start, target, arc))
@@ -295,7 +308,7 @@ def go_on_fanuc(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | 
     if abs(turn) > math.pi - TURNED:
         raise ArcError("a contour under cutter compensation that turns back on itself", "another contour")
     if turn * cutter.side > 0.0:
-        return _inside(cutter, start, target, arc)
+        return _go(cutter, start, target, arc, TURNED)  # an inside corner, as LinuxCNC has it
     return _outside(cutter, _end(cutter, start, target, arc), (before, turn), beside, arc)
 
 
@@ -306,18 +319,11 @@ def _end(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -
     return _beside_contour(target, cutter, _heading(target, start, target, arc))
 
 
-def _inside(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> Step:
-    """An inside corner: where both offset moves meet, on LinuxCNC too."""
-    if arc is None:
-        return go_straight(cutter, start, target, TURNED)
-    return go_round(cutter, start, target, arc.center, arc.turn, TURNED)
-
-
 def _heading(at: Point2, start: Point2, target: Point2, arc: OffsetArc | None) -> float:
     """Direction of a programmed move at one of its ends."""
     if arc is None:
-        return math.atan2(target[1] - start[1], target[0] - start[0])
-    return math.atan2(at[1] - arc.center[1], at[0] - arc.center[0]) + arc.turn * math.pi / 2.0
+        return _angle(start, target)
+    return _angle(arc.center, at) + arc.turn * math.pi / 2.0
 
 
 def _beside_contour(point: Point2, cutter: Cutter, heading: float) -> Point2:

@@ -37,8 +37,6 @@ from toolpath_stiff.nc.tables import (
 )
 from toolpath_stiff.toml_reader import TomlReader, is_text
 
-# -- dialects ----------------------------------------------------------------------------------------------------------
-
 # IS-B, the increment system of nearly every Fanuc and Haas: what a number without a decimal point counts.
 INCREMENT_MM, INCREMENT_INCH, INCREMENT_DEGREE = 1e-3, 1e-4, 1e-3
 
@@ -154,8 +152,6 @@ def dialect_named(name: str) -> Dialect:
         raise ProgramError(f"dialect {name!r}", expected=", ".join(DIALECTS))
     return DIALECTS[name]
 
-
-# -- the controller file -----------------------------------------------------------------------------------------------
 
 ALL_SWITCHES = frozenset(range(1, 10))
 TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "material", "remark")
@@ -296,12 +292,9 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
 def _dialect(toml: TomlReader, asked: str | None) -> Dialect:
     name = _choice(toml, "dialect", tuple(DIALECTS), "generic")
     dialect = dialect_named(asked or name)
-    changes: dict[str, Any] = {}
-    if _choice(toml, "arc_centers", ("incremental", "absolute"), "incremental") == "absolute":
-        changes["arc_absolute"] = True
-    if _choice(toml, "inch_metric", (G70_UNITS, G20_UNITS), G20_UNITS) == G70_UNITS:
-        changes["inch_metric"] = True
-    return replace(dialect, **changes) if changes else dialect
+    absolute = _choice(toml, "arc_centers", ("incremental", "absolute"), "incremental") == "absolute"
+    by_g70 = _choice(toml, "inch_metric", (G70_UNITS, G20_UNITS), G20_UNITS) == G70_UNITS
+    return replace(dialect, arc_absolute=dialect.arc_absolute or absolute, inch_metric=dialect.inch_metric or by_g70)
 
 
 def _choice(toml: TomlReader, key: str, choices: tuple[str, ...], otherwise: str) -> str:

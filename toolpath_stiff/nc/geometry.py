@@ -54,9 +54,6 @@ def normal_of(plane: str) -> Vector:
     return (float(normal == 0), float(normal == 1), float(normal == 2))
 
 
-# -- arcs --------------------------------------------------------------------------------------------------------------
-
-
 class ArcError(Exception):
     """What is wrong with an arc: found, expected."""
 
@@ -221,9 +218,6 @@ def _vector(values: FloatArray) -> Vector:
     return (x, y, z)
 
 
-# -- tool axes ---------------------------------------------------------------------------------------------------------
-
-
 def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
     """Roll and pitch in degrees that turn the spindle's z onto a tool axis, at a yaw of 0.
 
@@ -244,9 +238,6 @@ def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
     across = math.hypot(i, k)
     pitch = math.degrees(math.atan2(i, k)) if across else 0.0
     return math.degrees(math.atan2(-j, across)), pitch
-
-
-# -- the curves of moves -----------------------------------------------------------------------------------------------
 
 
 def move_lengths(moves: Moves) -> FloatArray:
@@ -341,9 +332,6 @@ def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray
     position = frame.center[arc] + radius * outward + height * normal
     velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
     return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
-
-
-# -- strokes of drilling cycles ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -223,8 +223,6 @@ def _check_pair(toml: TomlReader, axes: tuple[RotaryAxis, ...], parts: tuple[tup
         raise toml.error(f"{first}.axis and {second}.axis are parallel", "two directions", where=f"{second}.axis")
 
 
-# -- where the tool stands ---------------------------------------------------------------------------------------------
-
 UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
 Z = np.array([0.0, 0.0, 1.0])
 

@@ -60,7 +60,7 @@ class Program:
     controller: Controller = field(repr=False)
     options: dict[str, Any] = field(repr=False)
     text: str | None = field(default=None, repr=False)
-    said: dict[str, Any] = field(default_factory=dict, repr=False)
+    given: dict[str, Any] = field(default_factory=dict, repr=False)
     _last: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
@@ -155,37 +155,37 @@ class Program:
         from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
         from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 
-        given = {option: reading.get(option) for option in Reading.__annotations__}
-        said = {option.removesuffix("_mm_per_min"): value for option, value in given.items() if value}
-        switches = given["block_delete"] or False
+        values = {option: reading.get(option) for option in Reading.__annotations__}
+        given = {option.removesuffix("_mm_per_min"): value for option, value in values.items() if value}
+        switches = values["block_delete"] or False
         if not isinstance(switches, bool):
             switches = frozenset(switches)
             if not switches <= set(range(1, 10)):
                 raise InputError(f"block_delete {sorted(switches)}", expected="switches 1 to 9, True or False")
-            said["block_delete"] = ",".join(map(str, sorted(switches)))
-        if given["interpreter"] == "builtin":
-            del said["interpreter"]
-        controller = Controller(dialect_named(given["dialect"] or "generic"))
-        if given["controller"]:
-            controller = read_controller(given["controller"], given["dialect"])
+            given["block_delete"] = ",".join(map(str, sorted(switches)))
+        if values["interpreter"] == "builtin":
+            del given["interpreter"]
+        controller = Controller(dialect_named(values["dialect"] or "generic"))
+        if values["controller"]:
+            controller = read_controller(values["controller"], values["dialect"])
         tables = dict[str, Any]()
-        if given["offsets"]:
-            tables["offsets"] = read_offsets(given["offsets"])
-        if given["tools"]:
-            tables["tools"] = read_tool_table(given["tools"])
-        if given["feed_mm_per_min"]:
-            tables["feed"] = given["feed_mm_per_min"]
-        if given["subprograms"]:
-            tables["subprograms"] = str(given["subprograms"])
+        if values["offsets"]:
+            tables["offsets"] = read_offsets(values["offsets"])
+        if values["tools"]:
+            tables["tools"] = read_tool_table(values["tools"])
+        if values["feed_mm_per_min"]:
+            tables["feed"] = values["feed_mm_per_min"]
+        if values["subprograms"]:
+            tables["subprograms"] = str(values["subprograms"])
             if not Path(tables["subprograms"]).is_dir():
                 raise InputError(f"{tables['subprograms']!r} is no folder", expected="the folder of subprograms")
         options = {
             "block_delete": switches,
-            "interpreter": given["interpreter"] or "builtin",
-            "rs274": given["rs274"],
-            "unconfined": bool(given["unconfined"]),
+            "interpreter": values["interpreter"] or "builtin",
+            "rs274": values["rs274"],
+            "unconfined": bool(values["unconfined"]),
         }
-        return cls(name, file, replace(controller, **tables), options, text, said)
+        return cls(name, file, replace(controller, **tables), options, text, given)
 
     def __repr__(self) -> str:
         count = "" if self.text is None else f": {len(self.text.splitlines())} lines"
@@ -205,12 +205,12 @@ class Program:
     @property
     def words(self) -> list[str]:
         """The options of a command that say how it is read."""
-        return options(**self.said)
+        return options(**self.given)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """The files that it is read from."""
-        beside = (self.said.get(name) for name in ("controller", "offsets", "tools"))
+        beside = (self.given.get(name) for name in ("controller", "offsets", "tools"))
         return tuple(str(file) for file in (self.file, *beside) if file)
 
     def moves(self, origin: Pose | None = None, default_origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) -> ReadProgram:

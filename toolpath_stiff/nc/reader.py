@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -14,8 +13,6 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.points import increments_hint
 from toolpath_stiff.nc.controller import Controller, Switches, check_plain, plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
-from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.languages import foreign_program, refused_program
 from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
@@ -25,6 +22,7 @@ from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.parametric.statements import uses_variables
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
@@ -35,7 +33,7 @@ INTERPRETERS = ("builtin", "linuxcnc", "auto")
 
 
 class Options(TypedDict, total=False):
-    """Options of reading; see `Request`."""
+    """How a program is read; see `Request`."""
 
     origin: Pose | None
     default_origin: Pose
@@ -162,11 +160,8 @@ def _read_built_in(request: Request) -> ReadProgram:
 def _run_built_in(
     request: Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
 ) -> ReadProgram:
-    frames = Frames(copy.deepcopy(request.work_offsets), *request.zero, posted=request.posted)
-    state = State(request.name, frames, copy.deepcopy(request.tool_table), request.controller.dialect)
-    state.feed = request.controller.feed
-    run = begin(state, request.lines, request.name, request.switches)
-    warnings = run.run()
+    run = begin(request.start(), request.lines, request.name, request.switches)
+    state, frames, warnings = run.state, run.state.frames, run.run()
     if not state.recorder.cuts:
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
     if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
@@ -196,10 +191,7 @@ def _with_feed(program: ReadProgram, request: Request) -> ReadProgram:
 
 
 def _on_the_part(
-    program: ReadProgram,
-    request: Request,
-    tip_held: Sequence[tuple[int, bool]] = (),
-    offsets: Offsets | None = None,
+    program: ReadProgram, request: Request, tip_held: Sequence[tuple[int, bool]] = (), offsets: Offsets | None = None
 ) -> ReadProgram:
     """A program with the moves of the tool on the part, if it was posted for another machine."""
     program = _with_feed(program, request)
@@ -216,7 +208,7 @@ _LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beg
 
 
 def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
-    """A warning that numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
+    """That numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
 
     Where whole numbers are increments, posts end those in mm with their point.
     """
@@ -232,7 +224,7 @@ def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
 
 
 def feed_assumption(controller: Controller, moves: Moves | None) -> list[str]:
-    """The assumption that the first cuts have the feed that was asked for."""
+    """That the first cuts have the feed that was asked for."""
     if controller.feed is None or moves is None:
         return []
     cuts = moves.feed[moves.motion != RAPID][:1]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from functools import cached_property
 
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.units import Pose, ShopPose, pose_in_mm
 
@@ -88,3 +91,10 @@ class Request:
         if self.posted is not None:
             return None, ZERO
         return None if self.origin is None else pose_in_mm(self.origin), pose_in_mm(self.default_origin)
+
+    def start(self) -> State:
+        """The control as the program finds it."""
+        frames = Frames(copy.deepcopy(self.work_offsets), *self.zero, posted=self.posted)
+        state = State(self.name, frames, copy.deepcopy(self.tool_table), self.controller.dialect)
+        state.feed = self.controller.feed
+        return state

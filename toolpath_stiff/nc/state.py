@@ -39,12 +39,17 @@ class Flow(Enum):
 
 @dataclass(frozen=True)
 class Call:
-    """A subprogram call: its number, its L (None: not given), the column of its M98; `local`: by an N number."""
+    """A subprogram call: its number, its L (None: not given), the column of its code; `local`: by an N number.
+
+    `arguments`: the local variables that a macro call gives; `modal`: G66.
+    """
 
     number: int
     repeats: int | None
     column: int
     local: bool = False
+    arguments: dict[int, float | None] | None = None
+    modal: bool = False
 
 
 @dataclass(frozen=True)

@@ -125,18 +125,16 @@ def block_delete(compact: str, at: int, columns: Sequence[int], place: Place) ->
         end += 1
     switch = int(compact[at + 1 : end] or 1) if end < at + 3 else 0
     if not 1 <= switch <= 9:
-        raise place.fail(
-            f"block-delete switch {compact[at : min(end, at + 20)]!r}", "/ or /1 to /9", column=columns[at]
-        )
+        found = f"block-delete switch {compact[at : min(end, at + 20)]!r}"
+        raise place.fail(found, "/ or /1 to /9", column=columns[at])
     return end, switch
 
 
 def check_length(compact: str, place: Place) -> None:
     """Refuse a block that no control reads."""
     if len(compact) > LONGEST_BLOCK:
-        raise place.fail(
-            f"a block of {len(compact)} characters without comments and blanks", f"at most {LONGEST_BLOCK}"
-        )
+        found = f"a block of {len(compact)} characters without comments and blanks"
+        raise place.fail(found, f"at most {LONGEST_BLOCK}")
 
 
 def program_number(compact: str, column: int, place: Place) -> Block:
@@ -212,16 +210,12 @@ def _tokens(
                 number += exponent
         original = text[column - 1 : columns[end - 1]]
         if end - position > 1 + LONGEST_NUMBER:
-            raise place.fail(
-                f"a number of {end - position - 1} characters after {letter}",
-                f"at most {LONGEST_NUMBER}",
-                column=column,
-            )
+            found = f"a number of {end - position - 1} characters after {letter}"
+            raise place.fail(found, f"at most {LONGEST_NUMBER}", column=column)
         if letter == "N":
             if words:
-                raise place.fail(
-                    f"line number {original!r} after another word", "N at the beginning of the line", column=column
-                )
+                found = f"line number {original!r} after another word"
+                raise place.fail(found, "N at the beginning of the line", column=column)
         elif letter not in LETTERS:
             raise place.fail(f"word {original!r} is not known", column=column)
         else:
@@ -326,8 +320,6 @@ def leader(lines: Sequence[str], name: str, semicolon: bool) -> int:
             unread += 1
     return mark if unread else 0
 
-
-# -- text to lines -----------------------------------------------------------------------------------------------------
 
 # Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
 # end-of-file mark of CP/M and DOS (0x1A), which some posts still append.

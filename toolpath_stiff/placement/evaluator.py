@@ -15,7 +15,7 @@ import numpy as np
 
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load, geometric_directions
-from toolpath_stiff.arrays import BoolArray, Columns, FloatArray, IntArray, product
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Extremes, reach
 from toolpath_stiff.placement.keep_out import KeepOut
@@ -29,7 +29,7 @@ COMPLIANCE_DECIDES = ("softest", "normal")  # loads whose direction asks the com
 
 
 @dataclass(frozen=True)
-class PlacementFigures(Columns):
+class PlacementFigures(ArrayColumns):
     """Figures of k placements. SI; the stiffnesses are nan where a cut is out of reach.
 
     Attributes
@@ -65,7 +65,7 @@ class PlacementFigures(Columns):
 
 
 @dataclass(frozen=True)
-class PlacedRows(Columns):
+class PlacedRows(ArrayColumns):
     """Rows of k placements, a column a sample: rigid samples first (m), then the anchored rapids (q). SI.
 
     `stiffness` (k, m), nan but at headline samples; `law` (k, m) m, how far the struts are inside the lengths of their

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff.analysis.loads import Load, headline_rows
-from toolpath_stiff.arrays import BoolArray, Columns, FloatArray, IntArray, product
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
 from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
@@ -32,7 +32,7 @@ MOST_COMPARED = 6000  # samples of a long path that are compared with each other
 
 
 @dataclass(frozen=True)
-class Anchored(Columns):
+class Anchored(ArrayColumns):
     """q samples of rapids that do not wholly move with the work: (1 - u) start + u end. SI.
 
     Attributes
@@ -75,7 +75,7 @@ class Anchored(Columns):
 
 
 @dataclass(frozen=True)
-class WorkPath(Columns):
+class WorkPath(ArrayColumns):
     """Samples of a program in the set-up frame. SI.
 
     Attributes

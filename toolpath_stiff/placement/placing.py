@@ -20,7 +20,7 @@ from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
 from toolpath_stiff.placement.paths import work_path
-from toolpath_stiff.placement.result import Placement, Refused, Written
+from toolpath_stiff.placement.result import NotWritten, Placement, Written
 from toolpath_stiff.placement.rows import (
     FIGURES,
     PLACEMENT,
@@ -151,7 +151,7 @@ def _analyzed(task: Task, program: ReadProgram, origin: Pose) -> tuple[Analysis 
 
 def _rewritten(
     task: Task, writing: Rewriting, program: ReadProgram, best: Analysis
-) -> tuple[bytes | None, Written | Refused]:
+) -> tuple[bytes | None, Written | NotWritten]:
     """The transformed program's bytes, and how it compares; or why there is none, and what chords would bring."""
 
     def at_chord(chord: float | None) -> tuple[RewrittenProgram, dict[str, float]]:
@@ -175,7 +175,7 @@ def _rewritten(
                 f"{len(rewritten.text.splitlines())} lines instead of {len(program.source)}; its mean would differ by "
                 f"{differences['mean']:.1e}, its range by {differences['range']:.1e} (relative)"
             )
-    return None, Refused(writing.file, reason)
+    return None, NotWritten(writing.file, reason)
 
 
 def rewriting_differences(

@@ -56,7 +56,7 @@ class Written:
 
 
 @dataclass(frozen=True)
-class Refused:
+class NotWritten:
     """The reason why the program could not be written for the placement."""
 
     file: str
@@ -121,7 +121,7 @@ class Placement(FolderResult, SearchedFront):
     before: Analysis | None
     program: ReadProgram
     rewritten: bytes | None
-    written: Written | Refused | None
+    written: Written | NotWritten | None
     inputs: tuple[str, ...] = ()
 
     @property
@@ -207,7 +207,7 @@ class Placement(FolderResult, SearchedFront):
     @property
     def refusal(self) -> str:
         """The reason why the program could not be written for the placement, "" unless that is so."""
-        return self.written.refused if isinstance(self.written, Refused) else ""
+        return self.written.refused if isinstance(self.written, NotWritten) else ""
 
     @property
     def offsets(self) -> OffsetBlocks:

@@ -23,7 +23,7 @@ from toolpath_stiff.planning.choice import choose, why_of
 from toolpath_stiff.planning.forecasts import Forecast, principal
 from toolpath_stiff.planning.gaps import pair_shares
 from toolpath_stiff.planning.outlook import SETTLED
-from toolpath_stiff.planning.rows import POSE, plan_csv, plan_rows
+from toolpath_stiff.planning.rows import POSE, PlanRow, plan_csv, plan_rows
 from toolpath_stiff.planning.tables import Tables
 from toolpath_stiff.planning.visits import Visits
 from toolpath_stiff.readings.mapping import mapped_table
@@ -94,7 +94,7 @@ class NextVisit(Result):
         return not self.unlike and max(self.weights.values()) >= SETTLED
 
     @cached_property
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[PlanRow]:
         """Rows of the next visit, as of plan.csv; none where there is no next visit."""
         if self.visit is None:
             return []

@@ -21,7 +21,7 @@ from toolpath_stiff.planning.campaign import RISER, TABLE, Campaign, first_campa
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.rivals import errors_so_far, fitted_rivals, rivals_of, unfitted_rivals
-from toolpath_stiff.planning.rows import plan_rows, visit_entries
+from toolpath_stiff.planning.rows import PlanRow, plan_rows, visit_entries
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.catalogue import known_effects
@@ -62,7 +62,7 @@ class Plan(FolderResult):
     inputs: tuple[str, ...] = ()
 
     @cached_property
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[PlanRow]:
         """The rows of plan.csv: a measurement file whose stiffness is left empty."""
         return plan_rows(self.choice.visits, self.choice.chosen, () if self.data is None else self.data.point.tolist())
 
@@ -79,7 +79,8 @@ class Plan(FolderResult):
     @property
     def visits(self) -> list[dict[str, Any]]:
         """One entry a clamping: where, how, what is read, why."""
-        return visit_entries(self.rows, self.choice.kinds, self.choice.why)
+        choice = self.choice
+        return visit_entries(choice.visits, choice.chosen, self.rows, choice.kinds, choice.why)
 
     def to_dict(self) -> dict[str, Any]:
         """The content of plan.json."""

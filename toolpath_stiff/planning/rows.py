@@ -13,12 +13,11 @@ from toolpath_stiff.planning.visits import AXES, VECTORS, Visits
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m
 
 POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
-
-
 VECTOR = ("dx", "dy", "dz")
+PlanRow = dict[str, float | str]  # a reading, by the columns of a measurement file
 
 
-def plan_rows(visits: Visits, chosen: Sequence[int], taken: Iterable[str] = ()) -> list[dict[str, Any]]:
+def plan_rows(visits: Visits, chosen: Sequence[int], taken: Iterable[str] = ()) -> list[PlanRow]:
     """Rows of a measurement file in shop units, in measuring order.
 
     Parameters
@@ -34,7 +33,7 @@ def plan_rows(visits: Visits, chosen: Sequence[int], taken: Iterable[str] = ()) 
     timed, beside = not np.isnan(readings.time).any(), bool((readings.loop[planned] != "").any())
     axes_only = set(visits.names[planned].tolist()) <= set(AXES)
     named = bool((visits.setup[list(chosen)] != "").any())
-    rows = []
+    rows: list[PlanRow] = []
     for clamp, visit in enumerate(chosen, 1):
         pose = [*mm_from_m(visits.pose[visit, :3]), *deg_from_rad(visits.pose[visit, 3:])]
         for row in visits.rows(visit):
@@ -71,18 +70,20 @@ def _round(value: float) -> float:
     return round(float(value), 6) + 0.0
 
 
-def visit_entries(rows: list[dict[str, Any]], kinds: Sequence[str], why: Sequence[str]) -> list[dict[str, Any]]:
+def visit_entries(
+    visits: Visits, chosen: Sequence[int], rows: Sequence[PlanRow], kinds: Sequence[str], why: Sequence[str]
+) -> list[dict[str, Any]]:
     """One entry a clamping: where, how, what is read, why."""
+    first = {row["clamp"]: row for row in reversed(rows)}
     entries = []
-    for clamp, (kind, reason) in enumerate(zip(kinds, why, strict=True), 1):
-        readings = [row for row in rows if row["clamp"] == clamp]
-        first = readings[0]
-        entry = {key: first[key] for key in ("clamp", "point", *POSE, "tool_extension_mm")}
+    for clamp, (visit, kind, reason) in enumerate(zip(chosen, kinds, why, strict=True), 1):
+        taken = visits.rows(visit)
+        entry: dict[str, Any] = {key: first[clamp][key] for key in ("clamp", "point", *POSE, "tool_extension_mm")}
         entry |= {
-            "setup": first.get("setup", ""),
-            "forces_N": sorted({row["force_N"] for row in readings}),
-            "directions": list(dict.fromkeys(map(_direction, readings))),
-            "loops": list(dict.fromkeys(row["loop"] for row in readings if row.get("loop"))),
+            "setup": str(visits.setup[visit]),
+            "forces_N": sorted(set(map(_round, visits.readings.force[taken]))),
+            "directions": list(dict.fromkeys(visits.names[taken].tolist())),
+            "loops": [loop for loop in dict.fromkeys(visits.readings.loop[taken].tolist()) if loop],
             "kind": kind,
             "why": reason,
         }
@@ -90,11 +91,7 @@ def visit_entries(rows: list[dict[str, Any]], kinds: Sequence[str], why: Sequenc
     return entries
 
 
-def _direction(row: dict[str, Any]) -> str:
-    return str(row.get("direction") or "".join(axis for axis, key in zip("XYZ", VECTOR, strict=True) if row[key]))
-
-
-def plan_csv(rows: Sequence[dict[str, Any]]) -> str:
+def plan_csv(rows: Sequence[PlanRow]) -> str:
     """The rows as CSV."""
     cells = [[value if isinstance(value, str) else f"{value:.10g}" for value in row.values()] for row in rows]
     return csv_text(rows[0], cells)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpath_stiff.report.figure import INK, MUTED
-from toolpath_stiff.report.words import headline_text, plain, shortened
+from toolpath_stiff.report.figure_words import headline_text
+from toolpath_stiff.report.words import plain, shortened
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -7,63 +7,17 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
-from toolpath_stiff.analysis.loads import PLUNGES_ONLY
 from toolpath_stiff.stiffness.model import machine_words
 from toolpath_stiff.units import number
 
-# Who read a program, for headings (`Program.interpreter`).
-READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
-
-
-# Of an analysis, in the order of every table.
-FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
-
-
 # The sign of every residual that is shown, for axes and legends.
 DEVIATION = "(measured - modelled) / modelled"
-
-
 MINUS_IS_SOFTER = "minus: softer than modelled"
-
-
-ONLY_PLUNGES = "only plunges"  # beside a program, a tool or an operation
 
 
 def counted(count: float, thing: str) -> str:
     """So many of a thing: "1 line", "1 405 lines"."""
     return f"{number(count)} {thing}{'' if count == 1 else 's'}"
-
-
-def span_of(figures: Mapping[str, Any]) -> str:
-    """Lowest and highest stiffness of a block of figures: "122 988 to 123 770"."""
-    return f"{number(figures['min_N_per_mm'])} to {number(figures['max_N_per_mm'])}"
-
-
-def headline_text(figures: Mapping[str, Any], between: str) -> str:
-    """Mean and range for a heading, and what they are about where that is not every cut; `between` the parts."""
-    text = f"mean {number(figures['mean_N_per_mm'])} N/mm ({span_of(figures)})"
-    if only_plunges(figures):
-        return f"{text}, {ONLY_PLUNGES}"
-    plunges = plunges_beside(figures)
-    if plunges is None:
-        return text
-    return f"{text} across the tool axis{between}plunges {number(plunges['mean_N_per_mm'])} N/mm ({span_of(plunges)})"
-
-
-def plunges_beside(figures: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """The plunges that the headline figures leave out; None where there are none, or where there is nothing else."""
-    found: Mapping[str, Any] | None = figures["plunges"]
-    return None if figures["headline"] == PLUNGES_ONLY else found
-
-
-def length_in_moves(plunges: Mapping[str, Any]) -> str:
-    """How much is plunged: "20.0 mm in 3 moves"."""
-    return f"{number(plunges['length_mm'], 1)} mm in {number(plunges['moves'])} move{'s' * (plunges['moves'] != 1)}"
-
-
-def only_plunges(figures: Mapping[str, Any]) -> bool:
-    """Whether the figures of a program, a tool or an operation are those of plunges, for it does nothing else."""
-    return bool(figures.get("headline") == PLUNGES_ONLY)
 
 
 def significant(value: float | None, digits: int = 3) -> str:
@@ -108,11 +62,7 @@ def machine_text(document: Mapping[str, Any]) -> str:
 
 
 WIDTH = 100
-
-
 LABEL = 14  # columns of the left-hand words
-
-
 LEAST_NAME = 24  # columns for the number and name of an operation, however wide the figures are
 
 

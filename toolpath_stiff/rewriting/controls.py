@@ -163,9 +163,9 @@ class Controls:
         if sentence not in self.notes:
             self.notes.append(sentence)
 
-    def refusal(self, found: str, hint: str = "") -> InputError:
+    def refusal(self, problem: str, hint: str = "") -> InputError:
         """The error for the current block, which cannot be rewritten."""
-        return ProgramError(found, hint=hint, file=self.source.name, line=self.block.line)
+        return ProgramError(problem, hint=hint, file=self.source.name, line=self.block.line)
 
     @property
     def digits(self) -> int:

@@ -32,6 +32,13 @@ VARIABLES = (
 )
 
 
+# What can be told at the tip: joints and struts are in series, so an effect of all joints may be called either; so is
+# that of one strut, its joints and its drive. A strut's length follows height, radius and tilt of the pose, so what
+# varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant
+# there, and shows as the strut swings about it.
+ONE, ALL = "one strut,joints", "joints,struts"
+
+
 SOFT = 60e-9  # m/N, largest compliance that is tried: far beyond 30 % of a tip that gives 8 to 31 nm/N
 
 

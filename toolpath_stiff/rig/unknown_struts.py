@@ -1,4 +1,4 @@
-"""Unknowns of struts, joints, platform and frame: they act on what carries the platform."""
+"""Unknowns of struts, platform and frame: they act on what carries the platform."""
 
 from __future__ import annotations
 
@@ -9,24 +9,17 @@ import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.nominal import rotations, strut_directions
 from toolpath_stiff.rig.structure import BARS, Links
-from toolpath_stiff.rig.unknown import SOFT, _with_joints, beyond, kind, one_strut, opened, signed
+from toolpath_stiff.rig.unknown import ALL, ONE, SOFT, _with_joints, beyond, kind, one_strut, opened, signed
 
 if TYPE_CHECKING:
     from toolpath_stiff.rig.unknown import Kind, State, Unknown
-
-
-SWING = np.sin(np.radians(20.0)) ** 2  # squared sine of the swing at which compliances are quoted
 
 
 LEAST_FORCE = 0.1  # N, below which a secant compliance is held
 
 
 SOUND_BAR = 3e9  # N/m, the bars of a platform one of which is cracked: 1.4 % at the tip (assumed)
-
-
-SLIP_LOAD = 300.0  # N, load at which a sticking joint carries half of what it does at rest (assumed)
 
 
 PRELOAD_GROWS = 0.3  # of the campaign, time constant of a machine that warms up (assumed)
@@ -40,41 +33,6 @@ def _coupled(links: Links, shares: FloatArray, compliance: float) -> Links:
 
 def _only(strut: int) -> FloatArray:
     return np.where(np.arange(6) == strut, 1.0, 0.0)
-
-
-def _swing(state: State) -> FloatArray:
-    """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
-    pose = state.nominal.neutral_pose
-    rest = strut_directions(state.nominal, pose[None, :3], rotations(pose[None, 3:]), np.zeros(1))[1]
-    now = state.units @ state.place.rotation
-    return np.asarray(1.0 - np.minimum(np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now) ** 2, 1.0))
-
-
-def joint_swing(links: Links, state: State, u: Unknown) -> Links:
-    """The forks of the platform joints bend the more, the further they swing out: c = c0 sin^2."""
-    compliance = u.size * _swing(state) / SWING
-    return _with_joints(links, lambda forces: compliance)
-
-
-def cardan_fork(links: Links, state: State, u: Unknown) -> Links:
-    """A cross whose inner pin, radial on the platform, is worn: c = c0 (share of the strut's force along the pin)^2."""
-    joints = state.place.platform_joints - state.place.work_point[:, None, :]
-    axis = state.place.rotation[:, :, 2]
-    radial = joints - np.einsum("nki,ni->nk", joints, axis)[:, :, None] * axis[:, None, :]
-    pin = radial / np.linalg.norm(radial, axis=2, keepdims=True)
-    compliance = u.size * np.einsum("nki,nki->nk", state.units, pin) ** 2
-    return _with_joints(links, lambda forces: compliance)
-
-
-def joint_binding(links: Links, state: State, u: Unknown) -> Links:
-    """Joints that bind near the end of their swing: rotational stiffness m0 sin^2."""
-    return dataclasses.replace(links, moment=links.moment + u.size * _swing(state) / SWING)
-
-
-def joint_slip(links: Links, state: State, u: Unknown) -> Links:
-    """Sticking joints that slip: rotational secant stiffness m0 F0 / (F0 + F), Masing's element smeared out."""
-    held = SLIP_LOAD / (SLIP_LOAD + state.rows.force)
-    return dataclasses.replace(links, moment=links.moment + u.size * held[:, None] * np.ones(6))
 
 
 def strut_backlash(links: Links, state: State, u: Unknown) -> Links:
@@ -194,28 +152,7 @@ def _wave(rng: Generator) -> dict[str, Any]:
     return one_strut(rng) | {"wavelength": float(rng.uniform(0.12, 0.3)), "phase": float(rng.uniform(0.0, 6.28))}
 
 
-# What can be told at the tip: joints and struts are in series, so an effect of all joints may be called either; so is
-# that of one strut, its joints and its drive. A strut's length follows height, radius and tilt of the pose, so what
-# varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant
-# there, and shows as the strut swings about it.
-ONE, ALL = "one strut,joints", "joints,struts"
-
-
 STRUT_KINDS: dict[str, Kind] = {
-    "joint_swing": kind(
-        "joints softer the further they swing", ALL, "tilt,radius,strut length,z", SOFT, act=joint_swing
-    ),
-    "cardan_fork": kind(
-        "joints softer along one pin of their cross", ALL, "constant,tilt,radius,strut length", SOFT, act=cardan_fork
-    ),
-    "joint_binding": kind(
-        "joints that resist turning near the end of their swing", "joints,struts,platform",
-        "tilt,radius,strut length,z", 3e6, act=joint_binding,
-    ),
-    "joint_slip": kind(
-        "joints that resist turning under small loads and slip under large ones", "joints,struts,platform", "load",
-        6e6, act=joint_slip, varies=("force",), columns=("force_N",),
-    ),
     "strut_backlash": kind(
         "lost motion in one strut", ONE, "strut force,load", 50e-6, act=strut_backlash, shape=one_strut,
         varies=("force",), columns=("force_N",),

@@ -10,10 +10,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.rig.unknown_ends import END_KINDS
+from toolpath_stiff.rig.unknown_joints import JOINT_KINDS
 from toolpath_stiff.rig.unknown_struts import STRUT_KINDS
 
 if TYPE_CHECKING:
     from toolpath_stiff.rig.unknown import Kind
 
 
-UNKNOWNS: dict[str, Kind] = {**STRUT_KINDS, **END_KINDS}
+UNKNOWNS: dict[str, Kind] = {**JOINT_KINDS, **STRUT_KINDS, **END_KINDS}

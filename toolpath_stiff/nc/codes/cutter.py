@@ -7,6 +7,7 @@ tool centre; the ends of the last moves are set back in the recorder when the ne
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from toolpath_stiff.nc import compensation, geometry
 from toolpath_stiff.nc.codes.code import Code, g_codes
@@ -35,11 +36,6 @@ GROUPS = frozenset(
 MOTIONS = ("G0", "G1", "G2", "G3")
 OTHER_CONTROLS = "cutter compensation, whose entry and corners differ from control to control"
 NAME_CONTROL = "name the control with --dialect (linuxcnc, fanuc, haas), or post the path of the tool centre"
-
-Ends = tuple[list[float], list[float]]
-
-
-# -- on and off --------------------------------------------------------------------------------------------------------
 
 
 def switch_on(state: State, block: CurrentBlock, code: str) -> None:
@@ -97,7 +93,7 @@ def switch_off(state: State, block: CurrentBlock, code: str) -> None:
         return
     if cutter.entering:
         raise block.fail(code, "right after the first move of cutter compensation", "a contour between")
-    _settle(state, block, cutter, cutter.center)
+    CenterPath(state, block, cutter).settle(cutter.center)
     frames = state.frames
     there, here = frames.to_setup(frames.to_control(cutter.at)), frames.to_setup(frames.position)
     state.beside = [t - h for t, h in zip(there, here, strict=True)]
@@ -125,14 +121,11 @@ def _check_codes(state: State, block: CurrentBlock, also: tuple[str, ...]) -> No
         raise block.fail(polar, "while cutter compensation is on", "X and Y")
 
 
-# -- moves -------------------------------------------------------------------------------------------------------------
-
-
 def offset_move(
     state: State,
     block: CurrentBlock,
     motion: int,
-    ends: Ends,
+    ends: tuple[list[float], list[float]],
     feed: float,
     bound: tuple[bool, bool],
     arc: Arc | None,
@@ -143,170 +136,158 @@ def offset_move(
     """
     cutter, frames = state.cutter, state.frames
     assert cutter is not None
-    first, second, _ = cutter.axes
     if any(frames.from_machine[axis] for axis in cutter.axes[:2]):
         raise block.fail(None, "a move under cutter compensation from machine coordinates", "both words of the plane")
-    here, there = frames.to_program(frames.position), frames.to_program(ends[1])
-    start, target = (here[first], here[second]), (there[first], there[second])
-    own = None if arc is None else _programmed(state, arc)
-    direction = (target[0] - start[0], target[1] - start[1])
+    path = CenterPath(state, block, cutter, motion, feed, bound)
+    there = frames.to_program(ends[1])
+    start, target = path.in_plane(frames.to_program(frames.position)), path.in_plane(there)
+    programmed = None if arc is None else path.programmed(arc)
     rows = len(state.recorder.line)
+    direction, step = (target[0] - start[0], target[1] - start[1]), None
     try:
         if cutter.at is None:
-            step, direction = _enter(cutter, start, target, own)
-            cutter.at, cutter.anchor = frames.to_program(_to_control(state, ends[0])), start
-        elif own is None and math.dist(start, target) < SAME_PLACE:  # along the tool alone: the corner is still to come
-            step = None
-        else:
-            step = _go_on(cutter, start, target, own)
-            _round_corner(state, block, cutter, step, motion, start, there, feed, bound)
+            step, direction = compensation.enter(cutter, start, target, programmed)
+            cutter.at, cutter.anchor = frames.to_program(path.to_control(ends[0])), start
+        elif programmed is not None or math.dist(start, target) >= SAME_PLACE:  # else the corner is still to come
+            step = compensation.go_on(cutter, start, target, programmed)
+            path.go_round_corner(step, start, there)
     except geometry.ArcError as error:
         raise block.fail(None, error.found, error.expected) from None
-    end = list(there)
-    end[first], end[second] = cutter.center if step is None else step.end
-    if step is not None and step.center is not None and own is not None:
-        own = OffsetArc(step.center, own.turn, own.turns)
-    row = _add(state, block, motion, cutter, end, feed, bound, own)
-    if own is not None and not own.programmed and row >= 0:
+    if step is not None and step.center is not None and programmed is not None:
+        programmed = OffsetArc(step.center, programmed.turn, programmed.turns)
+    end = path.moved(there, cutter.center if step is None else step.end)
+    row = path.add(motion, end, bound, programmed)
+    if programmed is not None and not programmed.programmed and row >= 0:
         recorded = state.recorder.arc[row]
-        own.programmed = 0.0 if recorded is None else recorded.sweep
-    cutter.pending.append(Pending(end, direction, own, row))
+        programmed.programmed = 0.0 if recorded is None else recorded.sweep
+    cutter.pending.append(Pending(end, direction, programmed, row))
     return len(state.recorder.line) > rows
 
 
-def _enter(cutter: Cutter, start: Point2, target: Point2, own: OffsetArc | None) -> tuple[Step, Point2]:
-    if cutter.straight:
-        return compensation.enter_fanuc(cutter, target, own), (0.0, 0.0)
-    if own is not None:
-        return compensation.enter_arc(cutter, start, target, own.center, own.turn), (0.0, 0.0)
-    return compensation.enter_straight(cutter, start, target)
+@dataclass(frozen=True)
+class CenterPath:
+    """The path of the tool centre in a block, as it is recorded.
 
+    Attributes
+    ----------
+    state, block, cutter
+        Of the control; the block that moves; its compensation.
+    motion, feed, bound
+        Of the programmed move.
+    """
 
-def _go_on(cutter: Cutter, start: Point2, target: Point2, own: OffsetArc | None) -> Step:
-    if cutter.straight:
-        return compensation.go_on_fanuc(cutter, start, target, own)
-    if own is not None:
-        return compensation.go_round(cutter, start, target, own.center, own.turn)
-    return compensation.go_straight(cutter, start, target)
+    state: State
+    block: CurrentBlock
+    cutter: Cutter
+    motion: int = RAPID
+    feed: float = math.nan
+    bound: tuple[bool, bool] = (False, False)
 
+    def in_plane(self, point: list[float]) -> Point2:
+        """A point's two coordinates of the plane."""
+        return point[self.cutter.axes[0]], point[self.cutter.axes[1]]
 
-def _round_corner(
-    state: State,
-    block: CurrentBlock,
-    cutter: Cutter,
-    step: Step,
-    motion: int,
-    start: Point2,
-    there: list[float],
-    feed: float,
-    bound: tuple[bool, bool],
-) -> None:
-    """End the moves before the corner, and go round it if it is convex; rotary axes turn on the way round."""
-    if step.trim is not None:
-        _settle(state, block, cutter, step.trim)
-    cutter.pending.clear()
-    cutter.anchor = cutter.center
-    if step.outside:
-        _go_straight_round(state, block, cutter, step, motion, there, feed, bound)
-    if step.corner is None:
-        return
-    assert cutter.at is not None
-    around = [*cutter.at[:3], *there[3:]]
-    around[cutter.axes[0]], around[cutter.axes[1]] = step.corner
-    arc = None if motion == RAPID else OffsetArc(start, -cutter.side)
-    _add(state, block, motion if motion == RAPID else ARC, cutter, around, feed, (bound[0], bound[0]), arc)
-    cutter.anchor = cutter.center
+    def moved(self, point: list[float], to: Point2) -> list[float]:
+        """A point with other coordinates in the plane."""
+        point = list(point)
+        point[self.cutter.axes[0]], point[self.cutter.axes[1]] = to
+        return point
 
+    def go_round_corner(self, step: Step, start: Point2, there: list[float]) -> None:
+        """End the moves before the corner, and go round it if it is convex; rotary axes turn on the way round.
 
-def _go_straight_round(
-    state: State,
-    block: CurrentBlock,
-    cutter: Cutter,
-    step: Step,
-    motion: int,
-    there: list[float],
-    feed: float,
-    bound: tuple[bool, bool],
-) -> None:
-    """Straight moves round a corner, at the feed of the block; rotary axes have turned at the first one's end."""
-    assert cutter.at is not None
-    state.assume(compensation.STRAIGHT)
-    for place in step.way:
-        around = [*cutter.at[:3], *there[3:]]
-        around[cutter.axes[0]], around[cutter.axes[1]] = place
-        _add(state, block, motion if motion == RAPID else FEED, cutter, around, feed, (bound[0], bound[0]), None)
-    cutter.anchor = cutter.center
+        Straight moves round it are at the feed of the block; rotary axes have turned at the first one's end.
+        """
+        cutter, rapid = self.cutter, self.motion == RAPID
+        if step.trim is not None:
+            self.settle(step.trim)
+        cutter.pending.clear()
+        if step.outside:
+            self.state.assume(compensation.STRAIGHT)
+        bound = (self.bound[0], self.bound[0])
+        for place in step.way:
+            self.add(RAPID if rapid else FEED, self._around(place, there), bound, None)
+        if step.corner is not None:
+            round_it = None if rapid else OffsetArc(start, -cutter.side)
+            cutter.anchor = cutter.center
+            self.add(RAPID if rapid else ARC, self._around(step.corner, there), bound, round_it)
+        cutter.anchor = cutter.center
 
+    def _around(self, place: Point2, there: list[float]) -> list[float]:
+        assert self.cutter.at is not None
+        return self.moved([*self.cutter.at[:3], *there[3:]], place)
 
-def _add(
-    state: State,
-    block: CurrentBlock,
-    motion: int,
-    cutter: Cutter,
-    end: list[float],
-    feed: float,
-    bound: tuple[bool, bool],
-    arc: OffsetArc | None,
-) -> int:
-    """Record a move of the tool centre to a point in program coordinates; its row, -1 if it has none."""
-    recorder = state.recorder
-    assert cutter.at is not None
-    start = _to_setup(state, cutter.at)
-    added = recorder.add(
-        block.line, motion, start, _standing(start, _to_setup(state, end)), feed, state.tool, state.tool_length, bound,
-        None if arc is None else _recorded(state, cutter, arc, cutter.at, end),
-    )  # fmt: skip
-    cutter.at = end
-    return len(recorder.line) - 1 if added else -1
+    def add(self, motion: int, end: list[float], bound: tuple[bool, bool], arc: OffsetArc | None) -> int:
+        """Record a move of the tool centre to a point in program coordinates; its row, -1 if it has none."""
+        state, recorder, here = self.state, self.state.recorder, self.cutter.at
+        assert here is not None
+        start = self.to_setup(here)
+        added = recorder.add(
+            self.block.line, motion, start, _standing(start, self.to_setup(end)), self.feed, state.tool,
+            state.tool_length, bound, None if arc is None else self._recorded(arc, here, end),
+        )  # fmt: skip
+        self.cutter.at = end
+        return len(recorder.line) - 1 if added else -1
 
+    def settle(self, to: Point2) -> None:
+        """Move the end of the pending moves; raises `InputError` where the tool would have to go back."""
+        cutter, recorder = self.cutter, self.state.recorder
+        assert cutter.at is not None
+        for move in cutter.pending:
+            if self._gouges(move, to):
+                raise self.block.fail(None, compensation.GOUGE, compensation.SMALLER)
+            move.end[:] = self.moved(move.end, to)
+            self._rewrite(move)
+        cutter.at = self.moved(cutter.at, to)
+        for move in reversed(cutter.pending):
+            row = move.row
+            if row >= 0 and recorder.arc[row] is None and recorder.start[row] == recorder.end[row]:
+                recorder.drop(row)
 
-def _settle(state: State, block: CurrentBlock, cutter: Cutter, to: Point2) -> None:
-    """Move the end of the pending moves; raises `InputError` where the tool would have to go back."""
-    assert cutter.at is not None
-    first, second, _ = cutter.axes
-    for move in cutter.pending:
-        _check_gouge(block, cutter, move, to)
-        move.end[first], move.end[second] = to
-        _rewrite(state, cutter, move)
-    cutter.at = [*cutter.at]
-    cutter.at[first], cutter.at[second] = to
-    for move in reversed(cutter.pending):
-        row, recorder = move.row, state.recorder
-        if row >= 0 and recorder.arc[row] is None and recorder.start[row] == recorder.end[row]:
-            recorder.drop(row)
-
-
-def _check_gouge(block: CurrentBlock, cutter: Cutter, move: Pending, to: Point2) -> None:
-    if move.arc is None:
-        back = move.direction[0] * (to[0] - cutter.anchor[0]) + move.direction[1] * (to[1] - cutter.anchor[1])
-        gouges = back < 0.0
-    else:
-        arc = move.arc
-        before = (move.end[cutter.axes[0]], move.end[cutter.axes[1]])
-        sweep = geometry.arc_sweep(cutter.anchor, to, arc.center, arc.turn < 0, arc.turns)
-        apart = abs(math.dist(before, arc.center) - math.dist(to, arc.center))
+    def _gouges(self, move: Pending, to: Point2) -> bool:
+        anchor, arc = self.cutter.anchor, move.arc
+        if arc is None:
+            return move.direction[0] * (to[0] - anchor[0]) + move.direction[1] * (to[1] - anchor[1]) < 0.0
+        sweep = geometry.arc_sweep(anchor, to, arc.center, arc.turn < 0, arc.turns)
+        apart = abs(math.dist(self.in_plane(move.end), arc.center) - math.dist(to, arc.center))
         longer = abs(sweep) > abs(arc.programmed) + compensation.SHORTENED
-        gouges = apart > compensation.MATCHING * cutter.unit or (arc.programmed != 0.0 and longer)
-    if gouges:
-        raise block.fail(None, compensation.GOUGE, compensation.SMALLER)
+        return apart > compensation.MATCHING * self.cutter.unit or (arc.programmed != 0.0 and longer)
 
+    def _rewrite(self, move: Pending) -> None:
+        """The recorder's row of a move whose end has changed."""
+        row, recorder = move.row, self.state.recorder
+        if row < 0:
+            return
+        recorder.end[row] = _standing(recorder.start[row], self.to_setup(move.end))
+        if row + 1 < len(recorder.line):
+            recorder.start[row + 1] = recorder.end[row]
+        arc, offset = recorder.arc[row], move.arc
+        if offset is not None and arc is not None:
+            to = self.in_plane(move.end)
+            sweep = geometry.arc_sweep(self.cutter.anchor, to, offset.center, offset.turn < 0, offset.turns)
+            recorder.arc[row] = Arc(arc.center, arc.normal, sweep)
 
-def _rewrite(state: State, cutter: Cutter, move: Pending) -> None:
-    """The recorder's row of a move whose end has changed."""
-    if move.row < 0:
-        return
-    recorder, end = state.recorder, _to_setup(state, move.end)
-    recorder.end[move.row] = _standing(recorder.start[move.row], end)
-    if move.row + 1 < len(recorder.line):
-        recorder.start[move.row + 1] = recorder.end[move.row]
-    arc = recorder.arc[move.row]
-    if move.arc is not None and arc is not None:
-        to = (move.end[cutter.axes[0]], move.end[cutter.axes[1]])
-        sweep = geometry.arc_sweep(cutter.anchor, to, move.arc.center, move.arc.turn < 0, move.arc.turns)
-        recorder.arc[move.row] = Arc(arc.center, arc.normal, sweep)
+    def to_setup(self, program: list[float]) -> list[float]:
+        """Set-up coordinates of a point in program coordinates."""
+        return self.state.frames.to_setup(self.state.frames.to_control(program))
 
+    def to_control(self, setup: list[float]) -> list[float]:
+        """Control coordinates of a point in set-up coordinates."""
+        reference = self.state.frames.fix_reference()
+        return [*(s + r for s, r in zip(setup[:3], reference, strict=True)), *setup[3:]]
 
-# -- coordinates -------------------------------------------------------------------------------------------------------
+    def programmed(self, arc: Arc) -> OffsetArc:
+        """The programmed arc in program coordinates."""
+        center = self.state.frames.to_program(self.to_control([*arc.center, 0.0, 0.0, 0.0]))
+        turns = 1 + int((abs(arc.sweep) - 1e-9) / math.tau)
+        return OffsetArc(self.in_plane(center), 1 if arc.sweep > 0.0 else -1, turns, arc.sweep)
+
+    def _recorded(self, arc: OffsetArc, start: list[float], end: list[float]) -> Arc:
+        """An arc of the tool centre as it is recorded."""
+        x, y, z = self.to_setup(self.moved(start, arc.center))[:3]
+        sweep = geometry.arc_sweep(self.in_plane(start), self.in_plane(end), arc.center, arc.turn < 0, arc.turns)
+        return Arc((x, y, z), self.state.frames.turn_direction(geometry.normal_of(self.state.plane)), sweep)
+
 
 STILL = 1e-12  # as in `motion.record`
 SAME_PLACE = 1e-9  # mm; a step of less in the plane is none
@@ -315,34 +296,6 @@ SAME_PLACE = 1e-9  # mm; a step of less in the plane is none
 def _standing(start: list[float], end: list[float]) -> list[float]:
     """The end, with the numbers of the start where an axis stands but for rounding."""
     return [s if abs(e - s) < STILL * max(1.0, abs(s)) else e for s, e in zip(start, end, strict=True)]
-
-
-def _to_setup(state: State, program: list[float]) -> list[float]:
-    return state.frames.to_setup(state.frames.to_control(program))
-
-
-def _to_control(state: State, setup: list[float]) -> list[float]:
-    reference = state.frames.fix_reference()
-    return [*(s + r for s, r in zip(setup[:3], reference, strict=True)), *setup[3:]]
-
-
-def _programmed(state: State, arc: Arc) -> OffsetArc:
-    """The programmed arc in program coordinates."""
-    first, second, _ = geometry.PLANES[state.plane]
-    center = state.frames.to_program(_to_control(state, [*arc.center, 0.0, 0.0, 0.0]))
-    turns = 1 + int((abs(arc.sweep) - 1e-9) / math.tau)
-    return OffsetArc((center[first], center[second]), 1 if arc.sweep > 0.0 else -1, turns, arc.sweep)
-
-
-def _recorded(state: State, cutter: Cutter, arc: OffsetArc, start: list[float], end: list[float]) -> Arc:
-    """An arc of the tool centre as it is recorded."""
-    first, second, _ = cutter.axes
-    middle = list(start)
-    middle[first], middle[second] = arc.center
-    x, y, z = _to_setup(state, middle)[:3]
-    ends = ((start[first], start[second]), (end[first], end[second]))
-    sweep = geometry.arc_sweep(*ends, arc.center, arc.turn < 0, arc.turns)
-    return Arc((x, y, z), state.frames.turn_direction(geometry.normal_of(state.plane)), sweep)
 
 
 _CUTTER, _DYNAMIC = (

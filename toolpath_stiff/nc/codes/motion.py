@@ -319,16 +319,6 @@ def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, inc
     return sweep
 
 
-def center_by_offsets(start: Point2, offsets: tuple[float, float], scale: float) -> Point2:
-    """Centre that lies at I, J or K (in units of `scale` mm) from the start."""
-    return (start[0] + offsets[0] * scale, start[1] + offsets[1] * scale)
-
-
-def center_by_radius(start: Point2, end: Point2, radius: float, scale: float, clockwise: bool) -> Point2:
-    """Centre of an arc given by R (in units of `scale` mm). Raises `ArcError`."""
-    return geometry.center_from_radius(start, end, radius * scale, clockwise)
-
-
 def _turns(block: CurrentBlock) -> int:
     turns = block.take("P")
     if turns is None:
@@ -363,7 +353,7 @@ def _center(
             raise block.fail("R", "and a centre (I, J, K) are both given", "one of them")
         if not {first, second} & words.keys():
             raise geometry.ArcError("an arc with R and without an end point", "an axis word of the plane")
-        return center_by_radius(start, end, radius, state.length_scale, clockwise)
+        return geometry.center_from_radius(start, end, radius * state.length_scale, clockwise)
     if offsets == [None, None]:
         raise geometry.ArcError("an arc without a centre", f"{in_plane[0]}, {in_plane[1]} or R")
     if state.arc_absolute:
@@ -371,7 +361,8 @@ def _center(
             raise geometry.ArcError("an absolute centre (G90.1) with one word", f"{in_plane[0]} and {in_plane[1]}")
         a, b = (v * state.length_scale for v in offsets if v is not None)
         return (a, b)
-    return center_by_offsets(start, (offsets[0] or 0.0, offsets[1] or 0.0), state.length_scale)
+    a, b = ((offset or 0.0) * state.length_scale for offset in offsets)
+    return (start[0] + a, start[1] + b)
 
 
 ARC_CODES = (

@@ -22,9 +22,6 @@ SAME_PLACE_MM = 1e-9
 XY = frozenset((0, 1))
 
 
-# -- G68, G69 ----------------------------------------------------------------------------------------------------------
-
-
 def rotation(state: State, block: CurrentBlock, code: str) -> None:
     """G68 X Y R: programmed points turn about X, Y (absolute; without them about the present point). G69: rotation off.
 
@@ -128,8 +125,6 @@ ROTATION_CODES = (
 )
 
 
-# -- axis words --------------------------------------------------------------------------------------------------------
-
 LINEAR = frozenset("XYZ")
 
 
@@ -201,9 +196,6 @@ def control_point(state: State, block: CurrentBlock, here: list[float], words: d
     return point
 
 
-# -- LinuxCNC's polar words ------------------------------------------------------------------------------------------
-
-
 def _at_radius_and_angle(state: State, block: CurrentBlock) -> dict[int, float]:
     """LinuxCNC's polar words: @ the radius, ^ the angle about the program zero, of the XY plane.
 
@@ -234,9 +226,6 @@ def xy_of_polar_words(state: State, block: CurrentBlock) -> dict[int, float]:
         turn = math.radians(angle) + (0.0 if state.absolute else turn)
     point = (present * math.cos(turn), present * math.sin(turn))
     return {axis: value if state.absolute else value - here[axis] for axis, value in enumerate(point)}
-
-
-# -- G16 -------------------------------------------------------------------------------------------------------------
 
 
 def polar_mode(state: State, block: CurrentBlock, code: str) -> None:
@@ -275,8 +264,6 @@ POLAR_CODES = (
     Code("G16", "polar", polar_mode, "polar words", _FANUC_POLAR),
 )
 
-
-# -- numbers without a decimal point -----------------------------------------------------------------------------------
 
 ANGLES = frozenset("ABC")
 LENGTHS = frozenset((*"XYZIJKRQ", *CORNERS))

@@ -15,11 +15,12 @@ from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
 from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
 from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES
 from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, STRAIGHT_CODES
-from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_CODES
+from toolpath_stiff.nc.codes.offsets import OFFSET_CODES
 from toolpath_stiff.nc.codes.other_controls import OTHER_CODES, OTHER_REFUSED
 from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES
 from toolpath_stiff.nc.codes.saved import SAVED_CODES
 from toolpath_stiff.nc.codes.synchronised import SYNCHRONISED_CODES
+from toolpath_stiff.nc.codes.tools import TOOL_ALIASES, TOOL_CODES
 from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
 
 WAIT_FOR_INPUT = 66  # LinuxCNC, M-Codes, M66: P or E, and L with the kind of wait

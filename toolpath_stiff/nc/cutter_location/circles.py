@@ -13,13 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from toolpath_stiff.nc.geometry import (
-    RELATIVE_TOLERANCE,
-    ArcError,
-    Point2,
-    Vector,
-    check_bulge,
-)
+from toolpath_stiff.nc.geometry import RELATIVE_TOLERANCE, ArcError, Point2, Vector, check_bulge
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
 

@@ -100,10 +100,10 @@ class State:
     unsmooth: int = 0
     first_unsmooth: int = 0
 
-    def fail(self, found: str, expected: str = "", hint: str = "", place: Argument | None = None) -> ProgramError:
+    def fail(self, problem: str, expected: str = "", hint: str = "", place: Argument | None = None) -> ProgramError:
         """The error for the statement being executed."""
         line, column = (place or self.statement).line, (place or self.statement).column
-        return Place(self.name, line, max(column, 1)).fail(found, expected, hint)
+        return Place(self.name, line, max(column, 1)).fail(problem, expected, hint)
 
     def note(self, reason: str, doubtful: bool = False) -> None:
         """Note that the word being executed is not acted upon; `doubtful`: which is a warning."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 from toolpath_stiff.nc.cutter_location import cycles, modes, motion
 from toolpath_stiff.nc.cutter_location.modes import FRAMES, HEADING, TOOL
@@ -72,23 +72,29 @@ def listed(meaning: str, written_by: str, source: str, names: str, kind: str = L
     return [Word(name, act, meaning, written_by, source, kind=kind) for name in names.split()]
 
 
+class Harmless(NamedTuple):
+    """Statements of a refused word that change nothing: which they are, why, what is expected of the others."""
+
+    holds: Callable[[Statement], bool]
+    reason: str
+    expected: str = GEOMETRY
+
+
 def refused(
     meaning: str,
     hint: str,
     source: str,
     names: str,
     form: str = "",
-    *,
-    harmless: Callable[[Statement], bool] | None = None,
-    reason: str = "",
-    expected: str = GEOMETRY,
+    harmless: Harmless | None = None,
 ) -> list[Word]:
-    """Words that change the path in a way that is not supported; a `harmless` statement is listed with its reason."""
+    """Words that change the path in a way that is not supported."""
 
     def act(state: State, statement: Statement) -> None:
-        if harmless is None or not harmless(statement):
+        if harmless is None or not harmless.holds(statement):
+            expected = harmless.expected if harmless else GEOMETRY
             raise state.fail(f"{statement.shown} {meaning}, which is not supported", expected, hint)
-        state.note(reason)
+        state.note(harmless.reason)
 
     return [Word(name, act, meaning, "", source, form, REFUSED) for name in names.split()]
 
@@ -119,7 +125,7 @@ _BLOCK = "a block for the control as it stands: what it does is not known"
 _M_CODE, _G_CODE = (f"{kind} of one control: what it does is not known" for kind in ("an M code", "a G code"))
 _WHERE_CUT = "have the CAM system write the points where they are cut"
 _ONE_SYSTEM = "have the CAM system write points and tool axes in one system"
-_TURNS, _ZERO_TURN = "turns the work or the head of one machine", "a rotary axis that stays at 0"
+_TURNS = "turns the work or the head of one machine"
 _REPEATS, _OUT = "repeats or calls a part of the file", "have the CAM system write the points out"
 _DRIVE, _PROCESSOR = "is driven along surfaces", "give the file of points that APT's processor writes"
 _POINT, _POINTS = "have the CAM system write the point", "have the CAM system write points"
@@ -179,14 +185,14 @@ _ACTING = (
     Word("CSYS", modes.frame_word, FRAMES["CSYS"], "", VERICUT, kind=LISTED),
     Word("ZERO", modes.frame_word, FRAMES["ZERO"], AUTODESK, POSTS, kind=LISTED),
 )
-_SHIFT: dict[str, Any] = {"harmless": no_shift, "reason": "a shift of zero", "expected": "0,0,0"}
-_TURN: dict[str, Any] = {"harmless": no_turn, "reason": "a rotary axis that stays at 0"}
+_SHIFT = Harmless(no_shift, "a shift of zero", "0,0,0")
+_TURN = Harmless(no_turn, "a rotary axis that stays at 0")
 WORDS = table(
     (
         *_ACTING,
-        *refused("shifts all that follows", _WHERE_CUT, ISO, "TRANS ORIGIN", _SHIFT_FORM, **_SHIFT),
-        *refused(_TURNS, _ONE_SYSTEM, ISO, "ROTABL ROTHED", _TURN_FORM, **_TURN),
-        *refused(_TURNS, _ONE_SYSTEM, MANUALS, "ROTATE TABLE INDEX TILT", _TURN_FORM, **_TURN),
+        *refused("shifts all that follows", _WHERE_CUT, ISO, "TRANS ORIGIN", _SHIFT_FORM, _SHIFT),
+        *refused(_TURNS, _ONE_SYSTEM, ISO, "ROTABL ROTHED", _TURN_FORM, _TURN),
+        *refused(_TURNS, _ONE_SYSTEM, MANUALS, "ROTATE TABLE INDEX TILT", _TURN_FORM, _TURN),
         *listed(HEADING, ALL, ISO, "PARTNO PPRINT REMARK LETTER"),
         *listed(HEADING, "", APT, "TITLES TITLE"),
         *listed(HEADING, CATIA, DASSAULT, "TPRINT"),

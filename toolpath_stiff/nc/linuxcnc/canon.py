@@ -98,9 +98,9 @@ class Follower:
                     self.line = self.reading
             action(inner)
 
-    def fail(self, line: int, found: str, expected: str = "", hint: str = "") -> InputError:
+    def fail(self, line: int, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error of a line of the program."""
-        return ProgramError(found, expected=expected, hint=hint, file=self.name, line=line or None)
+        return ProgramError(problem, expected=expected, hint=hint, file=self.name, line=line or None)
 
     def _point(self, inner: str) -> Vector:
         """X, Y, Z as printed in mm, A, B, C in degrees."""

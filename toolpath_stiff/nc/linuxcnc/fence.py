@@ -46,9 +46,9 @@ def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
             )
 
 
-def _refused(found: str, place: Place) -> ProgramError:
+def _refused(problem: str, place: Place) -> ProgramError:
     return place.fail(
-        f"{found}: LinuxCNC's interpreter is not started on such a program",
+        f"{problem}: LinuxCNC's interpreter is not started on such a program",
         "a program that runs no other",
         "remove it, or read the program with --interpreter builtin",
     )

@@ -150,8 +150,8 @@ def _numbered_line(line: Line, words: str, name: str, tags: bool) -> str:
         comment = f"({line.number})"
     text = f"N{line.number}{words}{comment}"
     if len(text) > LONGEST_LINE:
-        found = f"a line of {len(text)} characters without blanks and comments"
-        raise place.fail(found, f"at most {LONGEST_LINE}, as LinuxCNC reads")
+        problem = f"a line of {len(text)} characters without blanks and comments"
+        raise place.fail(problem, f"at most {LONGEST_LINE}, as LinuxCNC reads")
     return text
 
 

@@ -15,10 +15,7 @@ import sys
 
 PR_SET_PDEATHSIG, PR_SET_NO_NEW_PRIVS, PR_SET_SECCOMP, SECCOMP_MODE_FILTER = 1, 38, 22, 2
 # linux/audit.h, and the numbers of clone, fork, vfork, clone3 on each machine (asm/unistd.h).
-ARCHITECTURES = {
-    "x86_64": (0xC000003E, (56, 57, 58, 435)),
-    "aarch64": (0xC00000B7, (220, 435)),
-}
+ARCHITECTURES = {"x86_64": (0xC000003E, (56, 57, 58, 435)), "aarch64": (0xC00000B7, (220, 435))}
 # linux/filter.h and linux/seccomp.h
 LOAD, JUMP_EQUAL, JUMP_ABOVE, RETURN = 0x20, 0x15, 0x25, 0x06
 CALL_NUMBER, ARCHITECTURE = 0, 4  # offsets in seccomp_data

@@ -17,6 +17,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import and_, or_, xor
 from typing import Protocol
 
 from toolpath_stiff.errors import InputError
@@ -123,7 +124,23 @@ class Scanner:
         """The next few characters, for errors."""
         return repr(self.text[self.at : self.at + 12])
 
-    # -- values ----------------------------------------------------------------------------------------------------
+    def _missing(self, what: str, expected: str) -> InputError:
+        return self.fail("the block ends here" if self.done else f"{self.rest()} is not {what}", expected)
+
+    def _worked_out(self, name: str, column: int, work: Callable[[Variables], float]) -> Value:
+        """A value whose result is a finite real number, or an error at `column`."""
+
+        def value(variables: Variables) -> float:
+            try:
+                return finite(work(variables))
+            except (ArithmeticError, ValueError) as error:
+                raise self.fail(f"{name} cannot be worked out: {error}", column=column) from None
+
+        return value
+
+    def _closed(self, column: int) -> None:
+        if not self.next("]"):
+            raise self.fail("a bracket that is not closed", "]", column=column)
 
     def value(self) -> Value:
         """The value after a letter or an operator: a number, a variable, a function, an expression in brackets."""
@@ -151,17 +168,16 @@ class Scanner:
         for short, long in SHORT.items():
             if self.next(short):
                 return self._function(long)
-        raise self.fail(f"{self.rest()} is not a value" if not self.done else "the block ends here", "a value")
+        raise self._missing("a value", "a value")
 
     def bracket(self) -> Value:
         """An expression in brackets."""
         column = self.column
         if not self.next("["):
-            raise self.fail(f"{self.rest()} is not a bracket" if not self.done else "the block ends here", "[")
+            raise self._missing("a bracket", "[")
         self._deeper(column)
         value = self.expression()
-        if not self.next("]"):
-            raise self.fail("a bracket that is not closed", "]", column=column)
+        self._closed(column)
         self.depth -= 1
         return value
 
@@ -242,34 +258,22 @@ class Scanner:
         if operator in ("EQ", "NE"):
             return lambda variables: equality(operator, left(variables), right(variables), family)
         act = OPERATIONS[operator]
-
-        def operated(variables: Variables) -> float:
-            try:
-                return finite(act(number(left(variables)), number(right(variables)), family))
-            except (ArithmeticError, ValueError) as error:
-                raise self.fail(f"{operator} cannot be worked out: {error}", column=column) from None
-
-        return operated
+        return self._worked_out(
+            operator, column, lambda variables: act(number(left(variables)), number(right(variables)), family)
+        )
 
     def _function(self, name: str) -> Value:
-        column = self.column
+        column, family = self.column, self.family
         if name == "EXISTS":
             return self._exists()
-        if name == "ROUND" and self.of_word and self.family == MACRO_B:
+        if name == "ROUND" and self.of_word and family == MACRO_B:
             raise self.fail(
                 "ROUND in a word, where it rounds to the least increment of the control", hint="round in an assignment"
             )
         if name in ("ATAN", "POW"):
             return self._of_two(name, column)
-        argument, act, family = self.bracket(), FUNCTIONS[name], self.family
-
-        def applied(variables: Variables) -> float:
-            try:
-                return finite(act(number(argument(variables)), family))
-            except (ArithmeticError, ValueError) as error:
-                raise self.fail(f"{name} cannot be worked out: {error}", column=column) from None
-
-        return applied
+        argument, act = self.bracket(), FUNCTIONS[name]
+        return self._worked_out(name, column, lambda variables: act(number(argument(variables)), family))
 
     def _of_two(self, name: str, column: int) -> Value:
         """ATAN[y]/[x]; Macro B's ATAN[y,x] and POW[base,exponent] too."""
@@ -279,35 +283,27 @@ class Scanner:
         first = self.expression()
         if self.family != NGC and self.next(","):
             second = self.expression()
-            if not self.next("]"):
-                raise self.fail("a bracket that is not closed", "]", column=self.columns[start])
+            self._closed(self.columns[start])
         elif name == "ATAN" and self.next("]") and self.next("/"):
             second = self.bracket()
         else:
             raise self.fail(
                 f"{name} with one value", "ATAN[y]/[x]" if name == "ATAN" else "POW[base,exponent]", column=column
             )
-        family = self.family
+        if name == "POW" and self.family == NGC:
+            raise self.fail(f"POW is no function of {NGC}", column=column)
 
-        def applied(variables: Variables) -> float:
+        def work(variables: Variables) -> float:
             one, other = number(first(variables)), number(second(variables))
-            try:
-                return finite(one**other if name == "POW" else variables.angle(one, other))
-            except (ArithmeticError, ValueError, TypeError) as error:
-                raise self.fail(f"{name} cannot be worked out: {error}", column=column) from None
+            return one**other if name == "POW" else variables.angle(one, other)
 
-        return applied if family != NGC or name == "ATAN" else self._refused(name, column)
-
-    def _refused(self, name: str, column: int) -> Value:
-        raise self.fail(f"{name} is no function of {self.family}", column=column)
+        return self._worked_out(name, column, work)
 
     def _exists(self) -> Value:
         """EXISTS[#<name>]: 1 if the variable has been set."""
         if self.family != NGC:
-            return self._refused("EXISTS", self.column)
-        if not self.next("[#"):
-            raise self.fail("EXISTS without a named variable", "EXISTS[#<name>]")
-        named = self.match(NAME)
+            raise self.fail(f"EXISTS is no function of {self.family}")
+        named = self.match(NAME) if self.next("[#") else None
         if named is None or not self.next("]"):
             raise self.fail("EXISTS without a named variable", "EXISTS[#<name>]")
         return lambda variables: float(variables.exists(named[1]))
@@ -331,9 +327,6 @@ def equality(operator: str, left: float | None, right: float | None, family: str
     return float(same == (operator == "EQ"))
 
 
-# -- what operators and functions do -----------------------------------------------------------------------------------
-
-
 def modulo(left: float, right: float, family: str) -> float:
     """MOD; never negative in NGC."""
     if right == 0.0:
@@ -353,17 +346,14 @@ def divided(left: float, right: float, family: str) -> float:
 
 def logical(operator: str) -> Callable[[float, float, str], float]:
     """AND, OR, XOR: of truth values in NGC, of bits in Macro B."""
+    combine: Callable[[int, int], int] = {"AND": and_, "OR": or_, "XOR": xor}[operator]
 
     def act(left: float, right: float, family: str) -> float:
         if family == NGC:
-            one, other = left != 0.0, right != 0.0
-            return float((one and other) if operator == "AND" else (one or other) if operator == "OR" else one != other)
-        bits = [round(value) for value in (left, right)]
-        if any(bit != value or not 0 <= bit < LARGEST_BITS for bit, value in zip(bits, (left, right), strict=True)):
+            return float(combine(left != 0.0, right != 0.0))
+        if any(value != round(value) or not 0 <= value < LARGEST_BITS for value in (left, right)):
             raise ValueError("its values are not whole numbers from 0")
-        return float(
-            bits[0] & bits[1] if operator == "AND" else bits[0] | bits[1] if operator == "OR" else bits[0] ^ bits[1]
-        )
+        return float(combine(round(left), round(right)))
 
     return act
 
@@ -383,23 +373,15 @@ OPERATIONS: dict[str, Callable[[float, float, str], float]] = {
 }
 
 
-def rounded(value: float, family: str) -> float:
-    """ROUND: half away from zero."""
-    return math.copysign(math.floor(abs(value) + 0.5), value)
+def whole(name: str, ngc: Callable[[float], float], macro: Callable[[float], float]) -> Callable[[float, str], float]:
+    """FIX and FUP: down and up in NGC, towards and from zero in Macro B."""
 
+    def act(value: float, family: str) -> float:
+        if family == EITHER and value < 0.0:
+            raise ValueError(f"controls differ in {name} of a negative number")
+        return float((ngc if family == NGC else macro)(value))
 
-def down(value: float, family: str) -> float:
-    """FIX: towards zero in Macro B, down in NGC."""
-    if family == EITHER and value < 0.0:
-        raise ValueError("controls differ in FIX of a negative number")
-    return float(math.floor(value) if family == NGC else math.trunc(value))
-
-
-def up(value: float, family: str) -> float:
-    """FUP: from zero in Macro B, up in NGC."""
-    if family == EITHER and value < 0.0:
-        raise ValueError("controls differ in FUP of a negative number")
-    return float(math.ceil(value) if family == NGC else math.copysign(math.ceil(abs(value)), value))
+    return act
 
 
 def trimmed(function: Callable[[float], float], degrees: bool = False) -> Callable[[float, str], float]:
@@ -429,10 +411,10 @@ FUNCTIONS: dict[str, Callable[[float, str], float]] = {
     "ASIN": trimmed(math.asin, degrees=True),
     "COS": trimmed(math.cos),
     "EXP": lambda value, family: math.exp(value),
-    "FIX": down,
-    "FUP": up,
+    "FIX": whole("FIX", math.floor, math.trunc),
+    "FUP": whole("FUP", math.ceil, lambda value: math.copysign(math.ceil(abs(value)), value)),
     "LN": lambda value, family: math.log(value),
-    "ROUND": rounded,
+    "ROUND": lambda value, family: math.copysign(math.floor(abs(value) + 0.5), value),  # half away from zero
     "SIN": trimmed(math.sin),
     "SQRT": lambda value, family: math.sqrt(value),
     "TAN": tangent,

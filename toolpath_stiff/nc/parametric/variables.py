@@ -65,8 +65,6 @@ class Variables:
     named: dict[str, float] = field(default_factory=dict)
     line: int = 0
 
-    # -- reading ---------------------------------------------------------------------------------------------------
-
     def get(self, which: str | int, place: Place) -> float | None:
         """The value of a variable; None: empty. Raises `InputError` for one that is not known."""
         try:
@@ -142,8 +140,6 @@ class Variables:
             )
         return None
 
-    # -- writing ---------------------------------------------------------------------------------------------------
-
     def set(self, which: str | int, value: float | None, place: Place) -> None:
         """Set a variable. Raises `InputError` for one that a program cannot set."""
         if isinstance(which, str):
@@ -158,8 +154,6 @@ class Variables:
         elif self.family != MACRO_B or value is None or not self._set_macro_system(which, value, place):
             known = f"#31 to #{NGC_LAST}" if self.family == NGC else "#1 to #33, #100 to #199, #500 to #999"
             raise place.fail(f"#{which} cannot be set here", known)
-
-    # -- what the control keeps ------------------------------------------------------------------------------------
 
     def angle(self, y: float, x: float) -> float:
         """ATAN[y]/[x], degrees: -180 to 180 on LinuxCNC, 0 to 360 on Fanuc's (parameter 6004, NAT = 0)."""

@@ -21,21 +21,21 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report.analysis.path import cutting_box, legend_extend, scale_limits
 from toolpath_stiff.report.figure import page_colours
-from toolpath_stiff.report.pages import bullets, markup, render_pieces, table
-from toolpath_stiff.report.profile import extremes_by_column, profile_curve
-from toolpath_stiff.report.words import (
-    FIGURES,
+from toolpath_stiff.report.figure_words import (
     ONLY_PLUNGES,
     READERS,
-    duration,
+    compared_rows,
+    figures_in_words,
     headline_text,
     length_in_moves,
     only_plunges,
-    plain,
+    place_words,
     plunges_beside,
-    shortened,
     span_of,
 )
+from toolpath_stiff.report.pages import bullets, markup, render_pieces, table
+from toolpath_stiff.report.profile import extremes_by_column, profile_curve
+from toolpath_stiff.report.words import duration, plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
@@ -111,10 +111,8 @@ def page_tables(summary: Mapping[str, Any], weakest: Sequence[int]) -> list[tupl
 
 def _figures(summary: Mapping[str, Any]) -> Markup:
     origin = " ".join(f"{axis}{v:.10g}" for axis, v in zip("XYZABC", summary["origin_mm_deg"], strict=True))
-    rows = [
-        (title[0].upper() + title[1:], number(summary[name], 2 if name.endswith("_um") else 0))
-        for title, name in zip(TITLES, FIGURES, strict=True)
-    ]
+    shown = figures_in_words(summary)
+    rows = [(title[0].upper() + title[1:], text) for title, text in zip(TITLES, shown, strict=True)]
     rows += _plunges(summary)
     rows += [
         ("Cutting length mm", number(summary["cutting_length_mm"], 1)),
@@ -158,13 +156,8 @@ def _beside(row: Mapping[str, Any]) -> str:
 def _places(places: Sequence[Mapping[str, Any]], weakest: Sequence[int]) -> Markup:
     rows = []
     for place, row in zip(places, weakest, strict=True):
-        where = " ".join(f"{axis.upper()}{place[f'{axis}_mm']:.2f}" for axis in "xyz")
-        if any(place[f"{axis}_deg"] for axis in "abc"):
-            where += " " + " ".join(f"{axis.upper()}{place[f'{axis}_deg']:.2f}" for axis in "abc")
-        button = markup(PLACE, place["line"], row, place["line"])
-        rows.append(
-            ("", (button, number(place["stiffness_N_per_mm"]), where, markup("<code>{}</code>", place["text"])))
-        )
+        button, text = markup(PLACE, place["line"], row, place["line"]), markup("<code>{}</code>", place["text"])
+        rows.append(("", (button, number(place["stiffness_N_per_mm"]), place_words(place, 2), text)))
     return table(("", "N/mm", "position mm", "program"), rows, (1,))
 
 
@@ -190,7 +183,7 @@ def _part_figures(row: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         number(row["cutting_length_mm"], 1),
         duration(row["time_s"]),
-        *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
+        *figures_in_words(row),
         _beside(row),
         _weakest(row["weakest"]),
     )
@@ -231,17 +224,8 @@ def _required(required: Mapping[str, Any]) -> Markup:
 
 def _comparison(summary: Mapping[str, Any]) -> Markup:
     other = summary["compare"]
-    rows = []
-    for title, name, change in zip(TITLES, FIGURES, other["difference_percent"].values(), strict=True):
-        digits = 2 if name.endswith("_um") else 0
-        difference = "-" if change is None else f"{change:+.1f} %"
-        rows.append(("", (title, number(summary[name], digits), number(other[name], digits), difference)))
-    plunges = [plunges_beside(one) for one in (summary, other)]
-    if any(plunges):
-        first, second = (number(one["mean_N_per_mm"] if one else None) for one in plunges)
-        change = other["plunges_difference_percent"]
-        shown = "-" if change is None else f"{change:+.1f} %"
-        rows.append(("", (f"mean of the {PLUNGES_TITLE}", first, second, shown)))
+    figures, plunges = compared_rows(summary, other, TITLES, f"mean of the {PLUNGES_TITLE}")
+    rows = [("", row) for row in (*figures, *plunges)]
     return table(("", str(summary["machine"]), str(other["machine"]), "difference"), rows, (1, 2, 3))
 
 

@@ -6,27 +6,29 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.analysis.document import compare_summaries
-from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
+from toolpath_stiff.analysis.statistics import FIGURES, samples_csv, samples_parquet
 from toolpath_stiff.column_files import check_parquet
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.analysis.page import page_pieces
 from toolpath_stiff.report.analysis.path import path_picture
+from toolpath_stiff.report.figure_words import (
+    READERS,
+    compared_rows,
+    length_in_moves,
+    only_plunges,
+    place_words,
+    plunges_beside,
+)
 from toolpath_stiff.report.profile import profile_picture
 from toolpath_stiff.report.words import (
-    FIGURES,
     LABEL,
-    READERS,
     WIDTH,
     aligned,
     duration,
     first_column_fitted,
     labelled,
-    length_in_moves,
     machine_text,
-    only_plunges,
     plain,
-    plunges_beside,
     shortened,
 )
 from toolpath_stiff.results import one_of
@@ -87,13 +89,7 @@ TABLES = {"csv": samples_csv, "parquet": samples_parquet}
 MOST_OPERATIONS = 12  # rows; all are in summary.json
 
 
-TITLES = {
-    "mean_N_per_mm": "mean N/mm",
-    "min_N_per_mm": "min N/mm",
-    "max_N_per_mm": "max N/mm",
-    "range_N_per_mm": "range N/mm",
-    "mean_deflection_um": "deflection um",
-}
+TITLES = ("mean N/mm", "min N/mm", "max N/mm", "range N/mm", "deflection um")
 
 
 def terminal_table(summary: Mapping[str, Any]) -> str:
@@ -137,14 +133,9 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
 
 def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> str:
     """Two machines side by side, the difference in percent of the first."""
-    compared = compare_summaries(summary, other)
-    rows = [["", *(shortened(machine_text(one), 32) for one in (summary, other)), "difference"]]
-    for name, change in zip(FIGURES, compared["difference_percent"].values(), strict=True):
-        digits = 2 if name.endswith("_um") else 0
-        difference = "-" if change is None else f"{change:+.1f} %"
-        rows.append([TITLES[name], number(summary[name], digits), number(other[name], digits), difference])
+    figures, plunges = compared_rows(summary, other, TITLES, "plunges N/mm")
+    rows = [["", *(shortened(machine_text(one), 32) for one in (summary, other)), "difference"], *figures, *plunges]
     places = [s["weakest"] for s in (summary, other)]
-    rows += _plunges_compared(summary, other)
     rows.append(["weakest line", *(str(place["line"]) if place else "-" for place in places), ""])
     rows.append(["extrapolated", *(f"{s['extrapolated_share']:.1%}" for s in (summary, other)), ""])
     if any(s["out_of_reach_samples"] for s in (summary, other)):
@@ -188,16 +179,6 @@ def _plunges(summary: Mapping[str, Any]) -> list[str]:
     return _entry("plunges", f"{text}; not counted above{', though weaker than all other cuts' if weaker else ''}")
 
 
-def _plunges_compared(summary: Mapping[str, Any], other: Mapping[str, Any]) -> list[list[str]]:
-    """The row of the plunges' mean; none where no machine has plunges beside its headline."""
-    plunges = [plunges_beside(one) for one in (summary, other)]
-    if not any(plunges):
-        return []
-    change = compare_summaries(summary, other)["plunges_difference_percent"]
-    means = [number(one["mean_N_per_mm"] if one else None) for one in plunges]
-    return [["plunges N/mm", *means, "-" if change is None else f"{change:+.1f} %"]]
-
-
 def _band(summary: Mapping[str, Any]) -> list[str]:
     """What the uncertainty of fitted parameters leaves open, where the machine file tells of it."""
     band = summary.get("parameter_uncertainty")
@@ -216,10 +197,8 @@ def _weakest(summary: Mapping[str, Any]) -> list[str]:
     place = summary["weakest"]
     if place is None:
         return _entry("weakest", "-")
-    where = " ".join(f"{axis.upper()}{place[f'{axis}_mm']:.3f}" for axis in "xyz")
-    if any(place[f"{axis}_deg"] for axis in "abc"):
-        where += " " + " ".join(f"{axis.upper()}{place[f'{axis}_deg']:.3f}" for axis in "abc")
-    lines = _entry("weakest", f"{number(place['stiffness_N_per_mm'])} N/mm in line {place['line']} at {where}")
+    stiffness, where = number(place["stiffness_N_per_mm"]), place_words(place, 3)
+    lines = _entry("weakest", f"{stiffness} N/mm in line {place['line']} at {where}")
     if place["text"]:
         lines.append(" " * (LABEL + 2) + shortened(plain(place["text"]), WIDTH - LABEL - 2))
     return lines

@@ -18,8 +18,9 @@ from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.batch.outcomes import Outcome, good_and_failed, summary_csv
 from toolpath_stiff.report.batch.programs import RESERVED
+from toolpath_stiff.report.figure_words import ONLY_PLUNGES
 from toolpath_stiff.report.pages import markup, render
-from toolpath_stiff.report.words import ONLY_PLUNGES, counted, duration, plain, shortened
+from toolpath_stiff.report.words import counted, duration, plain, shortened
 from toolpath_stiff.units import number
 
 INDEX, SUMMARY = RESERVED

@@ -9,7 +9,8 @@ from typing import Any
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.documents import Document
-from toolpath_stiff.report.words import WIDTH, counted, duration, only_plunges, plain, shortened
+from toolpath_stiff.report.figure_words import only_plunges
+from toolpath_stiff.report.words import WIDTH, counted, duration, plain, shortened
 from toolpath_stiff.units import number
 
 MOST_NAME = 36  # columns of the terminal for the name

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.placement.result import Placement, Refused, Written
+from toolpath_stiff.placement.result import NotWritten, Placement, Written
 from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
 from toolpath_stiff.report.place.html import place_page
 from toolpath_stiff.report.place.pictures import front_picture, profiles_picture, workspace_picture
@@ -58,9 +58,9 @@ def _figures_words(row: PlacementRow) -> str:
     )
 
 
-def _written(written: Written | Refused) -> list[str]:
+def _written(written: Written | NotWritten) -> list[str]:
     """Lines on the transformed program."""
-    if isinstance(written, Refused):
+    if isinstance(written, NotWritten):
         return [f"not rewritten   {written.file}: {written.refused}"]
     zero, apart = written.analysed_at, written.relative_difference
     figures = ", ".join(f"{name} {value:.1e}" for name, value in apart.items())

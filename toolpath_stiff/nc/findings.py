@@ -1,0 +1,131 @@
+"""What a check says of a program: codes, errors, warnings, notes, and where each stands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes.registry import would_change
+from toolpath_stiff.nc.moves import Jump, Moves, Unsupported
+from toolpath_stiff.units import Pose
+
+ERROR, WARNING, NOTE = "error", "warning", "note"
+NO_CHANGE = "nothing of the path"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One finding about a program.
+
+    Attributes
+    ----------
+    line, column
+        Where, from 1; 0: of the program as a whole.
+    code
+        What kind of finding it is, a short word; of used and unsupported words the word itself.
+    text
+        One sentence.
+    severity
+        "error": the program is refused for it; "warning": to be checked; "note": for the record.
+    """
+
+    line: int
+    column: int
+    code: str
+    text: str
+    severity: str
+
+
+@dataclass(frozen=True)
+class UsedCode:
+    """A G or M code of the program: where it stands first, how often, and what it is taken for."""
+
+    line: int
+    column: int
+    code: str
+    text: str
+    severity: str
+    count: int
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found without a machine.
+
+    Attributes
+    ----------
+    used
+        Codes in the order of their first appearance.
+    unsupported
+        Words that were read and not acted upon, with what they would change.
+    findings
+        In the order of lines.
+    start, end
+        Modal state before the first block and after the last one, names to words.
+    moves
+        In the set-up frame; after an error the moves of the blocks that could be read, None if there are none.
+    origin
+        Where program zero sits, m and rad.
+    complete
+        Whether the whole program was read.
+    dialect
+        What the file was taken for, where that is not the control's dialect.
+    remarks
+        What the tool table says of the tools that were used, by number.
+    marks, jumps
+        Where operations begin, where the run left the order of the lines; as in `ReadProgram`.
+    """
+
+    used: tuple[UsedCode, ...]
+    unsupported: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
+    start: dict[str, str]
+    end: dict[str, str]
+    moves: Moves | None
+    origin: Pose
+    complete: bool
+    dialect: str = ""
+    remarks: dict[int, str] = field(default_factory=dict)
+    marks: tuple[tuple[int, str], ...] | None = None
+    jumps: tuple[Jump, ...] | None = None
+
+
+def findings_of(
+    errors: Iterable[InputError], warnings: Iterable[str], assumptions: Iterable[str]
+) -> tuple[Finding, ...]:
+    """All findings about a program, in the order of lines."""
+    return in_order(
+        [
+            *(finding_of(error) for error in errors),
+            *(Finding(line_in(text), 0, "warning", text, WARNING) for text in warnings),
+            *(Finding(0, 0, "assumption", text, NOTE) for text in assumptions),
+        ]
+    )
+
+
+def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings in the order of lines."""
+    return tuple(sorted(findings, key=lambda finding: (finding.line, finding.column)))
+
+
+def finding_of(error: InputError) -> Finding:
+    """What could not be read, and what it would change."""
+    text = error.found + (f"; expected {error.expected}" if error.expected else "")
+    changes = would_change(error.found)
+    text += f"; it would change {changes}" if changes else ""
+    text += f". {error.hint[0].upper()}{error.hint[1:]}" if error.hint else ""
+    return Finding(error.line or 0, error.column or 0, "not read", text, ERROR)
+
+
+def finding_of_unsupported(word: Unsupported) -> Finding:
+    """What was read and not acted upon, and what it would change."""
+    text = f"{word.reason}; it would change {would_change(word.word, listed=True) or NO_CHANGE}"
+    return Finding(word.line, word.column, word.word, text, NOTE)
+
+
+def line_in(text: str) -> int:
+    """The line that a warning names; 0 if it names none."""
+    _, found, rest = text.partition("line ")
+    digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
+    return int(digits) if found and digits else 0

@@ -1,0 +1,395 @@
+"""The blocks of a file, in the order in which they run.
+
+Subprograms are those of Fanuc's controls: O numbers within the file, after the main program or before it, called by
+`M98 P1000 L2` or, with the repeats before the four digits of the number, `M98 P21000`; they end with M99. LinuxCNC
+reads the first form alike. `M97 P100` (Haas) and `M98 Q100` (Fanuc) call the block N100 of the file, up to an M99.
+Modal state goes through a call unchanged.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, TypeVar
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.codes.saved import leave_level
+from toolpath_stiff.nc.interpreter import execute
+from toolpath_stiff.nc.moves import Jump
+from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.state import Call, Flow, GoTo, State, Then
+from toolpath_stiff.nc.words import Block, Word, leader, read_block
+
+if TYPE_CHECKING:
+    from toolpath_stiff.nc.plain_lines import PlainRun
+    from toolpath_stiff.nc.plain_words import PlainWords
+
+DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
+MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
+MOST_REPEATS = 9999
+MOST_ERRORS = 100  # beyond, a file is not a program for this reader
+FEWEST_LINES = 50  # of a program; below, loading what reads many lines at once costs more than it saves
+SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
+HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
+LABEL = re.compile(r"\s*(%\s*\d+)\s*", re.ASCII)
+REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
+
+Argument = TypeVar("Argument", int, Block)
+Outcome = TypeVar("Outcome")
+
+
+@dataclass
+class Subprogram:
+    """A subprogram that runs.
+
+    Attributes
+    ----------
+    name, first, back, again
+        Its name, first line (from 0), where to go on, and how often it runs again.
+    arguments
+        The local variables with which each of its runs begins; None: it has those of its caller.
+    modal
+        Whether G66 calls it.
+    counts
+        Repeats left of its loops, by line.
+    """
+
+    name: str
+    first: int
+    back: int
+    again: int
+    arguments: dict[int, float | None] | None = None
+    modal: bool = False
+    counts: dict[int, int] = field(default_factory=dict)
+
+
+@dataclass
+class Tally:
+    """What a check gathers while a program runs: its errors, and of each code its first place and how often it runs."""
+
+    errors: list[InputError] = field(default_factory=list)
+    first: dict[str, tuple[int, int]] = field(default_factory=dict)
+    count: Counter[str] = field(default_factory=Counter)
+
+    def add(self, block: Block) -> None:
+        """Count the codes of a block."""
+        for word in block.words:
+            if word.letter in "GM":
+                code = code_name(word.letter, word.value)
+                self.first.setdefault(code, (block.line, word.column))
+                self.count[code] += 1
+
+
+def beyond_the_end(what: str, at: int, lines: int) -> str:
+    """The warning that lines follow what ends a program in line `at` (from 0)."""
+    return f"what follows {what} in line {at + 1} is not part of the program (lines: {lines})"
+
+
+def without_label(state: State, lines: tuple[str, ...]) -> tuple[str, ...]:
+    """The lines, without what stands behind the first tape mark in the dialect fanuc, whose controls skip that."""
+    first = next((index for index, line in enumerate(lines) if line.strip()), 0)
+    label = LABEL.fullmatch(lines[first]) if lines and state.dialect.name == "fanuc" else None
+    if label is None:
+        return lines
+    state.note(first + 1, Word("%", 0.0, label.start(1) + 1, label[1]), "program number")
+    return (*lines[:first], "%", *lines[first + 1 :])
+
+
+class ProgramRun:
+    """Runs the blocks of a file on a control.
+
+    Parameters
+    ----------
+    state
+        Of the control at the start; the blocks change it.
+    lines, name
+        The file.
+    switches
+        The block-delete switches that are on, 1 to 9: blocks that begin with their slash are left out.
+    fast
+        Whether plain lines are executed many at a time; the moves are the same.
+    tally
+        Gathers errors and codes; the run then goes on after a block with an error.
+    """
+
+    recursive = False  # whether a program may call itself
+    no_such_block = "and the file has no such block"
+
+    def __init__(
+        self,
+        state: State,
+        lines: tuple[str, ...],
+        name: str,
+        switches: frozenset[int],
+        fast: bool = True,
+        tally: Tally | None = None,
+    ) -> None:
+        self.state, self.lines, self.name = state, without_label(state, lines), name
+        self.switches, self.tally = switches, tally
+        self._plain: PlainRun | None = None
+        if fast and len(lines) >= FEWEST_LINES:
+            from toolpath_stiff.nc.plain_lines import PlainRun
+
+            self._plain = PlainRun(state, lines, name)
+        self._levels: list[Subprogram] = []
+        self._programs: dict[int, int] | None = None
+        self._sequence: dict[int, list[int]] | None = None
+        self._called: dict[int, Block] = {}  # blocks of subprograms by line, from 0: each is read once
+        self._blocks = 0
+        self.jumps: list[Jump] = []
+
+    def run(self) -> list[str]:
+        """Run to the program's end; returns warnings. Raises `InputError` with the line."""
+        at, percent, numbered = leader(self.lines, self.name, self.state.dialect.semicolon), False, False
+        if at:
+            self.state.warnings.append(f"what stands before the tape mark (%) in line {at + 1} is not read")
+        while at < len(self.lines):
+            if self._plain is not None and not self._levels:
+                words = self._plain.execute(at)
+                if words is not None:
+                    self._tally_plain(at, words)
+                    percent = percent or bool(words.count.any())
+                    at += len(words)
+                    continue
+            following: int | None = at + 1
+            steered = self._tried(self._steered, at, following)
+            if steered is not None:
+                at = steered
+                continue
+            block = self._block(at)
+            if block.percent:
+                if percent:
+                    return self._end(at, "%")
+                percent = True
+            elif block.words:
+                percent = True  # from the first word on, a tape mark is the last one
+                if block.words[0].letter == "O":
+                    self._check_head(block, numbered)
+                    numbered = True
+                if not (block.optional and block.switch in self.switches):
+                    self.state.level = len(self._levels)
+                    if self.tally is not None:
+                        self.tally.add(block)
+                    on: Then = Flow.NEXT
+                    flow = self._tried(self._execute, block, on)
+                    if flow is Flow.END:
+                        return self._end(at, "the program's end", ended=True)
+                    if flow is not Flow.NEXT:
+                        to = self._enter(at, flow) if isinstance(flow, Call) else self._return(at, flow)
+                        if to is None:
+                            return [
+                                f"M99 in line {at + 1}, outside any subprogram, makes the control start the program "
+                                "again, without end: it is read once",
+                                *self._end(at, "M99"),
+                            ]
+                        at = self._jump(at, to)
+                        continue
+            at += 1
+        return self._end(len(self.lines) - 1, "the file")
+
+    def _tried(self, act: Callable[[Argument], Outcome], argument: Argument, instead: Outcome) -> Outcome:
+        """What a step gives; in a check its error is kept and the run goes on with `instead`."""
+        try:
+            return act(argument)
+        except InputError as error:
+            if self.tally is None:
+                raise
+            self.tally.errors.append(error)
+            if len(self.tally.errors) >= MOST_ERRORS:
+                raise
+            return instead
+
+    def _tally_plain(self, at: int, words: PlainWords) -> None:
+        """Count the codes of plain lines from `at`."""
+        if self.tally is None:
+            return
+        rows_of_codes = [(words.code == number).nonzero()[0] for number in range(int(words.code.max()) + 1)]
+        for rows in sorted((rows for rows in rows_of_codes if len(rows)), key=lambda rows: int(rows[0])):
+            code, line = f"G{words.code[rows[0]]}", at + int(rows[0])
+            if code not in self.tally.first:
+                column = next(word.column for word in self._read(line).words if word.letter == "G")
+                self.tally.first[code] = (line + 1, column)
+            self.tally.count[code] += len(rows)
+
+    def _steered(self, at: int) -> int | None:
+        """Where the run goes on, of a line that only says that; None: its words act."""
+        return None
+
+    def _block(self, at: int) -> Block:
+        block = self._called.get(at) if self._levels else None
+        if self._levels:
+            self._blocks += 1
+            if self._blocks > MOST_BLOCKS:
+                raise self._fail(at, f"the subprograms run more than {MOST_BLOCKS} blocks", "fewer repeats")
+        if block is None:
+            block = self._tried(self._read, at, Block(at + 1, ()))
+            if self._levels:
+                self._called[at] = block
+        return block
+
+    def _execute(self, block: Block) -> Then:
+        return execute(self.state, block)
+
+    def _read(self, at: int) -> Block:
+        block = read_block(self.lines[at], at + 1, self.name, self.state.dialect.semicolon)
+        return block if block.rest is None else block.executed(self.switches)
+
+    def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
+        return self._place(at).fail(found, expected, hint, column)
+
+    def _place(self, at: int) -> Place:
+        return Place(self.name, at + 1)
+
+    def _check_head(self, block: Block, numbered: bool) -> None:
+        """A program number within a program: the next one begins where this one did not end."""
+        if self._levels:
+            raise self._unended(block.line - 1)
+        if (numbered or len(self.state.recorder)) and self.state.dialect.name != "linuxcnc":
+            found = f"{block.words[0].text} begins another program before the first one has ended"
+            raise self._fail(block.line - 1, found, "M30 or M2 before it", column=block.words[0].column)
+
+    def _unended(self, at: int) -> InputError:
+        level = self._levels[-1]
+        return self._fail(at, f"the subprogram {level.name}, which begins in line {level.first + 1}, has no end", "M99")
+
+    def _end(self, at: int, what: str, ended: bool = False) -> list[str]:
+        """A warning if anything but tape marks and the subprograms that ran follows the end."""
+        if self._levels and not ended:
+            raise self._unended(at)
+        rest = [
+            line
+            for index, line in enumerate(self.lines[at + 1 :], at + 1)
+            if line.strip() not in ("", "%") and index not in self._called and index + 1 not in self._called
+        ]
+        return [beyond_the_end(what, at, len(rest))] if rest else []
+
+    def _enter(self, at: int, call: Call) -> int:
+        """The line at which the called subprogram begins."""
+        if call.local:
+            code = "M97" if self.state.dialect.local_calls else "M98 Q"
+            name, repeats = f"N{call.number}", call.repeats or 1
+            first = self._block_numbered(at, f"{code} calls", call.number, call.column)
+        else:
+            number, repeats = self._target(at, call)
+            code, name, first = "M98" if call.arguments is None else "a call", f"O{number}", self._heads()[number] + 1
+        if not 1 <= repeats <= MOST_REPEATS:
+            raise self._fail(at, f"{code} with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
+        if call.local or not self.recursive:
+            if any(level.name == name for level in self._levels):
+                raise self._fail(at, f"{code} calls {name}, which is running: it would never end", column=call.column)
+            if not call.local and first == self._main + 1:
+                raise self._fail(at, f"M98 calls {name}, the main program itself", column=call.column)
+        self._begin(Subprogram(name, first, at + 1, repeats - 1, call.arguments, call.modal), at, call.column)
+        return first
+
+    def _begin(self, level: Subprogram, at: int, column: int) -> None:
+        if len(self._levels) == DEEPEST:
+            raise self._fail(at, f"more than {DEEPEST} subprograms within each other", column=column)
+        self._levels.append(level)
+
+    def _jump(self, at: int, to: int) -> int:
+        self.jumps.append(Jump(len(self.state.recorder), at + 1, to))
+        return to
+
+    def _numbered(self, at: int, number: float) -> list[int]:
+        """The lines (from 0) with an N number, of the program that runs at `at`."""
+        if self._sequence is None:
+            self._sequence = {}
+            for index, line in enumerate(self.lines):
+                match = SEQUENCE.match(line)
+                if match:
+                    self._sequence.setdefault(int(match[1] or 0), []).append(index)
+        return self._sequence.get(round(number), []) if number == round(number) else []
+
+    def _block_numbered(self, at: int, what: str, number: float, column: int) -> int:
+        """The line (from 0) of the block with an N number. Raises `InputError` unless there is one."""
+        rows = self._numbered(at, number)
+        if len(rows) != 1:
+            places = ", ".join(str(self._place(row).line) for row in rows)
+            other = f"which is in the lines {places}" if rows else self.no_such_block
+            raise self._fail(at, f"{what} N{number:g}, {other}", "one block with that number", column=column)
+        return rows[0]
+
+    def _return(self, at: int, flow: Flow | GoTo) -> int | None:
+        """The line at which M99 goes on; None where that is the beginning of the program, or before this line."""
+        if not isinstance(flow, GoTo):
+            return self._leave(at) if self._levels else None
+        to = self._block_numbered(at, "M99 P goes to", flow.number, flow.column)
+        if not self._levels:
+            return to if to > at else None
+        self._restore(at)
+        level = self._levels.pop()
+        if level.again or to < level.back:
+            found = f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram"
+            raise self._fail(at, found, "a block after the call, which is not repeated", column=flow.column)
+        return to
+
+    def _restore(self, at: int) -> None:
+        """The caller's modes, where M73 has saved them."""
+        fault = leave_level(self.state, len(self._levels))
+        if fault:
+            raise self._fail(at, f"the subprogram that saved modes with M73 returns where {fault}")
+
+    def _leave(self, at: int) -> int:
+        self._restore(at)
+        level = self._levels[-1]
+        if level.again:
+            level.again -= 1
+            return level.first
+        self._levels.pop()
+        return level.back
+
+    def _target(self, at: int, call: Call) -> tuple[int, int]:
+        """Program number and repeats of a call."""
+        heads = self._heads()
+        meanings = {(call.number, call.repeats or 1)}
+        style = self.state.dialect.repeats_in_p
+        if call.repeats is None and call.number >= REPEATS_IN_P and style is not False:
+            repeats, number = divmod(call.number, REPEATS_IN_P)
+            meanings = {(number, repeats)} if style else meanings | {(number, repeats)}
+        known = [meaning for meaning in sorted(meanings) if meaning[0] in heads]
+        if not known:
+            names = " or ".join(f"O{number}" for number, _ in sorted(meanings))
+            hint = "put the subprogram into the file, after the main program's M30"
+            found = f"M98 calls {names}, and the file has no such subprogram"
+            raise self._fail(at, found, hint=hint, column=call.column)
+        if len(known) > 1:
+            raise self._fail(
+                at,
+                f"M98 P{call.number} calls O{call.number} or, {known[0][1]} times, O{known[0][0]}: the file has both",
+                hint="give the number of repeats as L",
+                column=call.column,
+            )
+        return known[0]
+
+    def _heads(self) -> dict[int, int]:
+        """Program number -> line (from 0) of its O word; what follows the last tape mark is not part of one."""
+        if self._programs is None:
+            self._programs = {}
+            started = False
+            for index, line in enumerate(self.lines):
+                if line.strip() == "%" and started:
+                    break
+                started = started or bool(line.strip())
+                head = HEAD.match(line)
+                if head is None:
+                    continue
+                number = int(head[1] or 0)
+                if number in self._programs:
+                    raise self._fail(index, f"O{number} is in line {self._programs[number] + 1} already")
+                self._programs[number] = index
+        return self._programs
+
+    @cached_property
+    def _main(self) -> int:
+        """The line of the main program's own number; -1 if it has none."""
+        for index, line in enumerate(self.lines):
+            if HEAD.match(line):
+                return index
+            if line.strip() not in ("", "%") and not line.lstrip().startswith("("):
+                break
+        return -1
