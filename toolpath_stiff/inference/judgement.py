@@ -2,7 +2,7 @@
 
 | step | function | gives |
 | --- | --- | --- |
-| read | `measurements.read_measurements` | `Measurements`: readings as columns |
+| read | `measurements.read_measurements` | `Readings`: as columns |
 | noise | `noise.noise_models` | `Noise`: how far readings scatter for reasons that no model explains |
 | | `evidence.Problem.of` | `Problem`: readings, model and scatter together |
 | candidates | `find_candidates` | `Candidates`: every effect fitted as far as a table of its compliance goes |

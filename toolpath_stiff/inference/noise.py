@@ -144,7 +144,7 @@ def noise_models(
     Parameters
     ----------
     data
-        n readings; those of loops beside the tip have a noise of their own, `Measurements.sd`.
+        n readings; those of loops beside the tip have a noise of their own, `Readings.sd`.
     stated
         Relative sd of one reading, re-clamping included; or (repeat, clamping). Wins over the data.
     strut_spread, joint_error
