@@ -12,7 +12,7 @@ import pytest
 from tests.faults import all_writes_by_files
 from toolpath_stiff import results_folder
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.cli.outputs import joined_names
+from toolpath_stiff.cli.outputs import _default_folder
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.results_folder import MANIFEST, Rules, check_folder, write_folder
 
@@ -191,9 +191,9 @@ def test_told_to_replace_it_keeps_what_was_in_the_way(tmp_path):
 
 
 def test_default_names_hold_every_file_s_name():
-    assert joined_names(["a/first.csv", "second.csv"]) == "first+second"
-    assert joined_names(["x" * 40 + ".csv", "y" * 40, "z"]) == "x" * 40 + "+2"
-    assert joined_names(["part.v2.nc"]) == "part.v2"
+    assert _default_folder(["a/first.csv", "second.csv"], "") == Path("reports/first+second")
+    assert _default_folder(["x" * 40 + ".csv", "y" * 40, "z"], "-plan") == Path(f"reports/{'x' * 40}+2-plan")
+    assert _default_folder(["part.v2.nc"], "") == Path("reports/part.v2")
 
 
 # -- the commands ------------------------------------------------------------------------------------------------------
