@@ -6,8 +6,9 @@ from argparse import Namespace
 
 import toolpath_stiff as tps
 from toolpath_stiff.api.effects import effect_name
+from toolpath_stiff.cli.calls import call
 from toolpath_stiff.cli.outputs import check_new, check_single, keep, show
-from toolpath_stiff.cli.parser import DATA, JSON, REPLACE, Command, call, own
+from toolpath_stiff.cli.parser import DATA, JSON, REPLACE, Command, own
 from toolpath_stiff.hints import command_line, hint, options
 from toolpath_stiff.options import arguments_of
 

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import toolpath_stiff as tps
 from toolpath_stiff.api.inputs import pose_si
+from toolpath_stiff.cli.calls import call, given
 from toolpath_stiff.cli.outputs import check_new, check_single, destination, keep, show, tell, write_made, written_text
-from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, Command, call, given, own
+from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, Command, own
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, hint
 from toolpath_stiff.options import finite_number, numbers

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import toolpath_stiff as tps
+from toolpath_stiff.cli.calls import call
 from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell, write_made, written_text
-from toolpath_stiff.cli.parser import DATA, FOLDER, JSON, NO_PLOTS, REPLACE, Command, call, own
+from toolpath_stiff.cli.parser import DATA, FOLDER, JSON, NO_PLOTS, REPLACE, Command, own
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.workbooks import split_name
 

@@ -6,8 +6,9 @@ from argparse import Namespace
 from pathlib import Path
 
 import toolpath_stiff as tps
+from toolpath_stiff.cli.calls import call
 from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell_incomplete, written_text
-from toolpath_stiff.cli.parser import FOLDER, PROGRAM, Command, call, own
+from toolpath_stiff.cli.parser import FOLDER, PROGRAM, Command, own
 from toolpath_stiff.cli.program import READ
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names

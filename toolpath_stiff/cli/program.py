@@ -11,19 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import toolpath_stiff as tps
 from toolpath_stiff.api import programs
+from toolpath_stiff.cli.calls import call, given, machine_for, program_for
 from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell, written_text
-from toolpath_stiff.cli.parser import (
-    FOLDER,
-    JSON,
-    PROGRAM,
-    REPLACE,
-    Command,
-    call,
-    given,
-    machine_for,
-    own,
-    program_for,
-)
+from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, Command, own
 from toolpath_stiff.cli.progress import say
 from toolpath_stiff.defaults import one_thread
 from toolpath_stiff.errors import InputError

@@ -6,7 +6,8 @@ from argparse import Namespace
 from typing import cast
 
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.cli.parser import Command, given, own
+from toolpath_stiff.cli.calls import given
+from toolpath_stiff.cli.parser import Command, own
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import arguments_of
