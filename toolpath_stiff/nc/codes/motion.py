@@ -267,8 +267,8 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     added = Arc(center, normal, sweep) if pending.letter == ",R" else None
     feed, bound = recorder.feed[-1], recorder.from_machine[-1]
     recorder.add(
-        pending.line, ARC if added else FEED, recorder.end[-1], [*last, *vertex[3:]], feed, state.tool, state.tool_length,
-        (bound[1], bound[1]), added,
+        pending.line, ARC if added else FEED, recorder.end[-1], [*last, *vertex[3:]], feed, state.tool,
+        state.tool_length, (bound[1], bound[1]), added,
     )  # fmt: skip
     frames.position = [p + new - old for p, new, old in zip(frames.position, [*last, *vertex[3:]], vertex, strict=True)]
 
