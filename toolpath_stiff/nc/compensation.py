@@ -75,7 +75,7 @@ class Cutter:
         First, second axis of the plane, and the one along the tool.
     unit
         Millimetres of one length unit of the program.
-    at
+    position
         Tool centre in program coordinates (6); None before the first move.
     anchor
         Where the pending moves begin, in the plane.
@@ -91,7 +91,7 @@ class Cutter:
     radius: float
     axes: tuple[int, int, int]
     unit: float
-    at: list[float] | None = None
+    position: list[float] | None = None
     anchor: Point2 = (0.0, 0.0)
     pending: list[Pending] = field(default_factory=list)
     straight: bool = False
@@ -100,8 +100,8 @@ class Cutter:
     @property
     def center(self) -> Point2:
         """Tool centre in the plane."""
-        assert self.at is not None
-        return self.at[self.axes[0]], self.at[self.axes[1]]
+        assert self.position is not None
+        return self.position[self.axes[0]], self.position[self.axes[1]]
 
 
 @dataclass(frozen=True)

@@ -89,13 +89,13 @@ def _diameter(state: State, block: CurrentBlock, code: str) -> float:
 def switch_off(state: State, block: CurrentBlock, code: str) -> None:
     """G40: the next move goes from where the tool centre stands to its own end."""
     cutter, state.cutter = state.cutter, None
-    if cutter is None or cutter.at is None:
+    if cutter is None or cutter.position is None:
         return
     if cutter.entering:
         raise block.fail(code, "right after the first move of cutter compensation", "a contour between")
     CenterPath(state, block, cutter).settle(cutter.center)
     frames = state.frames
-    there, here = frames.to_setup(frames.to_control(cutter.at)), frames.to_setup(frames.position)
+    there, here = frames.to_setup(frames.to_control(cutter.position)), frames.to_setup(frames.position)
     state.beside = [t - h for t, h in zip(there, here, strict=True)]
 
 
@@ -145,9 +145,9 @@ def offset_move(
     rows = len(state.recorder.line)
     direction, step = (target[0] - start[0], target[1] - start[1]), None
     try:
-        if cutter.at is None:
+        if cutter.position is None:
             step, direction = compensation.enter(cutter, start, target, programmed)
-            cutter.at, cutter.anchor = frames.to_program(path.to_control(ends[0])), start
+            cutter.position, cutter.anchor = frames.to_program(path.to_control(ends[0])), start
         elif programmed is not None or math.dist(start, target) >= SAME_PLACE:  # else the corner is still to come
             step = compensation.go_on(cutter, start, target, programmed)
             path.go_round_corner(step, start, there)
@@ -214,31 +214,31 @@ class CenterPath:
         cutter.anchor = cutter.center
 
     def _around(self, place: Point2, there: list[float]) -> list[float]:
-        assert self.cutter.at is not None
-        return self.moved([*self.cutter.at[:3], *there[3:]], place)
+        assert self.cutter.position is not None
+        return self.moved([*self.cutter.position[:3], *there[3:]], place)
 
     def add(self, motion: int, end: list[float], bound: tuple[bool, bool], arc: OffsetArc | None) -> int:
         """Record a move of the tool centre to a point in program coordinates; its row, -1 if it has none."""
-        state, recorder, here = self.state, self.state.recorder, self.cutter.at
+        state, recorder, here = self.state, self.state.recorder, self.cutter.position
         assert here is not None
         start = self.to_setup(here)
         added = recorder.add(
             self.block.line, motion, start, _standing(start, self.to_setup(end)), self.feed, state.tool,
             state.tool_length, bound, None if arc is None else self._recorded(arc, here, end),
         )  # fmt: skip
-        self.cutter.at = end
+        self.cutter.position = end
         return len(recorder.line) - 1 if added else -1
 
     def settle(self, to: Point2) -> None:
         """Move the end of the pending moves; raises `InputError` where the tool would have to go back."""
         cutter, recorder = self.cutter, self.state.recorder
-        assert cutter.at is not None
+        assert cutter.position is not None
         for move in cutter.pending:
             if self._gouges(move, to):
                 raise self.block.fail(None, compensation.GOUGE, compensation.SMALLER)
             move.end[:] = self.moved(move.end, to)
             self._rewrite(move)
-        cutter.at = self.moved(cutter.at, to)
+        cutter.position = self.moved(cutter.position, to)
         for move in reversed(cutter.pending):
             row = move.row
             if row >= 0 and recorder.arc[row] is None and recorder.start[row] == recorder.end[row]:

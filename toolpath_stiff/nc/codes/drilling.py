@@ -58,9 +58,9 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
             hint="name the control with --dialect, or leave threading out",
         )
     if code in TAPS and state.plane != "G17" and not state.dialect.increments:
-        found = f"{code} in {state.plane}: LinuxCNC's rs274 taps along another axis"
+        problem = f"{code} in {state.plane}: LinuxCNC's rs274 taps along another axis"
         raise block.fail(
-            None, found, "G17", "" if state.dialect.name == "linuxcnc" else "name the control with --dialect"
+            None, problem, "G17", "" if state.dialect.name == "linuxcnc" else "name the control with --dialect"
         )
     normal = geometry.PLANES[state.plane][2]
     repeats = _repeats(state, block)

@@ -240,8 +240,8 @@ def corner(state: State, block: CurrentBlock, code: str) -> None:
 
 def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     """Shorten the move before this one, and add the corner between them; the tool then stands at its end."""
-    asked, frames, recorder = state.corner, state.frames, state.recorder
-    assert asked is not None
+    pending, frames, recorder = state.corner, state.frames, state.recorder
+    assert pending is not None
     others = block.groups.keys() - {
         "motion",
         "distance",
@@ -249,28 +249,28 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     }
     if others or recorder.dwell[-1]:
         raise block.fail(
-            None, f"the second move of a corner ({asked.letter}, line {asked.line}) beside other codes", "G1"
+            None, f"the second move of a corner ({pending.letter}, line {pending.line}) beside other codes", "G1"
         )
     state.corner = None
-    begin, at, end = recorder.start[-1], frames.to_setup(frames.position), frames.to_setup(target)
+    begin, vertex, end = recorder.start[-1], frames.to_setup(frames.position), frames.to_setup(target)
     normal = frames.turn_direction(geometry.normal_of(state.plane))
     try:
-        if begin[3:] != at[3:] or at[3:] != end[3:]:
+        if begin[3:] != vertex[3:] or vertex[3:] != end[3:]:
             raise geometry.ArcError("a corner while the rotary axes turn", "X, Y and Z alone")
-        ends = geometry.corner(begin[:3], at[:3], end[:3], normal, asked.size, asked.letter == ",R")
+        ends = geometry.corner(begin[:3], vertex[:3], end[:3], normal, pending.size, pending.letter == ",R")
     except geometry.ArcError as error:
-        raise block.fail(None, f"{error.found} ({asked.letter} of line {asked.line})", error.expected) from None
+        raise block.fail(None, f"{error.found} ({pending.letter} of line {pending.line})", error.expected) from None
     if ends is None:  # the path goes straight on
         return
     first, last, center, sweep = ends
-    recorder.end[-1] = [*first, *at[3:]]
-    added = Arc(center, normal, sweep) if asked.letter == ",R" else None
+    recorder.end[-1] = [*first, *vertex[3:]]
+    added = Arc(center, normal, sweep) if pending.letter == ",R" else None
     feed, bound = recorder.feed[-1], recorder.from_machine[-1]
     recorder.add(
-        asked.line, ARC if added else FEED, recorder.end[-1], [*last, *at[3:]], feed, state.tool, state.tool_length,
-        (bound[1], bound[1]), added,
+        pending.line, ARC if added else FEED, recorder.end[-1], [*last, *vertex[3:]], feed, state.tool,
+        state.tool_length, (bound[1], bound[1]), added,
     )  # fmt: skip
-    frames.position = [p + new - old for p, new, old in zip(frames.position, [*last, *at[3:]], at, strict=True)]
+    frames.position = [p + new - old for p, new, old in zip(frames.position, [*last, *vertex[3:]], vertex, strict=True)]
 
 
 CORNER_CODES = (

@@ -130,12 +130,12 @@ LINEAR = frozenset("XYZ")
 
 def axis_words(state: State, block: CurrentBlock) -> dict[int, float]:
     """Axis index -> value of the block's axis words in mm and degrees; they then count as used."""
-    found = {}
+    axis_values = {}
     for index, letter in enumerate(AXES):
         value = block.take(letter)
         if value is not None:
-            found[index] = value * state.length_scale if letter in LINEAR else value
-    return found
+            axis_values[index] = value * state.length_scale if letter in LINEAR else value
+    return axis_values
 
 
 def point_words(state: State, block: CurrentBlock) -> dict[int, float]:

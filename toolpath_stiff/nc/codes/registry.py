@@ -224,12 +224,12 @@ UNDERSTOOD = (
 
 def table(codes: Iterable[Code]) -> dict[str, Code]:
     """Name -> code. Raises `ValueError` for a name that is there twice."""
-    found: dict[str, Code] = {}
+    codes_by_name: dict[str, Code] = {}
     for code in codes:
-        if code.name in found:
+        if code.name in codes_by_name:
             raise ValueError(f"{code.name} is in the table twice")
-        found[code.name] = code
-    return found
+        codes_by_name[code.name] = code
+    return codes_by_name
 
 
 CODES: dict[str, Code] = table(UNDERSTOOD)
@@ -321,10 +321,10 @@ def would_change(text: str, listed: bool = False) -> str:
     >>> would_change("G419 is not a G code that is known")
     ''
     """
-    found = FIRST_CODE.match(text)
-    if found is None:
+    first_code = FIRST_CODE.match(text)
+    if first_code is None:
         return next((changes for beginning, changes in BY_TEXT.items() if text.startswith(beginning)), "")
-    code = code_name(found[1].upper(), float(found[2]))
+    code = code_name(first_code[1].upper(), float(first_code[2]))
     if code[0] == "M" and code not in CODES and code not in REFUSED:
         return "what is not known: it may run anything on its control"
     return (LISTED_CHANGES if listed else BY_CODE).get(code, "")

@@ -31,9 +31,9 @@ def restore_modes(state: State, block: CurrentBlock, code: str) -> None:
     saved = state.saved.get(state.level)
     if saved is None:
         raise block.fail(code, "and nothing was saved at this level of calls", "M70 or M73 before it")
-    found = _restore(state, saved)
-    if found:
-        raise block.fail(code, f"where {found}", "G40, G49, G69 and G15 before it")
+    obstacle = _restore(state, saved)
+    if obstacle:
+        raise block.fail(code, f"where {obstacle}", "G40, G49, G69 and G15 before it")
 
 
 def leave_level(state: State, level: int) -> str:

@@ -43,7 +43,7 @@ def _forget_changes(state: State) -> None:
         state.unsettled = "G10"
     if state.beside is not None:  # it then counts from where the tool centre stands
         frames = state.frames
-        frames.position = [at + b for at, b in zip(frames.position, state.beside, strict=True)]
+        frames.position = [coordinate + b for coordinate, b in zip(frames.position, state.beside, strict=True)]
         state.beside = None
 
 
@@ -146,8 +146,8 @@ def _length_in_table(state: State, block: CurrentBlock, code: str) -> float:
     if number is not None and (number < 0 or number != int(number)):
         raise block.fail("H", "is not a tool number", "a whole number")
     if state.tools is None:
-        found = f"needs the length of tool {tool}, and there is no tool table"
-        raise block.fail(code, found, hint=tool_table_hint(tool))
+        problem = f"needs the length of tool {tool}, and there is no tool table"
+        raise block.fail(code, problem, hint=tool_table_hint(tool))
     if tool not in state.tools or math.isnan(state.tools[tool].length):
         raise block.fail(code, f"needs the length of tool {tool}", hint="add it to the tool table (--tools FILE)")
     return state.tools[tool].length

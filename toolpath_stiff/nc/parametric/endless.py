@@ -48,16 +48,16 @@ class LoopGuard:
         """
         self.passes += 1
         if self.earlier is not None and self.earlier[0] == often and self.earlier[1] == self._modes(rarely):
-            found = "the loop back to line {} never ends: no variable or position changes in it"
-            return found, "a loop whose condition becomes false"
+            problem = "the loop back to line {} never ends: no variable or position changes in it"
+            return problem, "a loop whose condition becomes false"
         if self.passes & (self.passes - 1) == 0:
             self.earlier = often, self._modes(rarely)
         moves = len(self.state.recorder)
         if moves != self.moved[0]:
             self.moved = moves, steps
         elif steps - self.moved[1] > MOST_IDLE:
-            found = f"more than {MOST_IDLE:,} blocks of loops without a move, back to line {{}} each time"
-            return found, "a loop that ends: see whether its condition becomes false"
+            problem = f"more than {MOST_IDLE:,} blocks of loops without a move, back to line {{}} each time"
+            return problem, "a loop that ends: see whether its condition becomes false"
         return "", ""
 
     def _modes(self, rarely: object) -> str:

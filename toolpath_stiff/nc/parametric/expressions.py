@@ -77,7 +77,7 @@ class Scanner:
         `NGC`, `MACRO_B` or `EITHER`.
     of_word
         Whether a word's value is read, not an assignment's or a condition's.
-    at
+    position
         The next character.
     depth, operations
         Brackets that are open; operators so far.
@@ -88,41 +88,41 @@ class Scanner:
     place: Place
     family: str
     of_word: bool = False
-    at: int = 0
+    position: int = 0
     depth: int = 0
     operations: int = 0
 
     @property
     def done(self) -> bool:
         """Whether all of it is read."""
-        return self.at >= len(self.text)
+        return self.position >= len(self.text)
 
     @property
     def column(self) -> int:
         """The column of the next character."""
-        return self.columns[min(self.at, len(self.columns) - 1)]
+        return self.columns[min(self.position, len(self.columns) - 1)]
 
     def next(self, what: str) -> bool:
         """Whether `what` comes next; it is then read."""
-        if not self.text.startswith(what, self.at):
+        if not self.text.startswith(what, self.position):
             return False
-        self.at += len(what)
+        self.position += len(what)
         return True
 
     def match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
         """What matches next, then read; None if nothing does."""
-        found = pattern.match(self.text, self.at)
-        if found is not None:
-            self.at = found.end()
-        return found
+        token = pattern.match(self.text, self.position)
+        if token is not None:
+            self.position = token.end()
+        return token
 
-    def fail(self, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
+    def fail(self, problem: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
         """An error at a column, unless given that of the next character."""
-        return self.place.fail(found, expected, hint, column or self.column)
+        return self.place.fail(problem, expected, hint, column or self.column)
 
     def rest(self) -> str:
         """The next few characters, for errors."""
-        return repr(self.text[self.at : self.at + 12])
+        return repr(self.text[self.position : self.position + 12])
 
     def _missing(self, what: str, expected: str) -> InputError:
         return self.fail("the block ends here" if self.done else f"{self.rest()} is not {what}", expected)
@@ -145,9 +145,9 @@ class Scanner:
     def value(self) -> Value:
         """The value after a letter or an operator: a number, a variable, a function, an expression in brackets."""
         negative = False
-        while not self.done and self.text[self.at] in "+-":
-            negative ^= self.text[self.at] == "-"
-            self.at += 1
+        while not self.done and self.text[self.position] in "+-":
+            negative ^= self.text[self.position] == "-"
+            self.position += 1
         value = self._unsigned()
         return (lambda variables: -number(value(variables))) if negative else value
 
@@ -160,7 +160,7 @@ class Scanner:
             return lambda variables: constant
         if self.next("#"):
             return self.variable()
-        if not self.done and self.text[self.at] == "[":
+        if not self.done and self.text[self.position] == "[":
             return self.bracket()
         name = self.match(FUNCTION)
         if name is not None:
@@ -207,7 +207,7 @@ class Scanner:
             self._deeper(column)
             inner = self.variable()
             self.depth -= 1
-        elif not self.done and self.text[self.at] == "[":
+        elif not self.done and self.text[self.position] == "[":
             inner = self.bracket()
         else:
             literal = self.match(NUMBER)
@@ -219,10 +219,10 @@ class Scanner:
             inner = lambda variables: constant  # noqa: E731
 
         def numbered(variables: Variables) -> int:
-            found = number(inner(variables))
-            if not abs(found) < LARGEST_PLACE or abs(found - round(found)) > EQUAL:
-                raise self.fail(f"#{found:g}", "a whole number", column=column)
-            return round(found)
+            variable_number = number(inner(variables))
+            if not abs(variable_number) < LARGEST_PLACE or abs(variable_number - round(variable_number)) > EQUAL:
+                raise self.fail(f"#{variable_number:g}", "a whole number", column=column)
+            return round(variable_number)
 
         return numbered
 
@@ -230,12 +230,12 @@ class Scanner:
         """Values and operators that bind tighter than `tightest`."""
         left = self.value()
         while True:
-            begin = self.at
+            begin = self.position
             column = self.column if not self.done else 0
-            found = self.match(OPERATOR)
-            if found is None:
+            token = self.match(OPERATOR)
+            if token is None:
                 return left
-            operator = found[0]
+            operator = token[0]
             rank = BINDS[self.family].get(operator)
             if rank is None:
                 if operator in LOGIC:
@@ -246,7 +246,7 @@ class Scanner:
                     )
                 raise self.fail(f"{operator} is no operator of {self.family}", column=column)
             if rank <= tightest:
-                self.at = begin
+                self.position = begin
                 return left
             self.operations += 1
             if self.operations > MOST_OPERATIONS:
@@ -277,7 +277,7 @@ class Scanner:
 
     def _of_two(self, name: str, column: int) -> Value:
         """ATAN[y]/[x]; Macro B's ATAN[y,x] and POW[base,exponent] too."""
-        start = self.at
+        start = self.position
         if not self.next("["):
             raise self.fail(f"{name} without its bracket", "[", column=column)
         first = self.expression()
@@ -294,8 +294,8 @@ class Scanner:
             raise self.fail(f"POW is no function of {NGC}", column=column)
 
         def work(variables: Variables) -> float:
-            one, other = number(first(variables)), number(second(variables))
-            return one**other if name == "POW" else variables.angle(one, other)
+            left, right = number(first(variables)), number(second(variables))
+            return left**right if name == "POW" else variables.angle(left, right)
 
         return self._worked_out(name, column, work)
 

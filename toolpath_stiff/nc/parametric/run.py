@@ -47,38 +47,38 @@ class ParametricRun(ValuesRun):
         super()._load(names)
         self._structure = self._loops = None
 
-    def _steered(self, at: int) -> int | None:
+    def _steered(self, row: int) -> int | None:
         """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
-        self._at = at
-        if any(at == first for first, *_ in self._files):  # the end of the file before it
+        self._at = row
+        if any(row == first for first, *_ in self._files):  # the end of the file before it
             return len(self.lines)
         self._steps += 1
         if self._steps > MOST_STEPS:
-            raise self._fail(at, f"more than {MOST_STEPS:,} blocks have run", "a loop that ends")
-        statement = self._statement(at)
+            raise self._fail(row, f"more than {MOST_STEPS:,} blocks have run", "a loop that ends")
+        statement = self._statement(row)
         self.variables.line = statement.line
         if statement.percent and self._began:  # as after a word, the tape mark is the last one
             return len(self.lines)
         self._began |= bool(statement.assignments or statement.steering)
         if statement.optional and statement.switch in self.switches:
-            return at + 1
+            return row + 1
         if statement.steering is None:
             return None
-        to = self._steer(at, statement.steering)
+        to = self._steer(row, statement.steering)
         if to is None:
-            return at + 1
-        return to if to == at + 1 else self._jump(at, to)
+            return row + 1
+        return to if to == row + 1 else self._jump(row, to)
 
-    def _jump(self, at: int, to: int) -> int:
-        if to <= at:
-            self._check_loop(at, to)
-        return super()._jump(at, to) if max(at, to) < self._main_lines else to
+    def _jump(self, row: int, to: int) -> int:
+        if to <= row:
+            self._check_loop(row, to)
+        return super()._jump(row, to) if max(row, to) < self._main_lines else to
 
-    def _check_loop(self, at: int, to: int) -> None:
+    def _check_loop(self, row: int, to: int) -> None:
         """Refuse a loop that cannot end, or makes no move in very many blocks, where it goes back."""
         known = self.variables
         often: list[object] = [
-            at,
+            row,
             [*self.state.frames.position],
             [(dict(level.numbered), dict(level.named)) for level in known.levels],
             dict(known.common),
@@ -86,61 +86,61 @@ class ParametricRun(ValuesRun):
             dict(self._counts),
             [(level.first, level.back, level.again, dict(level.counts)) for level in self._levels],
         ]
-        found, expected = self._guard.fault(self._steps, often, (self._modal, self._began))
-        if found:
-            raise self._fail(at, found.format(self._place(to).line), expected)
+        problem, expected = self._guard.fault(self._steps, often, (self._modal, self._began))
+        if problem:
+            raise self._fail(row, problem.format(self._place(to).line), expected)
 
-    def _return(self, at: int, flow: Flow | GoTo) -> int | None:
+    def _return(self, row: int, flow: Flow | GoTo) -> int | None:
         """M99; with P it goes on at that block of the caller, wherever that is."""
         if not isinstance(flow, GoTo) or not self._levels:
-            return super()._return(at, flow)
+            return super()._return(row, flow)
         self._levels[-1].again = 0
-        return self._go_on(self._leave(at) - 1, flow.number, flow.column)
+        return self._go_on(self._leave(row) - 1, flow.number, flow.column)
 
-    def _steer(self, at: int, steering: Steering) -> int | None:
+    def _steer(self, row: int, steering: Steering) -> int | None:
         """The line (from 0) at which the run goes on; None: the next one."""
-        if self.family == NGC and at in self._ngc().faults:
-            raise self._ngc().faults[at]
+        if self.family == NGC and row in self._ngc().faults:
+            raise self._ngc().faults[row]
         act = (NGC_STEPS if self.family == NGC else MACRO_STEPS).get(steering.kind)
-        return None if act is None else act(self, at, steering)
+        return None if act is None else act(self, row, steering)
 
     def _true(self, steering: Steering) -> bool:
         return number(steering.values[0](self.variables)) != 0.0
 
-    def _if(self, at: int, steering: Steering) -> int | None:
+    def _if(self, row: int, steering: Steering) -> int | None:
         if self._true(steering):
             return None
-        for branch in self._ngc().branches[at]:
+        for branch in self._ngc().branches[row]:
             other = self._statement(branch).steering
             assert other is not None
             if other.kind != "ELSEIF" or self._true(other):
                 return branch + 1
         raise AssertionError("every if has its endif")
 
-    def _else(self, at: int, steering: Steering) -> int | None:
+    def _else(self, row: int, steering: Steering) -> int | None:
         """Reached from the branch before: the rest is passed over."""
-        return self._ngc().branches[self._ngc().branch_of[at]][-1] + 1
+        return self._ngc().branches[self._ngc().branch_of[row]][-1] + 1
 
-    def _while(self, at: int, steering: Steering) -> int | None:
+    def _while(self, row: int, steering: Steering) -> int | None:
         structure = self._ngc()
-        if at in structure.start:  # the end of a do
-            return structure.start[at] + 1 if self._true(steering) else None
-        return None if self._true(steering) else structure.end[at] + 1
+        if row in structure.start:  # the end of a do
+            return structure.start[row] + 1 if self._true(steering) else None
+        return None if self._true(steering) else structure.end[row] + 1
 
-    def _end_while(self, at: int, steering: Steering) -> int | None:
-        return self._ngc().start[at]
+    def _end_while(self, row: int, steering: Steering) -> int | None:
+        return self._ngc().start[row]
 
-    def _repeat(self, at: int, steering: Steering) -> int | None:
+    def _repeat(self, row: int, steering: Steering) -> int | None:
         count = number(steering.values[0](self.variables))
         if abs(count - round(count)) > EQUAL:
-            raise self._fail(at, f"repeat [{count:g}]", "a whole number", column=steering.column)
+            raise self._fail(row, f"repeat [{count:g}]", "a whole number", column=steering.column)
         if round(count) <= 0:
-            return self._ngc().end[at] + 1
-        self._repeats_left[at] = round(count)
+            return self._ngc().end[row] + 1
+        self._repeats_left[row] = round(count)
         return None
 
-    def _end_repeat(self, at: int, steering: Steering) -> int | None:
-        start, counts = self._ngc().start[at], self._repeats_left
+    def _end_repeat(self, row: int, steering: Steering) -> int | None:
+        start, counts = self._ngc().start[row], self._repeats_left
         counts[start] = counts.get(start, 1) - 1
         return start + 1 if counts[start] > 0 else None
 
@@ -148,91 +148,91 @@ class ParametricRun(ValuesRun):
     def _repeats_left(self) -> dict[int, int]:
         return self._levels[-1].counts if self._levels else self._counts
 
-    def _break(self, at: int, steering: Steering) -> int | None:
+    def _break(self, row: int, steering: Steering) -> int | None:
         structure = self._ngc()
-        return structure.end[structure.inside[at]] + 1
+        return structure.end[structure.inside[row]] + 1
 
-    def _continue(self, at: int, steering: Steering) -> int | None:
+    def _continue(self, row: int, steering: Steering) -> int | None:
         structure = self._ngc()
-        start = structure.inside[at]
+        start = structure.inside[row]
         opener = self._statement(start).steering
         assert opener is not None
         return start if opener.kind == "WHILE" else structure.end[start]
 
-    def _sub(self, at: int, steering: Steering) -> int | None:
-        return self._ngc().end[at] + 1
+    def _sub(self, row: int, steering: Steering) -> int | None:
+        return self._ngc().end[row] + 1
 
-    def _return_sub(self, at: int, steering: Steering) -> int | None:
+    def _return_sub(self, row: int, steering: Steering) -> int | None:
         if not self._levels:
-            raise self._fail(at, f"{steering.kind.lower()} outside any subprogram", column=steering.column)
+            raise self._fail(row, f"{steering.kind.lower()} outside any subprogram", column=steering.column)
         value = number(steering.values[0](self.variables)) if steering.values else None
         self.variables.named["_VALUE_RETURNED"] = float(value is not None)
         self.variables.named["_VALUE"] = 0.0 if value is None else value
-        return self._leave(at)
+        return self._leave(row)
 
-    def _call_sub(self, at: int, steering: Steering) -> int | None:
+    def _call_sub(self, row: int, steering: Steering) -> int | None:
         label = steering.label.known(self.variables)
         structure = self._ngc()
         if label not in structure.subs and self.folder is not None:
             name = label.strip("<>")
             if Path(name).name != name:
-                raise self._fail(at, f"o{label.lower()[:SHOWN]} is not the name of a file", column=steering.column)
+                raise self._fail(row, f"o{label.lower()[:SHOWN]} is not the name of a file", column=steering.column)
             self._load((name.lower(), name, *(() if label.startswith("<") else (f"o{name}",))))
             structure = self._ngc()
         if label not in structure.subs:
             where = "" if self.folder is None else f", and {str(self.folder)!r} has no file of it"
             raise self._fail(
-                at,
+                row,
                 f"o{label.lower()[:SHOWN]} call: the program has no such sub{where}",
                 hint="" if self.folder else "name the folder of its subprograms with --subprograms FOLDER",
                 column=steering.column,
             )
         first = structure.subs[label] + 1
         values = {place: number(value(self.variables)) for place, value in enumerate(steering.values, 1)}
-        self._begin(Subprogram(f"o{label.lower()[:SHOWN]}", first, at + 1, 0, dict(values)), at, steering.column)
+        self._begin(Subprogram(f"o{label.lower()[:SHOWN]}", first, row + 1, 0, dict(values)), row, steering.column)
         return first
 
-    def _goto(self, at: int, steering: Steering) -> int | None:
-        return self._go_on(at, number(steering.values[-1](self.variables)), steering.column)
+    def _goto(self, row: int, steering: Steering) -> int | None:
+        return self._go_on(row, number(steering.values[-1](self.variables)), steering.column)
 
-    def _if_goto(self, at: int, steering: Steering) -> int | None:
-        return self._goto(at, steering) if self._true(steering) else None
+    def _if_goto(self, row: int, steering: Steering) -> int | None:
+        return self._goto(row, steering) if self._true(steering) else None
 
-    def _then(self, at: int, steering: Steering) -> int | None:
+    def _then(self, row: int, steering: Steering) -> int | None:
         if self._true(steering):
-            self._assign(steering.then, at)
+            self._assign(steering.then, row)
         return None
 
-    def _while_do(self, at: int, steering: Steering) -> int | None:
-        return None if self._true(steering) else self._macro_loops()[at] + 1
+    def _while_do(self, row: int, steering: Steering) -> int | None:
+        return None if self._true(steering) else self._macro_loops()[row] + 1
 
-    def _do(self, at: int, steering: Steering) -> int | None:
+    def _do(self, row: int, steering: Steering) -> int | None:
         self._macro_loops()
         return None
 
-    def _end_do(self, at: int, steering: Steering) -> int | None:
+    def _end_do(self, row: int, steering: Steering) -> int | None:
         loops = self._macro_loops()
-        if at not in loops:
-            raise self._fail(at, f"END{steering.label.text} without DO{steering.label.text}", column=steering.column)
-        return loops[at]
+        if row not in loops:
+            raise self._fail(row, f"END{steering.label.text} without DO{steering.label.text}", column=steering.column)
+        return loops[row]
 
-    def _numbered(self, at: int, number: float) -> list[int]:
-        program = self._program_of(at)
-        return [row for row in super()._numbered(at, number) if self._program_of(row) == program]
+    def _numbered(self, row: int, number: float) -> list[int]:
+        program = self._program_of(row)
+        return [candidate for candidate in super()._numbered(row, number) if self._program_of(candidate) == program]
 
-    def _go_on(self, at: int, number: float, column: int) -> int:
+    def _go_on(self, row: int, number: float, column: int) -> int:
         """The block with an N number in the program that runs. Raises `InputError` for a jump into a loop."""
-        to = self._block_numbered(at, "the run goes on at", number, column)
+        to = self._block_numbered(row, "the run goes on at", number, column)
         for start, end in self._macro_loops().items():
-            if start < to < end and not start < at < end:
-                found = f"a jump into the loop that begins in line {self._place(start).line}"
-                raise self._fail(at, found, "a block outside of loops", column=column)
+            if start < to < end and not start < row < end:
+                problem = f"a jump into the loop that begins in line {self._place(start).line}"
+                raise self._fail(row, problem, "a block outside of loops", column=column)
         return to
 
-    def _program_of(self, at: int) -> int:
+    def _program_of(self, row: int) -> int:
         """The line at which the program (from O number to O number) begins that holds a line."""
         begins = sorted({0, *self._heads().values(), *(first for first, *_ in self._files)})
-        return begins[bisect_right(begins, at) - 1]
+        return begins[bisect_right(begins, row) - 1]
 
     def _macro_loops(self) -> dict[int, int]:
         if self._loops is None:
@@ -241,35 +241,35 @@ class ParametricRun(ValuesRun):
 
     def _steerings(self) -> list[tuple[int, Steering]]:
         """The lines that steer; one that cannot be read is an error where it runs, if it does."""
-        found = []
-        for at in range(len(self.lines)):
+        steerings = []
+        for row in range(len(self.lines)):
             try:
-                steering = self._statement(at).steering
+                steering = self._statement(row).steering
             except InputError:
                 continue
             if steering is not None:
-                found.append((at, steering))
-        return found
+                steerings.append((row, steering))
+        return steerings
 
     def _ngc(self) -> Structure:
         if self._structure is None:
             self._structure = structure_of(self._steerings(), {first for first, *_ in self._files}, self._fail)
         return self._structure
 
-    def _end(self, at: int, what: str, ended: bool = False) -> list[str]:
+    def _end(self, row: int, what: str, ended: bool = False) -> list[str]:
         if self._levels and not ended:
             raise self._unended(self._at)
-        if at >= self._main_lines:
+        if row >= self._main_lines:
             return []
         subs = self._ngc() if self.family == NGC else Structure()
         ends = [(start, subs.end[start]) for start in subs.subs.values() if start in subs.end]
-        heads = [index for index in range(at + 1, self._main_lines) if HEAD.match(self.lines[index])]
+        heads = [index for index in range(row + 1, self._main_lines) if HEAD.match(self.lines[index])]
         rest = [
             index
-            for index in range(at + 1, min([*heads, self._main_lines]))
+            for index in range(row + 1, min([*heads, self._main_lines]))
             if self.lines[index].strip() not in ("", "%") and not any(a <= index <= b for a, b in ends)
         ]
-        return [beyond_the_end(what, at, len(rest))] if rest else []
+        return [beyond_the_end(what, row, len(rest))] if rest else []
 
 
 NGC_STEPS = {

@@ -204,7 +204,7 @@ def read_statement(text: str, place: Place, family: str, dialect: Dialect) -> St
         return Statement(place.line, percent=True)
     check_length(compact, place)
     start, switch = block_delete(compact, 0, columns, place) if compact[0] == "/" else (0, 1)
-    block = Scanner(compact, columns, place, family, at=start)
+    block = Scanner(compact, columns, place, family, position=start)
     optional = start > 0
     block.match(_N_WORD)
     if block.done:
@@ -217,7 +217,7 @@ def read_statement(text: str, place: Place, family: str, dialect: Dialect) -> St
 
 
 def _steering(block: Scanner) -> Steering | None:
-    if block.text[block.at] in "O:" and not block.text[block.at + 1 :].isdigit():
+    if block.text[block.position] in "O:" and not block.text[block.position + 1 :].isdigit():
         return _o_word(block)
     if block.family == NGC:
         return None
@@ -226,22 +226,22 @@ def _steering(block: Scanner) -> Steering | None:
     if label is not None:
         kind = "DO" if label[0].startswith("DO") else "END"
         _check_loop(block, label[1], column)
-        found = Steering(kind, Label(label[1]), column=column)
-    elif block.text.startswith("IF[", block.at):
-        found = _if(block, column)
-    elif block.text.startswith("WHILE[", block.at):
+        steering = Steering(kind, Label(label[1]), column=column)
+    elif block.text.startswith("IF[", block.position):
+        steering = _if(block, column)
+    elif block.text.startswith("WHILE[", block.position):
         block.next("WHILE")
         condition = block.bracket()
         label = block.match(_LABEL)
         if label is None or not label[0].startswith("DO"):
             raise block.fail("WHILE without its DO", "WHILE[...]DO1", column=column)
         _check_loop(block, label[1], column)
-        found = Steering("WHILE", Label(label[1]), (condition,), column=column)
+        steering = Steering("WHILE", Label(label[1]), (condition,), column=column)
     elif block.next("GOTO"):
-        found = Steering("GOTO", Label(""), (block.value(),), column=column)
+        steering = Steering("GOTO", Label(""), (block.value(),), column=column)
     else:
         return None
-    return _alone(block, found)
+    return _alone(block, steering)
 
 
 def _check_loop(block: Scanner, label: str, column: int) -> None:
@@ -274,7 +274,7 @@ def _o_word(block: Scanner) -> Steering:
     column = block.column
     if block.family == MACRO_B:
         raise block.fail(f"{block.rest()} is no program number", "O and digits, or --dialect linuxcnc")
-    block.at += 1
+    block.position += 1
     label = _label(block, column)
     kind = block.match(_NGC_WORD)
     if kind is None:
@@ -284,7 +284,7 @@ def _o_word(block: Scanner) -> Steering:
         )
     values = []
     if kind[0] == "CALL":
-        while not block.done and block.text[block.at] == "[":
+        while not block.done and block.text[block.position] == "[":
             values.append(block.bracket())
         most = 30
         if len(values) > most:
@@ -299,11 +299,11 @@ def _label(block: Scanner, column: int) -> Label:
     if digits is not None:
         return Label(digits[0].lstrip("0") or "0")
     if block.next("<"):
-        end = block.text.find(">", block.at)
+        end = block.text.find(">", block.position)
         if end < 0:
             raise block.fail("an O word whose name is not closed", ">", column=column)
-        name = block.text[block.at - 1 : end + 1]
-        block.at = end + 1
+        name = block.text[block.position - 1 : end + 1]
+        block.position = end + 1
         return Label(name)
     return Label("", block.value())
 
@@ -312,41 +312,41 @@ def _contents(block: Scanner, text: str) -> tuple[list[tuple[str, Value | float,
     """Words and assignments of a block."""
     words: list[tuple[str, Value | float, int, str]] = []
     assignments: list[Assignment] = []
-    if block.text[block.at] in "O:":  # the program's number
-        (word,) = program_number(block.text[block.at :], block.column, block.place).words
+    if block.text[block.position] in "O:":  # the program's number
+        (word,) = program_number(block.text[block.position :], block.column, block.place).words
         return [(word.letter, word.value, word.column, word.text)], assignments
     while not block.done:
         column = block.column
-        if block.text[block.at] == "#":
+        if block.text[block.position] == "#":
             assignments.append(_assignment(block))
             continue
-        letter = block.text[block.at]
+        letter = block.text[block.position]
         if letter not in LETTERS:
             raise block.fail(f"{block.rest()} is not a word", "a letter and a value, or #1=...")
-        plain = WORD.match(block.text, block.at)
+        plain = WORD.match(block.text, block.position)
         if plain is not None and not plain[3] and not _goes_on(block.text, plain.end()):
-            block.at = plain.end()
+            block.position = plain.end()
             value: Value | float = float(plain[2])
         else:
-            block.at += 1
+            block.position += 1
             block.of_word = True
             value = block.value()
             block.of_word = False
-        written = text[column - 1 : block.columns[block.at - 1]]
+        written = text[column - 1 : block.columns[block.position - 1]]
         if letter == "N":
             raise block.fail(
                 f"line number {written!r} after another word", "N at the beginning of the line", column=column
             )
         words.append((letter, value, column, written))
     # The numbers that codes and tools may have, as in any other program.
-    plain_words = [Word(one[0], one[1], one[2], one[3]) for one in words if isinstance(one[1], float)]
+    plain_words = [Word(parts[0], parts[1], parts[2], parts[3]) for parts in words if isinstance(parts[1], float)]
     through_pygcode(plain_words, block.place)
     return words, assignments
 
 
-def _goes_on(text: str, at: int) -> bool:
+def _goes_on(text: str, end: int) -> bool:
     """Whether an operator follows a number outside of brackets: `X1+2`, which no control takes for 3."""
-    return text[at : at + 1] in ("*", "/", "+", "-")
+    return text[end : end + 1] in ("*", "/", "+", "-")
 
 
 def _assignment(block: Scanner) -> Assignment:

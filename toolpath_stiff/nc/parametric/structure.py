@@ -79,7 +79,7 @@ class _Opened:
 
     kind: str
     label: str
-    at: int
+    row: int
 
 
 def structure_of(steerings: Iterable[tuple[int, Steering]], firsts: set[int], fail: Fail) -> Structure:
@@ -97,13 +97,13 @@ def structure_of(steerings: Iterable[tuple[int, Steering]], firsts: set[int], fa
     structure = Structure()
     opened: list[_Opened] = []
     labels: list[dict[str, int]] = [{}]  # of the file, and of the sub that is open
-    for at, steering in steerings:
-        if at in firsts:
+    for row, steering in steerings:
+        if row in firsts:
             labels = [{}]
-        fault = _pair(structure, opened, labels, at, steering)
+        fault = _pair(structure, opened, labels, row, steering)
         if fault:
-            structure.faults[at] = fail(at, *fault, column=steering.column)
-    endless = {start.at: f"o{start.label.lower()[:SHOWN]} {start.kind.lower()} has no end" for start in opened}
+            structure.faults[row] = fail(row, *fault, column=steering.column)
+    endless = {start.row: f"o{start.label.lower()[:SHOWN]} {start.kind.lower()} has no end" for start in opened}
     # `break` and `continue` go to that end.
     leaving = {row: f"{endless[loop]} (line {loop + 1})" for row, loop in structure.inside.items() if loop in endless}
     for row, text in (endless | leaving).items():
@@ -112,47 +112,47 @@ def structure_of(steerings: Iterable[tuple[int, Steering]], firsts: set[int], fa
 
 
 def _pair(
-    structure: Structure, opened: list[_Opened], labels: list[dict[str, int]], at: int, steering: Steering
+    structure: Structure, opened: list[_Opened], labels: list[dict[str, int]], row: int, steering: Steering
 ) -> tuple[str, ...]:
     """Add one O word; returns what is wrong with it and what was expected, nothing if it fits."""
     kind, label = steering.kind, steering.label.text
     last = opened[-1] if opened else _Opened("", "", 0)
     closes_do = kind == "WHILE" and (last.kind, last.label) == ("DO", label)
     if kind in ("SUB", "IF", "DO", "REPEAT") or (kind == "WHILE" and not closes_do):
-        return _open(structure, opened, labels, _Opened(kind, label, at))
+        return _open(structure, opened, labels, _Opened(kind, label, row))
     if kind in OPENERS or closes_do:
         if last.label != label or not (closes_do or last.kind == OPENERS[kind]):
             return _unpaired(steering)
         opened.pop()
         if kind == "ENDSUB":
             labels.pop()
-        structure.end[last.at], structure.start[at] = at, last.at
+        structure.end[last.row], structure.start[row] = row, last.row
         if kind == "ENDIF":
-            structure.branches[last.at].append(at)
+            structure.branches[last.row].append(row)
     elif kind in ("ELSE", "ELSEIF"):
         if (last.kind, last.label) != ("IF", label):
             return _unpaired(steering)
-        structure.branches[last.at].append(at)
-        structure.branch_of[at] = last.at
+        structure.branches[last.row].append(row)
+        structure.branch_of[row] = last.row
     elif kind in ("BREAK", "CONTINUE"):
-        loops = [one.at for one in opened if one.label == label and one.kind in LOOPS]
+        loops = [start.row for start in opened if start.label == label and start.kind in LOOPS]
         if not loops:
             return _unpaired(steering)
-        structure.inside[at] = loops[-1]
+        structure.inside[row] = loops[-1]
     return ()
 
 
-def _open(structure: Structure, opened: list[_Opened], labels: list[dict[str, int]], one: _Opened) -> tuple[str, ...]:
-    if one.label in labels[-1] or not one.label:
-        place = f"is in line {labels[-1][one.label] + 1} already" if one.label else "is not known before it runs"
-        return (f"the label o{one.label.lower()[:SHOWN]} {place}", "each label once")
-    labels[-1][one.label] = one.at
-    opened.append(one)
-    if one.kind == "SUB":
-        structure.subs[one.label] = one.at
+def _open(structure: Structure, opened: list[_Opened], labels: list[dict[str, int]], start: _Opened) -> tuple[str, ...]:
+    if start.label in labels[-1] or not start.label:
+        place = f"is in line {labels[-1][start.label] + 1} already" if start.label else "is not known before it runs"
+        return (f"the label o{start.label.lower()[:SHOWN]} {place}", "each label once")
+    labels[-1][start.label] = start.row
+    opened.append(start)
+    if start.kind == "SUB":
+        structure.subs[start.label] = start.row
         labels.append({})
-    elif one.kind == "IF":
-        structure.branches[one.at] = []
+    elif start.kind == "IF":
+        structure.branches[start.row] = []
     return ()
 
 
@@ -166,17 +166,17 @@ def loops_of(steerings: Iterable[tuple[int, Steering]], fail: Fail) -> dict[int,
     """Line of WHILE DO or DO -> line of its END, and back; from 0. Raises `InputError` for one without the other."""
     loops: dict[int, int] = {}
     opened: list[tuple[str, int]] = []
-    for at, steering in steerings:
+    for row, steering in steerings:
         label = steering.label.text
         if steering.kind in ("WHILE", "DO"):
-            opened.append((label, at))
+            opened.append((label, row))
         elif steering.kind == "END":
             if not opened or opened[-1][0] != label:
-                raise fail(at, f"END{label} without DO{label}", column=steering.column)
+                raise fail(row, f"END{label} without DO{label}", column=steering.column)
             _, start = opened.pop()
-            loops[at], loops[start] = start, at
-    for label, at in opened:
-        raise fail(at, f"DO{label} has no END{label}")
+            loops[row], loops[start] = start, row
+    for label, row in opened:
+        raise fail(row, f"DO{label} has no END{label}")
     return loops
 
 
@@ -197,7 +197,7 @@ def arguments_of(
     words = [word for word in words if word.letter not in "PL"]
     letters = [word.letter for word in words]
     second = any(letters.count(letter) > 1 for letter in "IJK")
-    found: dict[int, float | None] = {}
+    arguments: dict[int, float | None] = {}
     triple, previous = -1, "K"
     for word in words:
         if second and word.letter in "IJK":
@@ -206,10 +206,10 @@ def arguments_of(
             place = 4 + 3 * triple + "IJK".index(word.letter)
         else:
             place = (SECOND_KIND if second else ARGUMENTS).get(word.letter, 0)
-        if not 1 <= place <= LAST_LOCAL or place in found:
+        if not 1 <= place <= LAST_LOCAL or place in arguments:
             expected = "each letter once; with I, J, K repeated no other ones than A, B, C"
             raise fault(word, "cannot be an argument of this call", expected)
         if increments and word.value and "." not in word.text and word.letter not in WHOLE_ARGUMENTS:
             raise fault(word, "has no decimal point, and parameters of the control scale it", f"{word.text}.")
-        found[place] = word.value
-    return found
+        arguments[place] = word.value
+    return arguments

@@ -66,26 +66,26 @@ class ValuesRun(ProgramRun):
         self._modal: Call | None = None
         self._at = 0  # the block that runs
 
-    def _place(self, at: int) -> Place:
+    def _place(self, row: int) -> Place:
         """File and line (from 1) of a line that is read."""
         for first, stop, name in self._files:
-            if first <= at < stop:
-                return Place(name, at - first + 1)
-        return super()._place(at)
+            if first <= row < stop:
+                return Place(name, row - first + 1)
+        return super()._place(row)
 
-    def _statement(self, at: int) -> Statement:
-        found = self._statements.get(at)
-        if found is None:
-            found = read_statement(self.lines[at], self._place(at), self.family, self.state.dialect)
-            self._statements[at] = found
-        return found
+    def _statement(self, row: int) -> Statement:
+        statement = self._statements.get(row)
+        if statement is None:
+            statement = read_statement(self.lines[row], self._place(row), self.family, self.state.dialect)
+            self._statements[row] = statement
+        return statement
 
-    def _block(self, at: int) -> Block:
-        return self._tried(self._read, at, Block(at + 1, ()))
+    def _block(self, row: int) -> Block:
+        return self._tried(self._read, row, Block(row + 1, ()))
 
-    def _read(self, at: int) -> Block:
+    def _read(self, row: int) -> Block:
         """The block with its values; its variables are set."""
-        statement = self._statement(at)
+        statement = self._statement(row)
         words = []
         for letter, value, column, written in statement.words:
             computed = not isinstance(value, float)
@@ -93,25 +93,25 @@ class ValuesRun(ProgramRun):
             if worked is None:  # an empty variable: the word is as if it were not there (Macro B)
                 continue
             if computed and letter in WHOLE_WORDS:
-                worked = self._whole(letter, worked, at, column, written)
+                worked = self._whole(letter, worked, row, column, written)
             words.append(plain_word(letter, worked, column, written, computed))
-        self._assign(statement.assignments, at)
-        line = statement.line if at < self._main_lines else self._line_of_call()
+        self._assign(statement.assignments, row)
+        line = statement.line if row < self._main_lines else self._line_of_call()
         return Block(line, tuple(words), statement.optional, statement.percent, statement.switch)
 
-    def _whole(self, letter: str, value: float, at: int, column: int, written: str) -> float:
+    def _whole(self, letter: str, value: float, row: int, column: int, written: str) -> float:
         """The code or number that a value stands for, as LinuxCNC's interpreter rounds it."""
         known = round(value, 1 if letter in "GM" else 0)
         if abs(known - value) > EQUAL or known < 0.0:
             expected = f"a code such as {letter}1 or {letter}59.3" if letter in "GM" else "a whole number from 0"
-            raise self._fail(at, f"{written[:SHOWN]} is {letter}{value:g}", expected, column=column)
+            raise self._fail(row, f"{written[:SHOWN]} is {letter}{value:g}", expected, column=column)
         return known
 
-    def _assign(self, assignments: tuple[Assignment, ...], at: int) -> None:
+    def _assign(self, assignments: tuple[Assignment, ...], row: int) -> None:
         """Set variables, once all values are known (LinuxCNC, "Numbered Parameters")."""
         known = [(a.which(self.variables), a.value(self.variables), a.column) for a in assignments]
         for which, value, column in known:
-            self.variables.set(which, value, self._place(at)._replace(column=column))
+            self.variables.set(which, value, self._place(row)._replace(column=column))
 
     def _line_of_call(self) -> int:
         """The line of the main file from which a subprogram's file is called: its moves are of that line."""
@@ -137,8 +137,8 @@ class ValuesRun(ProgramRun):
     def _macro_call(self, block: Block) -> tuple[Call | None, Block]:
         """G65, G66 or G67 of a block, carried out but for G65's call; and the block without it."""
         calls = [
-            (at, word)
-            for at, word in enumerate(block.words)
+            (index, word)
+            for index, word in enumerate(block.words)
             if word.letter == "G" and code_name("G", word.value) in MACRO_CALLS
         ]
         if not calls or self.family == NGC:  # LinuxCNC has none: refused where the codes are sorted
@@ -165,16 +165,16 @@ class ValuesRun(ProgramRun):
             raise self._word_fault(word, "is not a count", "a whole number from 1")
         return int(word.value)
 
-    def _word_fault(self, word: Word, found: str, expected: str) -> InputError:
-        return self._fail(self._at, f"{word.text} {found}", expected, column=word.column)
+    def _word_fault(self, word: Word, problem: str, expected: str) -> InputError:
+        return self._fail(self._at, f"{word.text} {problem}", expected, column=word.column)
 
-    def _begin(self, level: Subprogram, at: int, column: int) -> None:
-        super()._begin(level, at, column)
+    def _begin(self, level: Subprogram, row: int, column: int) -> None:
+        super()._begin(level, row, column)
         if level.arguments is not None:
             self.variables.levels.append(Level(dict(level.arguments)))
 
-    def _leave(self, at: int) -> int:
-        level, back = self._levels[-1], super()._leave(at)
+    def _leave(self, row: int) -> int:
+        level, back = self._levels[-1], super()._leave(row)
         level.counts = {}
         if level.arguments is not None:
             self.variables.levels.pop()
@@ -182,13 +182,13 @@ class ValuesRun(ProgramRun):
                 self.variables.levels.append(Level(dict(level.arguments)))
         return back
 
-    def _target(self, at: int, call: Call) -> tuple[int, int]:
+    def _target(self, row: int, call: Call) -> tuple[int, int]:
         if call.number not in self._heads() and self.folder is not None and call.number < 10_000:
             self._load((f"O{call.number:04d}", f"O{call.number}", f"{call.number}", f"{call.number:04d}"))
         if call.arguments is None:
-            return super()._target(at, call)
+            return super()._target(row, call)
         if call.number not in self._heads():
-            raise self._fail(at, f"the file has no program O{call.number}", column=call.column)
+            raise self._fail(row, f"the file has no program O{call.number}", column=call.column)
         return call.number, call.repeats or 1
 
     def _load(self, names: tuple[str, ...]) -> None:

@@ -70,8 +70,8 @@ class Variables:
         try:
             return self._named(which) if isinstance(which, str) else self._numbered(which, place)
         except LookupError as error:
-            found, hint = error.args
-            raise place.fail(found, hint=hint) from None
+            problem, hint = error.args
+            raise place.fail(problem, hint=hint) from None
 
     def exists(self, name: str) -> bool:
         """Whether a named variable has a value."""
@@ -82,9 +82,9 @@ class Variables:
         return True
 
     def _named(self, name: str) -> float:
-        own = self.named if name.startswith("_") else self.levels[-1].named
-        if name in own:
-            return own[name]
+        scope = self.named if name.startswith("_") else self.levels[-1].named
+        if name in scope:
+            return scope[name]
         if name in PREDEFINED:
             return PREDEFINED[name](self)
         if name == "_TASK":
@@ -99,9 +99,9 @@ class Variables:
         if number == 0 and self.family != NGC:
             return None
         if 1 <= number <= LOCALS[self.family]:
-            found = self.levels[-1].numbered
+            values = self.levels[-1].numbered
         elif self._settable(number):
-            found = self.common
+            values = self.common
         elif self.family == EITHER:
             raise LookupError(
                 f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls",
@@ -110,8 +110,8 @@ class Variables:
         else:
             system = self._ngc_system if self.family == NGC else self._macro_system
             return system(number, place)
-        if number in found:
-            return found[number]
+        if number in values:
+            return values[number]
         return self._unset(number)
 
     def _settable(self, number: int) -> bool:
@@ -232,7 +232,7 @@ class Variables:
         """#4001 to #4120: what was in force before this block, by Fanuc's groups of G codes; then by letters."""
         state = self.state
         cycle = state.motion is not None and state.motion not in ("G0", "G1", "G2", "G3")
-        found: dict[int, float | None] = {
+        group_values: dict[int, float | None] = {
             1: None if cycle or state.motion is None else float(state.motion[1:]),
             2: float(state.plane[1:]),
             3: 90.0 if state.absolute else 91.0,
@@ -246,7 +246,7 @@ class Variables:
             119: state.speed,
             120: float(state.selected),
         }
-        value = found.get(number - 4000)
+        value = group_values.get(number - 4000)
         if value is None:
             raise LookupError(f"the modal state #{number} is not known here", "put the number into the program")
         return value
