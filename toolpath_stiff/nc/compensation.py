@@ -319,11 +319,11 @@ def _end(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -
     return _beside_contour(target, cutter, _heading(target, start, target, arc))
 
 
-def _heading(at: Point2, start: Point2, target: Point2, arc: OffsetArc | None) -> float:
+def _heading(point: Point2, start: Point2, target: Point2, arc: OffsetArc | None) -> float:
     """Direction of a programmed move at one of its ends."""
     if arc is None:
         return _angle(start, target)
-    return _angle(arc.center, at) + arc.turn * math.pi / 2.0
+    return _angle(arc.center, point) + arc.turn * math.pi / 2.0
 
 
 def _beside_contour(point: Point2, cutter: Cutter, heading: float) -> Point2:

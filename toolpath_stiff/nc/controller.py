@@ -289,9 +289,9 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
     )
 
 
-def _dialect(toml: TomlReader, asked: str | None) -> Dialect:
+def _dialect(toml: TomlReader, override: str | None) -> Dialect:
     name = _choice(toml, "dialect", tuple(DIALECTS), "generic")
-    dialect = dialect_named(asked or name)
+    dialect = dialect_named(override or name)
     absolute = _choice(toml, "arc_centers", ("incremental", "absolute"), "incremental") == "absolute"
     by_g70 = _choice(toml, "inch_metric", (G70_UNITS, G20_UNITS), G20_UNITS) == G70_UNITS
     return replace(dialect, arc_absolute=dialect.arc_absolute or absolute, inch_metric=dialect.inch_metric or by_g70)
@@ -349,8 +349,8 @@ def _offsets(toml: TomlReader) -> Offsets | None:
     for name, values in table.items():
         where, most = f"offsets.{name}", 6 if name in HOMES else 7
         if additional_offset(name) in offsets.additional:
-            found = f"offsets.{name!r} is there twice: G54.1 and G154 name the same offsets"
-            raise toml.error(found, where=where)
+            problem = f"offsets.{name!r} is there twice: G54.1 and G154 name the same offsets"
+            raise toml.error(problem, where=where)
         if not is_offset(name):
             expected = f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)'
             raise toml.error(f"{where} is not an offset", expected, where=where)
@@ -373,8 +373,8 @@ def _tools(toml: TomlReader) -> dict[int, ToolEntry] | None:
     for place, tool in enumerate(given, 1):
         entry = _tool(toml, f"tools[{place}]", tool)
         if entry.number in tools:
-            found = f"tools[{place}]: tool {entry.number} appears twice"
-            raise toml.error(found, where=f"tools[{place}].number")
+            problem = f"tools[{place}]: tool {entry.number} appears twice"
+            raise toml.error(problem, where=f"tools[{place}].number")
         tools[entry.number] = entry
     return tools
 

@@ -126,6 +126,6 @@ def finding_of_unsupported(word: Unsupported) -> Finding:
 
 def line_in(text: str) -> int:
     """The line that a warning names; 0 if it names none."""
-    _, found, rest = text.partition("line ")
+    _, separator, rest = text.partition("line ")
     digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
-    return int(digits) if found and digits else 0
+    return int(digits) if separator and digits else 0

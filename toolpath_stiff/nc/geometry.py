@@ -57,9 +57,9 @@ def normal_of(plane: str) -> Vector:
 class ArcError(Exception):
     """What is wrong with an arc: found, expected."""
 
-    def __init__(self, found: str, expected: str) -> None:
-        super().__init__(found)
-        self.found, self.expected = found, expected
+    def __init__(self, problem: str, expected: str) -> None:
+        super().__init__(problem)
+        self.found, self.expected = problem, expected
 
 
 def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: bool) -> Point2:
@@ -179,9 +179,9 @@ def radii_clearly_agree(start: FloatArray, end: FloatArray, center: FloatArray, 
 
 
 def corner(
-    begin: Sequence[float], at: Sequence[float], end: Sequence[float], normal: Vector, size: float, rounded: bool
+    begin: Sequence[float], vertex: Sequence[float], end: Sequence[float], normal: Vector, size: float, rounded: bool
 ) -> tuple[Vector, Vector, Vector, float] | None:
-    """Where a corner `at` between two straight moves is cut off or rounded; None where they go straight on.
+    """Where the corner at `vertex` between two straight moves is cut off or rounded; None where they go straight on.
 
     Returns the end of the first move, the beginning of the second, the centre and the signed sweep in rad about
     `normal` (a unit vector). Raises `ArcError` unless both moves lie in the plane of `normal` and are long enough.
@@ -192,7 +192,7 @@ def corner(
     >>> first, center
     ((7.0, 0.0, 0.0), (7.0, 2.0, 0.0))
     """
-    here, z = np.asarray(at, dtype=float), np.array(normal)
+    here, z = np.asarray(vertex, dtype=float), np.array(normal)
     before, after = here - begin, np.asarray(end, dtype=float) - here
     lengths = float(np.linalg.norm(before)), float(np.linalg.norm(after))
     if min(lengths) == 0.0 or max(abs(before @ z), abs(after @ z)) > SAME_HEIGHT_MM:

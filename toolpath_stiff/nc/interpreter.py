@@ -63,9 +63,9 @@ def finish(state: State, block: CurrentBlock) -> Then:
 
 def _in_order(block: CurrentBlock, ahead: bool) -> list[Code]:
     """The codes and words of a block that set modes (`ahead`), or act after those, in the order of execution."""
-    found = [code for name in block.groups.values() if (code := CODES[name]).when != "motion"]
-    found += [CODES[letter] for letter in WORDS_THAT_ACT if letter in block.values]
-    return sorted((code for code in found if (code.rank <= LAST_MODE) == ahead), key=lambda code: code.rank)
+    codes = [code for name in block.groups.values() if (code := CODES[name]).when != "motion"]
+    codes += [CODES[letter] for letter in WORDS_THAT_ACT if letter in block.values]
+    return sorted((code for code in codes if (code.rank <= LAST_MODE) == ahead), key=lambda code: code.rank)
 
 
 def sort_words(state: State, block: Block) -> CurrentBlock:

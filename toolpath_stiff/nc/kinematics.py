@@ -216,8 +216,8 @@ def _check_pair(toml: TomlReader, axes: tuple[RotaryAxis, ...], parts: tuple[tup
         return
     first, second = (f"kinematics.{key}" for key, _ in parts)
     if axes[0].letter == axes[1].letter:
-        found = f"{first}.letter and {second}.letter are both {axes[0].letter!r}"
-        raise toml.error(found, "two letters", where=f"{second}.letter")
+        problem = f"{first}.letter and {second}.letter are both {axes[0].letter!r}"
+        raise toml.error(problem, "two letters", where=f"{second}.letter")
     (a, b, c), (d, e, f) = axes[0].direction, axes[1].direction
     if math.hypot(b * f - c * e, c * d - a * f, a * e - b * d) < PARALLEL:
         raise toml.error(f"{first}.axis and {second}.axis are parallel", "two directions", where=f"{second}.axis")

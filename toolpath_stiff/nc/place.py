@@ -14,7 +14,7 @@ class Place(NamedTuple):
     line: int
     column: int | None = None
 
-    def fail(self, found: str, expected: str = "", hint: str = "", column: int | None = None) -> ProgramError:
+    def fail(self, problem: str, expected: str = "", hint: str = "", column: int | None = None) -> ProgramError:
         """An error of the line, at the place's own column unless another is given."""
         where = self.column if column is None else column
-        return ProgramError(found, expected=expected, hint=hint, file=self.name, line=self.line, column=where)
+        return ProgramError(problem, expected=expected, hint=hint, file=self.name, line=self.line, column=where)

@@ -46,43 +46,43 @@ class PlainRun:
         self.lines = PlainLines(lines, state.dialect.semicolon)
         self._pause = 0  # the line before which another run is not worth trying
 
-    def execute(self, at: int) -> PlainWords | None:
-        """Execute plain lines from `at` (from 0); returns the words of those that were, None if there are none."""
-        count = self.lines.run(at)
-        if count < FEWEST or at < self._pause or not _suits(self.state):
+    def execute(self, first: int) -> PlainWords | None:
+        """Execute plain lines from `first` (from 0); returns the words of those that were, None if there are none."""
+        count = self.lines.run(first)
+        if count < FEWEST or first < self._pause or not _suits(self.state):
             return None
-        words = self.lines.words(at, count)
+        words = self.lines.words(first, count)
         if self.state.motion not in MODES and words.code[0] == NO_CODE and words.count[0]:
-            done = self._holes(at, words)
+            done = self._holes(first, words)
         else:
             lines = Lines(self.state, words)
-            done = lines.execute(at)
+            done = lines.execute(first)
             if done < FEWEST:
-                self._pause = at + done + 4 * FEWEST
-            self._watch_points(at, words, done)
+                self._pause = first + done + 4 * FEWEST
+            self._watch_points(first, words, done)
         return words.part(0, done) if done else None
 
-    def _holes(self, at: int, words: PlainWords) -> int:
+    def _holes(self, first: int, words: PlainWords) -> int:
         """Drill holes like that of the line before; returns how many lines were executed."""
         state = self.state
-        if state.motion not in CYCLES or not self.lines.has(at - 1) or not suits(state):
+        if state.motion not in CYCLES or not self.lines.has(first - 1) or not suits(state):
             return 0
-        hole = rows_of_hole(state.recorder, at)
+        hole = rows_of_hole(state.recorder, first)
         others = np.flatnonzero(~words.are_places())
         count = int(others[0]) if len(others) else len(words)
-        if hole is None or not self.lines.words(at - 1, 1).are_places().all() or not count:
+        if hole is None or not self.lines.words(first - 1, 1).are_places().all() or not count:
             return 0
         lines = Lines(state, words.part(0, count))
         places = lines.places()
         if not len(places):
             return 0
-        drill(state, hole, at + 1, places)
+        drill(state, hole, first + 1, places)
         if state.dialect.increments and lines.counted[: len(places)].any():
             assume_increments(state)
-        self._watch_points(at, words, len(places))
+        self._watch_points(first, words, len(places))
         return len(places)
 
-    def _watch_points(self, at: int, plain: PlainWords, done: int) -> None:
+    def _watch_points(self, first: int, plain: PlainWords, done: int) -> None:
         """As `points.read_numbers`, of all lines executed."""
         state = self.state
         if not watches_points(state):
@@ -90,9 +90,9 @@ class PlainRun:
         state.pointed = state.pointed or has_pointed(plain, done)
         row = first_bare(plain, done) if state.bare is None else None
         if row is not None:
-            words = read_block(self.lines.lines[at + row], at + row + 1, self.name, state.dialect.semicolon).words
+            words = read_block(self.lines.lines[first + row], first + row + 1, self.name, state.dialect.semicolon).words
             word = next(w for w in words if w.letter in LENGTH_LETTERS and is_bare("".join(w.text[1:].split())))
-            state.bare = (at + row + 1, word)
+            state.bare = (first + row + 1, word)
         warn_of_points(state)
 
 

@@ -78,8 +78,8 @@ class Lines:
             self.values[letter] = np.where(bare, self.values[letter] * unit, self.values[letter])
             self.counted |= bare
 
-    def execute(self, at: int) -> int:
-        """Move; returns how many lines were executed. `at`: the first one's number, from 0."""
+    def execute(self, first: int) -> int:
+        """Move; returns how many lines were executed. `first`: the first one's number, from 0."""
         self._modes()
         axes, centers = self._any(AXES), self._any(geometry.CENTER_LETTERS)
         is_arc = self.mode >= CLOCKWISE
@@ -94,28 +94,28 @@ class Lines:
             return self._leave(None)
         control = self._turned(moving) if self.state.frames.rotated else self._control()
         start, end = self._set_up(control)
-        found = self._arcs(np.flatnonzero(arc[: self.end]), control)
+        arcs = self._arcs(np.flatnonzero(arc[: self.end]), control)
         done = slice(self.end)
-        self._record(at, start[done], end[done], found, moving[done], arc[done])
+        self._record(first, start[done], end[done], arcs, moving[done], arc[done])
         return self._leave(control if moving[done].any() else None)
 
     def _record(
-        self, at: int, start: FloatArray, end: FloatArray, found: Arcs, moving: BoolArray, arc: BoolArray
+        self, first: int, start: FloatArray, end: FloatArray, arcs: Arcs, moving: BoolArray, arc: BoolArray
     ) -> None:
         """Hand over the moves of the lines that are done, those that go anywhere."""
         state = self.state
         kept = moving & (np.logical_or.reduce([start[:, axis] != end[:, axis] for axis in range(6)]) | arc)
-        feed = self._feeds(start, end, found, moving)
+        feed = self._feeds(start, end, arcs, moving)
         rows = np.flatnonzero(kept)
         motion = np.where(arc, ARC, np.where(self.mode[: self.end] == MODES["G1"], FEED, RAPID))[rows]
         place = np.cumsum(kept) - 1
         state.recorder.add_many(
             MovesInMm(
-                line=rows + (at + 1),
+                line=rows + (first + 1),
                 motion=motion,
                 start=start[rows],
                 end=end[rows],
-                arcs=replace(found, rows=place[found.rows]),
+                arcs=replace(arcs, rows=place[arcs.rows]),
                 feed=np.where(motion == RAPID, math.nan, feed[rows]),
                 dwell=np.zeros(len(rows)),
                 tool=np.full(len(rows), state.tool),
@@ -139,17 +139,17 @@ class Lines:
     def _feed_words(self) -> None:
         """F in force on each line, and the line that set it (-1: a line before these)."""
         state = self.state
-        said, values, bare = np.zeros(self.n, dtype=bool), np.full(self.n, math.nan), np.zeros(self.n, dtype=bool)
+        has_feed, values, bare = np.zeros(self.n, dtype=bool), np.full(self.n, math.nan), np.zeros(self.n, dtype=bool)
         for key in (FIRST_F, LAST_F):
             if key in self.words.forms:
                 form = self.words.forms[key]
-                self._stop(said & (form != NONE))  # a second one
-                values = np.where(said, values, self.words.values[key])
-                said, bare = said | (form != NONE), bare | (form == BARE)
-        order = np.cumsum(said)
-        self.feed_row = np.concatenate([[-1], np.flatnonzero(said)])[order]
+                self._stop(has_feed & (form != NONE))  # a second one
+                values = np.where(has_feed, values, self.words.values[key])
+                has_feed, bare = has_feed | (form != NONE), bare | (form == BARE)
+        order = np.cumsum(has_feed)
+        self.feed_row = np.concatenate([[-1], np.flatnonzero(has_feed)])[order]
         before = math.nan if state.feed is None else state.feed
-        self.feed = np.concatenate([[before], values[said] * state.feed_scale])[order]
+        self.feed = np.concatenate([[before], values[has_feed] * state.feed_scale])[order]
         self._stop((self.feed < SLOWEST) | (self.feed > LARGEST_WORD))
         if bare_feed_is_open(state):
             self._stop(bare)
@@ -231,13 +231,13 @@ class Lines:
         words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters])
         points = self._programmed(control[rows])
         middles, sweeps = self._all_arcs(rows, points[:, [first, second]], words)
-        frames, found = state.frames, points[: len(sweeps)]
-        found[:, [first, second]] = middles
+        frames, center_points = state.frames, points[: len(sweeps)]
+        center_points[:, [first, second]] = middles
         if frames.rotated:
-            turned = [frames.to_setup(frames.to_control(point))[:3] for point in found.tolist()]
+            turned = [frames.to_setup(frames.to_control(point))[:3] for point in center_points.tolist()]
             middles = np.array(turned).reshape(-1, 3)
         else:
-            columns = (frames.axis_to_setup(i, frames.axis_to_control(i, found[:, i])) for i in range(3))
+            columns = (frames.axis_to_setup(i, frames.axis_to_control(i, center_points[:, i])) for i in range(3))
             middles = np.stack([*columns], axis=1)
         vector = frames.turn_direction(geometry.normal_of(state.plane))
         return Arcs(rows[: len(sweeps)], middles, np.tile(vector, (len(sweeps), 1)), sweeps)
@@ -278,17 +278,17 @@ class Lines:
             return np.array([frames.to_program(point) for point in control.tolist()])
         return np.stack([frames.axis_to_program(axis, control[:, axis]) for axis in range(6)], axis=1)
 
-    def _feeds(self, start: FloatArray, end: FloatArray, found: Arcs, moving: BoolArray) -> FloatArray:
+    def _feeds(self, start: FloatArray, end: FloatArray, arcs: Arcs, moving: BoolArray) -> FloatArray:
         """Feed of each line's move (`modes.feed_of_move`); rapids are none."""
         feed: FloatArray = self.feed[: self.end].copy()
         if self.state.feed_mode == "G94":
             standing = np.logical_and.reduce([start[:, axis] == end[:, axis] for axis in range(3)])
-            standing[found.rows] = False
+            standing[arcs.rows] = False
             feed[standing] = rotary_feed(self.state, feed[standing])
             return feed
-        arcs = found.by_row()
+        arc_of_row = arcs.by_row()
         for row in np.flatnonzero(moving & (self.mode[: self.end] != MODES["G0"])).tolist():
-            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), arcs.get(row))
+            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), arc_of_row.get(row))
         return feed
 
     def _leave(self, control: FloatArray | None) -> int:
@@ -299,9 +299,9 @@ class Lines:
         if state.dialect.increments and self.counted[: self.end].any():
             assume_increments(state)
         if "S" in self.words.forms:
-            said = np.flatnonzero(self.words.forms["S"][: self.end])
-            if len(said):
-                state.speed = float(self.words.values["S"][said[-1]])
+            speed_rows = np.flatnonzero(self.words.forms["S"][: self.end])
+            if len(speed_rows):
+                state.speed = float(self.words.values["S"][speed_rows[-1]])
         if self.mode[last] != NO_MODE:
             state.motion = MODE_NAMES[self.mode[last]]
         if state.feed_mode == "G93":

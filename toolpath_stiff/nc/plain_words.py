@@ -123,24 +123,24 @@ class PlainLines:
         self._start, self._words = -1, _in_columns(1, *_tokens("")[:4])
         self._others: list[int] = []  # lines of the chunk that are not plain, and its end, in falling order
 
-    def run(self, at: int) -> int:
-        """How many lines from `at` (from 0) are plain; no more than the chunk's rest."""
-        if not self.has(at):
-            self._lex(at)
-        while self._others[-1] < at:
+    def run(self, first: int) -> int:
+        """How many lines from `first` (from 0) are plain; no more than the chunk's rest."""
+        if not self.has(first):
+            self._lex(first)
+        while self._others[-1] < first:
             self._others.pop()
-        return self._others[-1] - at
+        return self._others[-1] - first
 
-    def has(self, at: int) -> bool:
+    def has(self, row: int) -> bool:
         """Whether a line is in the present chunk."""
-        return self._start <= at < self._start + len(self._words)
+        return self._start <= row < self._start + len(self._words)
 
-    def words(self, at: int, count: int) -> PlainWords:
+    def words(self, first: int, count: int) -> PlainWords:
         """The words of lines that `run` has counted."""
-        return self._words.part(at - self._start, at - self._start + count)
+        return self._words.part(first - self._start, first - self._start + count)
 
-    def _lex(self, at: int) -> None:
-        chunk = self.lines[at : at + CHUNK]
+    def _lex(self, first: int) -> None:
+        chunk = self.lines[first : first + CHUNK]
         if max(map(len, chunk)) > LONGEST_PLAIN:
             chunk = [line if len(line) <= LONGEST_PLAIN else "!" for line in chunk]
         line, rank, value, form, odd = _tokens("\n".join(chunk))
@@ -149,26 +149,26 @@ class PlainLines:
             more, others = self._by_pattern([_without_blanks(chunk[row]) for row in odd.tolist()], odd)
             line, rank = np.append(line, more[0]), np.append(rank, more[1])
             value, form = np.append(value, more[2]), np.append(form, more[3])
-        self._start, self._words = at, _in_columns(len(chunk), line, rank, value, form)
-        self._others = [at + len(chunk), *(at + others[::-1]).tolist()]
+        self._start, self._words = first, _in_columns(len(chunk), line, rank, value, form)
+        self._others = [first + len(chunk), *(first + others[::-1]).tolist()]
 
-    def _by_pattern(self, lines: list[str], at: IntArray) -> tuple[Tokens, IntArray]:
+    def _by_pattern(self, lines: list[str], rows: IntArray) -> tuple[Tokens, IntArray]:
         """Words of lines as `_tokens` has them, and the lines that are not plain."""
         text = "\n".join(lines)
         if text.isascii():  # of other scripts some letters become ASCII ones in upper case
             text = text.upper()
-        found: list[tuple[int, int, float, int]] = []
+        tokens: list[tuple[int, int, float, int]] = []
         others = []
-        for row, texts in zip(at.tolist(), self._pattern.findall(text), strict=True):
+        for row, texts in zip(rows.tolist(), self._pattern.findall(text), strict=True):
             if texts[-1]:
                 others.append(row)
                 continue
             for rank, word in enumerate(texts[:-1], KEYS.index("G")):
                 if word:
                     form = BARE if "." not in word else POINTED if word.endswith(".") else BROKEN
-                    found.append((row, rank, float(word), form))
-        where = np.array([word[:2] for word in found], dtype=np.int64).reshape(-1, 2)
-        value, forms = np.array([word[2] for word in found]), np.array([word[3] for word in found], dtype=np.uint8)
+                    tokens.append((row, rank, float(word), form))
+        where = np.array([word[:2] for word in tokens], dtype=np.int64).reshape(-1, 2)
+        value, forms = np.array([word[2] for word in tokens]), np.array([word[3] for word in tokens], dtype=np.uint8)
         return (where[:, 0], where[:, 1], value, forms), np.array(others, dtype=np.int64)
 
 
@@ -185,22 +185,22 @@ def _tokens(text: str) -> tuple[IntArray, IntArray, FloatArray, ByteArray, IntAr
     kinds = np.append(_KINDS[codes[marks]], np.array([_END, _END], dtype=np.uint8))
     first = np.flatnonzero(kinds[:-2] >= _LETTER)  # what begins a word, ends a line, or is none of it
     following = np.append(first[1:], len(marks))
-    at, kind = marks[first], kinds[first]
-    end = np.append(at[1:], len(codes))
+    begin, kind = marks[first], kinds[first]
+    end = np.append(begin[1:], len(codes))
     is_end = kind == _END
     line = np.cumsum(is_end) - 1
     signed = kinds[first + 1] == _SIGN
     pointed = kinds[first + 1 + signed] == _POINT
     last = first + signed + pointed
     sign, point = marks.take(first + 1, mode="clip"), np.where(pointed, marks.take(last, mode="clip"), end)
-    digits, decimals = end - at - 1 - (last - first), end - point - pointed
-    rank = _ranks(codes[at], kind)
+    digits, decimals = end - begin - 1 - (last - first), end - point - pointed
+    rank = _ranks(codes[begin], kind)
     unsigned = (rank < _FEED_RANK + 1) | (rank >= len(KEYS) - 2)
     bad = (digits < 1) | (digits > MOST_DIGITS) | (unsigned & signed) | ((rank < _FEED_RANK) & pointed)
-    bad |= (signed & (sign > at + 1)) | (following > last + 1)  # misplaced, or too many
+    bad |= (signed & (sign > begin + 1)) | (following > last + 1)  # misplaced, or too many
     bad[1:] |= rank[1:] <= rank[:-1]
     bad |= kind == _OTHER
-    bad[is_end] = (end > at + 1)[is_end]  # numbers without a letter
+    bad[is_end] = (end > begin + 1)[is_end]  # numbers without a letter
     value = _values(buffer, point, end, digits, decimals)
     value[codes[sign] == ord("-")] *= -1.0
     bad |= (rank == KEYS.index("G")) & ((digits > 2) | (value > 3.0))
@@ -228,18 +228,18 @@ def _values(buffer: bytes, point: IntArray, end: IntArray, digits: IntArray, dec
     eights = np.ndarray(len(buffer) - 7, dtype="<u8", buffer=buffer, strides=(1,))  # the eight from each place on
     bits = eights[end - 8] & _MASKS.take(decimals, mode="clip")
     bits |= (eights[point - 8] & _MASKS.take(digits - decimals, mode="clip")) >> _SHIFTS.take(decimals, mode="clip")
-    found = _sum_of_digits(bits)
+    mantissa = _sum_of_digits(bits)
     longer = np.flatnonzero((digits > 8) & (digits <= MOST_DIGITS))
     if len(longer):
         after = decimals[longer]
         places = ((point[longer], digits[longer] - after), (end[longer], after))
         before, behind = (
-            1e8 * _sum_of_digits(eights[at - 16] & _MASKS.take(count - 8, mode="clip"))
-            + _sum_of_digits(eights[at - 8] & _MASKS.take(count, mode="clip"))
-            for at, count in places
+            1e8 * _sum_of_digits(eights[place - 16] & _MASKS.take(count - 8, mode="clip"))
+            + _sum_of_digits(eights[place - 8] & _MASKS.take(count, mode="clip"))
+            for place, count in places
         )
-        found[longer] = before * _TENS[after] + behind
-    return np.asarray(found / _TENS.take(decimals, mode="clip"))
+        mantissa[longer] = before * _TENS[after] + behind
+    return np.asarray(mantissa / _TENS.take(decimals, mode="clip"))
 
 
 def _sum_of_digits(bits: NDArray[np.uint64]) -> FloatArray:

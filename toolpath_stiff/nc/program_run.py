@@ -84,9 +84,9 @@ class Tally:
                 self.count[code] += 1
 
 
-def beyond_the_end(what: str, at: int, lines: int) -> str:
-    """The warning that lines follow what ends a program in line `at` (from 0)."""
-    return f"what follows {what} in line {at + 1} is not part of the program (lines: {lines})"
+def beyond_the_end(what: str, row: int, lines: int) -> str:
+    """The warning that lines follow what ends a program in line `row` (from 0)."""
+    return f"what follows {what} in line {row + 1} is not part of the program (lines: {lines})"
 
 
 def without_label(state: State, lines: tuple[str, ...]) -> tuple[str, ...]:
@@ -144,26 +144,26 @@ class ProgramRun:
 
     def run(self) -> list[str]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
-        at, percent, numbered = leader(self.lines, self.name, self.state.dialect.semicolon), False, False
-        if at:
-            self.state.warnings.append(f"what stands before the tape mark (%) in line {at + 1} is not read")
-        while at < len(self.lines):
+        row, percent, numbered = leader(self.lines, self.name, self.state.dialect.semicolon), False, False
+        if row:
+            self.state.warnings.append(f"what stands before the tape mark (%) in line {row + 1} is not read")
+        while row < len(self.lines):
             if self._plain is not None and not self._levels:
-                words = self._plain.execute(at)
+                words = self._plain.execute(row)
                 if words is not None:
-                    self._tally_plain(at, words)
+                    self._tally_plain(row, words)
                     percent = percent or bool(words.count.any())
-                    at += len(words)
+                    row += len(words)
                     continue
-            following: int | None = at + 1
-            steered = self._tried(self._steered, at, following)
+            following: int | None = row + 1
+            steered = self._tried(self._steered, row, following)
             if steered is not None:
-                at = steered
+                row = steered
                 continue
-            block = self._block(at)
+            block = self._block(row)
             if block.percent:
                 if percent:
-                    return self._end(at, "%")
+                    return self._end(row, "%")
                 percent = True
             elif block.words:
                 percent = True  # from the first word on, a tape mark is the last one
@@ -177,18 +177,18 @@ class ProgramRun:
                     on: Then = Flow.NEXT
                     flow = self._tried(self._execute, block, on)
                     if flow is Flow.END:
-                        return self._end(at, "the program's end", ended=True)
+                        return self._end(row, "the program's end", ended=True)
                     if flow is not Flow.NEXT:
-                        to = self._enter(at, flow) if isinstance(flow, Call) else self._return(at, flow)
+                        to = self._enter(row, flow) if isinstance(flow, Call) else self._return(row, flow)
                         if to is None:
                             return [
-                                f"M99 in line {at + 1}, outside any subprogram, makes the control start the program "
+                                f"M99 in line {row + 1}, outside any subprogram, makes the control start the program "
                                 "again, without end: it is read once",
-                                *self._end(at, "M99"),
+                                *self._end(row, "M99"),
                             ]
-                        at = self._jump(at, to)
+                        row = self._jump(row, to)
                         continue
-            at += 1
+            row += 1
         return self._end(len(self.lines) - 1, "the file")
 
     def _tried(self, act: Callable[[Argument], Outcome], argument: Argument, instead: Outcome) -> Outcome:
@@ -203,100 +203,103 @@ class ProgramRun:
                 raise
             return instead
 
-    def _tally_plain(self, at: int, words: PlainWords) -> None:
-        """Count the codes of plain lines from `at`."""
+    def _tally_plain(self, first: int, words: PlainWords) -> None:
+        """Count the codes of plain lines from `first`."""
         if self.tally is None:
             return
         rows_of_codes = [(words.code == number).nonzero()[0] for number in range(int(words.code.max()) + 1)]
         for rows in sorted((rows for rows in rows_of_codes if len(rows)), key=lambda rows: int(rows[0])):
-            code, line = f"G{words.code[rows[0]]}", at + int(rows[0])
+            code, line = f"G{words.code[rows[0]]}", first + int(rows[0])
             if code not in self.tally.first:
                 column = next(word.column for word in self._read(line).words if word.letter == "G")
                 self.tally.first[code] = (line + 1, column)
             self.tally.count[code] += len(rows)
 
-    def _steered(self, at: int) -> int | None:
+    def _steered(self, row: int) -> int | None:
         """Where the run goes on, of a line that only says that; None: its words act."""
         return None
 
-    def _block(self, at: int) -> Block:
-        block = self._called.get(at) if self._levels else None
+    def _block(self, row: int) -> Block:
+        block = self._called.get(row) if self._levels else None
         if self._levels:
             self._blocks += 1
             if self._blocks > MOST_BLOCKS:
-                raise self._fail(at, f"the subprograms run more than {MOST_BLOCKS} blocks", "fewer repeats")
+                raise self._fail(row, f"the subprograms run more than {MOST_BLOCKS} blocks", "fewer repeats")
         if block is None:
-            block = self._tried(self._read, at, Block(at + 1, ()))
+            block = self._tried(self._read, row, Block(row + 1, ()))
             if self._levels:
-                self._called[at] = block
+                self._called[row] = block
         return block
 
     def _execute(self, block: Block) -> Then:
         return execute(self.state, block)
 
-    def _read(self, at: int) -> Block:
-        block = read_block(self.lines[at], at + 1, self.name, self.state.dialect.semicolon)
+    def _read(self, row: int) -> Block:
+        block = read_block(self.lines[row], row + 1, self.name, self.state.dialect.semicolon)
         return block if block.rest is None else block.executed(self.switches)
 
-    def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
-        return self._place(at).fail(found, expected, hint, column)
+    def _fail(
+        self, row: int, problem: str, expected: str = "", hint: str = "", column: int | None = None
+    ) -> InputError:
+        return self._place(row).fail(problem, expected, hint, column)
 
-    def _place(self, at: int) -> Place:
-        return Place(self.name, at + 1)
+    def _place(self, row: int) -> Place:
+        return Place(self.name, row + 1)
 
     def _check_head(self, block: Block, numbered: bool) -> None:
         """A program number within a program: the next one begins where this one did not end."""
         if self._levels:
             raise self._unended(block.line - 1)
         if (numbered or len(self.state.recorder)) and self.state.dialect.name != "linuxcnc":
-            found = f"{block.words[0].text} begins another program before the first one has ended"
-            raise self._fail(block.line - 1, found, "M30 or M2 before it", column=block.words[0].column)
+            problem = f"{block.words[0].text} begins another program before the first one has ended"
+            raise self._fail(block.line - 1, problem, "M30 or M2 before it", column=block.words[0].column)
 
-    def _unended(self, at: int) -> InputError:
+    def _unended(self, row: int) -> InputError:
         level = self._levels[-1]
-        return self._fail(at, f"the subprogram {level.name}, which begins in line {level.first + 1}, has no end", "M99")
+        problem = f"the subprogram {level.name}, which begins in line {level.first + 1}, has no end"
+        return self._fail(row, problem, "M99")
 
-    def _end(self, at: int, what: str, ended: bool = False) -> list[str]:
+    def _end(self, row: int, what: str, ended: bool = False) -> list[str]:
         """A warning if anything but tape marks and the subprograms that ran follows the end."""
         if self._levels and not ended:
-            raise self._unended(at)
+            raise self._unended(row)
         rest = [
             line
-            for index, line in enumerate(self.lines[at + 1 :], at + 1)
+            for index, line in enumerate(self.lines[row + 1 :], row + 1)
             if line.strip() not in ("", "%") and index not in self._called and index + 1 not in self._called
         ]
-        return [beyond_the_end(what, at, len(rest))] if rest else []
+        return [beyond_the_end(what, row, len(rest))] if rest else []
 
-    def _enter(self, at: int, call: Call) -> int:
+    def _enter(self, row: int, call: Call) -> int:
         """The line at which the called subprogram begins."""
         if call.local:
             code = "M97" if self.state.dialect.local_calls else "M98 Q"
             name, repeats = f"N{call.number}", call.repeats or 1
-            first = self._block_numbered(at, f"{code} calls", call.number, call.column)
+            first = self._block_numbered(row, f"{code} calls", call.number, call.column)
         else:
-            number, repeats = self._target(at, call)
+            number, repeats = self._target(row, call)
             code, name, first = "M98" if call.arguments is None else "a call", f"O{number}", self._heads()[number] + 1
         if not 1 <= repeats <= MOST_REPEATS:
-            raise self._fail(at, f"{code} with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
+            raise self._fail(row, f"{code} with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
         if call.local or not self.recursive:
             if any(level.name == name for level in self._levels):
-                raise self._fail(at, f"{code} calls {name}, which is running: it would never end", column=call.column)
+                raise self._fail(row, f"{code} calls {name}, which is running: it would never end", column=call.column)
             if not call.local and first == self._main + 1:
-                raise self._fail(at, f"M98 calls {name}, the main program itself", column=call.column)
-        self._begin(Subprogram(name, first, at + 1, repeats - 1, call.arguments, call.modal), at, call.column)
+                raise self._fail(row, f"M98 calls {name}, the main program itself", column=call.column)
+        self._begin(Subprogram(name, first, row + 1, repeats - 1, call.arguments, call.modal), row, call.column)
         return first
 
-    def _begin(self, level: Subprogram, at: int, column: int) -> None:
+    def _begin(self, level: Subprogram, row: int, column: int) -> None:
         if len(self._levels) == DEEPEST:
-            raise self._fail(at, f"more than {DEEPEST} subprograms within each other", column=column)
+            raise self._fail(row, f"more than {DEEPEST} subprograms within each other", column=column)
         self._levels.append(level)
 
-    def _jump(self, at: int, to: int) -> int:
-        self.jumps.append(Jump(len(self.state.recorder), at + 1, to))
+    def _jump(self, row: int, to: int) -> int:
+        self.jumps.append(Jump(len(self.state.recorder), row + 1, to))
         return to
 
-    def _numbered(self, at: int, number: float) -> list[int]:
-        """The lines (from 0) with an N number, of the program that runs at `at`."""
+    def _numbered(self, row: int, number: float) -> list[int]:
+        """The lines (from 0) with an N number, of the program that runs at `row`."""
         if self._sequence is None:
             self._sequence = {}
             for index, line in enumerate(self.lines):
@@ -305,37 +308,37 @@ class ProgramRun:
                     self._sequence.setdefault(int(match[1] or 0), []).append(index)
         return self._sequence.get(round(number), []) if number == round(number) else []
 
-    def _block_numbered(self, at: int, what: str, number: float, column: int) -> int:
+    def _block_numbered(self, row: int, what: str, number: float, column: int) -> int:
         """The line (from 0) of the block with an N number. Raises `InputError` unless there is one."""
-        rows = self._numbered(at, number)
+        rows = self._numbered(row, number)
         if len(rows) != 1:
-            places = ", ".join(str(self._place(row).line) for row in rows)
+            places = ", ".join(str(self._place(duplicate).line) for duplicate in rows)
             other = f"which is in the lines {places}" if rows else self.no_such_block
-            raise self._fail(at, f"{what} N{number:g}, {other}", "one block with that number", column=column)
+            raise self._fail(row, f"{what} N{number:g}, {other}", "one block with that number", column=column)
         return rows[0]
 
-    def _return(self, at: int, flow: Flow | GoTo) -> int | None:
+    def _return(self, row: int, flow: Flow | GoTo) -> int | None:
         """The line at which M99 goes on; None where that is the beginning of the program, or before this line."""
         if not isinstance(flow, GoTo):
-            return self._leave(at) if self._levels else None
-        to = self._block_numbered(at, "M99 P goes to", flow.number, flow.column)
+            return self._leave(row) if self._levels else None
+        to = self._block_numbered(row, "M99 P goes to", flow.number, flow.column)
         if not self._levels:
-            return to if to > at else None
-        self._restore(at)
+            return to if to > row else None
+        self._restore(row)
         level = self._levels.pop()
         if level.again or to < level.back:
-            found = f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram"
-            raise self._fail(at, found, "a block after the call, which is not repeated", column=flow.column)
+            problem = f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram"
+            raise self._fail(row, problem, "a block after the call, which is not repeated", column=flow.column)
         return to
 
-    def _restore(self, at: int) -> None:
+    def _restore(self, row: int) -> None:
         """The caller's modes, where M73 has saved them."""
         fault = leave_level(self.state, len(self._levels))
         if fault:
-            raise self._fail(at, f"the subprogram that saved modes with M73 returns where {fault}")
+            raise self._fail(row, f"the subprogram that saved modes with M73 returns where {fault}")
 
-    def _leave(self, at: int) -> int:
-        self._restore(at)
+    def _leave(self, row: int) -> int:
+        self._restore(row)
         level = self._levels[-1]
         if level.again:
             level.again -= 1
@@ -343,7 +346,7 @@ class ProgramRun:
         self._levels.pop()
         return level.back
 
-    def _target(self, at: int, call: Call) -> tuple[int, int]:
+    def _target(self, row: int, call: Call) -> tuple[int, int]:
         """Program number and repeats of a call."""
         heads = self._heads()
         meanings = {(call.number, call.repeats or 1)}
@@ -355,11 +358,11 @@ class ProgramRun:
         if not known:
             names = " or ".join(f"O{number}" for number, _ in sorted(meanings))
             hint = "put the subprogram into the file, after the main program's M30"
-            found = f"M98 calls {names}, and the file has no such subprogram"
-            raise self._fail(at, found, hint=hint, column=call.column)
+            problem = f"M98 calls {names}, and the file has no such subprogram"
+            raise self._fail(row, problem, hint=hint, column=call.column)
         if len(known) > 1:
             raise self._fail(
-                at,
+                row,
                 f"M98 P{call.number} calls O{call.number} or, {known[0][1]} times, O{known[0][0]}: the file has both",
                 hint="give the number of repeats as L",
                 column=call.column,

@@ -78,16 +78,16 @@ def recover_moves(
     some = [slice(first, first + MOVES_AT_A_TIME) for first in range(0, len(moves), MOVES_AT_A_TIME)]
     count = np.concatenate([_pieces(moves.take(rows), kinematics, held[rows], length[rows]) for rows in some])
     _check_pieces(count, moves, kinematics, name)
-    found, filled = _room(moves, int(count.sum())), 0
+    recovered, filled = _room(moves, int(count.sum())), 0
     before: FloatArray | None = None
     for rows in some:
         part, before, waited = _divided(moves.take(rows), kinematics, held[rows], length[rows], count[rows], before)
         if filled:  # a pause before the first move is none
-            found.dwell[filled - 1] += waited
+            recovered.dwell[filled - 1] += waited
         for column in fields(Moves):
-            getattr(found, column.name)[filled : filled + len(part)] = getattr(part, column.name)
+            getattr(recovered, column.name)[filled : filled + len(part)] = getattr(part, column.name)
         filled += len(part)
-    return found.take(slice(0, filled))
+    return recovered.take(slice(0, filled))
 
 
 def _check_pieces(count: IntArray, moves: Moves, kinematics: PostedKinematics, name: str) -> None:
@@ -116,11 +116,11 @@ def _divided(
     programmed = points_along(moves, move, u)[0]
     angles = moves.start[move, 3:] + u[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
     angles[last] = moves.end[:, 3:]
-    found = tool_poses(kinematics, programmed, angles, length[move], held[move])
+    tool = tool_poses(kinematics, programmed, angles, length[move], held[move])
     pose = np.zeros((len(move), 6))
-    pose[:, :3] = _without_rounding(found.tip, None if before is None else before[:3])
+    pose[:, :3] = _without_rounding(tool.tip, None if before is None else before[:3])
     pitch = 0.0 if before is None else float(before[4])
-    pose[:, 3:5] = _without_rounding(roll_pitch(found.axis, pitch), None if before is None else before[3:5])
+    pose[:, 3:5] = _without_rounding(roll_pitch(tool.axis, pitch), None if before is None else before[3:5])
     start, end = np.flatnonzero(~last), np.flatnonzero(step > 0)
     pieces = _on_the_part(moves, kinematics, held, length, move[start], u[start])
     pieces = replace(pieces, start=pose[start], end=pose[end])
@@ -130,12 +130,12 @@ def _divided(
 
 def turns_far(moves: Moves, kinematics: PostedKinematics) -> list[tuple[int, str, float]]:
     """Cutting moves in which an axis without roll-over turns by more than half a turn: line, letter, degrees."""
-    found = []
+    turns = []
     for rotary in kinematics.axes:
         turn = np.abs(moves.end[:, 3 + rotary.column] - moves.start[:, 3 + rotary.column])
         far = np.flatnonzero((turn > HALF_TURN) & (moves.motion != RAPID) & (not rotary.rollover))
-        found += [(int(moves.line[i]), rotary.letter, deg_from_rad(float(turn[i]))) for i in far]
-    return sorted(found)
+        turns += [(int(moves.line[i]), rotary.letter, deg_from_rad(float(turn[i]))) for i in far]
+    return sorted(turns)
 
 
 def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> None:

@@ -128,10 +128,10 @@ class CurrentBlock:
             raise self.fail(self.values[letter], f"beside {word.text} is not a count", "a whole number from 1")
         return int(value)
 
-    def fail(self, at: Word | str | None, found: str, expected: str = "", hint: str = "") -> InputError:
+    def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block (or that of a code or letter), or at the block."""
-        word = self.codes.get(at) or self.values.get(at) if isinstance(at, str) else at
-        text = f"{word.text} {found}" if word else found
+        word = self.codes.get(culprit) or self.values.get(culprit) if isinstance(culprit, str) else culprit
+        text = f"{word.text} {problem}" if word else problem
         column = word.column if word else self.block.words[0].column
         return ProgramError(text, expected=expected, hint=hint, file=self.name, line=self.line, column=column)
 

@@ -128,12 +128,12 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
         raise ProgramError("the tool table is empty", file=str(path))
     is_csv = "," in filled[0][1] and not filled[0][1].lstrip().upper().startswith(("T0", "T1", ";"))
     tools = _csv_tools(path, filled) if is_csv else _linuxcnc_tools(path, filled)
-    found: dict[int, ToolEntry] = {}
+    by_number: dict[int, ToolEntry] = {}
     for line, tool in tools:
-        if tool.number in found:
+        if tool.number in by_number:
             raise Place(str(path), line).fail(f"tool {tool.number} appears twice")
-        found[tool.number] = tool
-    return found
+        by_number[tool.number] = tool
+    return by_number
 
 
 def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
@@ -143,8 +143,8 @@ def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int
     unknown = [name for name in heading if name not in columns]
     missing = [name for name in columns[:2] if name not in heading]
     if unknown or missing:
-        found = f"column {unknown[0]!r} is not known" if unknown else f"column {missing[0]!r} is missing"
-        raise heading_place.fail(found, f"columns {', '.join(columns)}")
+        problem = f"column {unknown[0]!r} is not known" if unknown else f"column {missing[0]!r} is missing"
+        raise heading_place.fail(problem, f"columns {', '.join(columns)}")
     rows = []
     for line, text in lines[1:]:
         place = Place(str(path), line)
@@ -203,8 +203,8 @@ def additional_offset(name: str) -> int | None:
     >>> additional_offset("G54") is None
     True
     """
-    found = ADDITIONAL.fullmatch(name)
-    return int(found[2]) if found and int(found[2]) <= ADDITIONAL_OFFSETS[found[1]] else None
+    match = ADDITIONAL.fullmatch(name)
+    return int(match[2]) if match and int(match[2]) <= ADDITIONAL_OFFSETS[match[1]] else None
 
 
 def read_offsets(path: str | Path) -> Offsets:

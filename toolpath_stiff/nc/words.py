@@ -118,23 +118,23 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     return Block(line, through_pygcode(words, place), optional=slash == 0, switch=switch, rest=rest)
 
 
-def block_delete(compact: str, at: int, columns: Sequence[int], place: Place) -> tuple[int, int]:
+def block_delete(compact: str, slash: int, columns: Sequence[int], place: Place) -> tuple[int, int]:
     """Where a block-delete slash and its number end, and which switch it names."""
-    end = at + 1
+    end = slash + 1
     while end < len(compact) and "0" <= compact[end] <= "9":
         end += 1
-    switch = int(compact[at + 1 : end] or 1) if end < at + 3 else 0
+    switch = int(compact[slash + 1 : end] or 1) if end < slash + 3 else 0
     if not 1 <= switch <= 9:
-        found = f"block-delete switch {compact[at : min(end, at + 20)]!r}"
-        raise place.fail(found, "/ or /1 to /9", column=columns[at])
+        problem = f"block-delete switch {compact[slash : min(end, slash + 20)]!r}"
+        raise place.fail(problem, "/ or /1 to /9", column=columns[slash])
     return end, switch
 
 
 def check_length(compact: str, place: Place) -> None:
     """Refuse a block that no control reads."""
     if len(compact) > LONGEST_BLOCK:
-        found = f"a block of {len(compact)} characters without comments and blanks"
-        raise place.fail(found, f"at most {LONGEST_BLOCK}")
+        problem = f"a block of {len(compact)} characters without comments and blanks"
+        raise place.fail(problem, f"at most {LONGEST_BLOCK}")
 
 
 def program_number(compact: str, column: int, place: Place) -> Block:
@@ -210,12 +210,12 @@ def _tokens(
                 number += exponent
         original = text[column - 1 : columns[end - 1]]
         if end - position > 1 + LONGEST_NUMBER:
-            found = f"a number of {end - position - 1} characters after {letter}"
-            raise place.fail(found, f"at most {LONGEST_NUMBER}", column=column)
+            problem = f"a number of {end - position - 1} characters after {letter}"
+            raise place.fail(problem, f"at most {LONGEST_NUMBER}", column=column)
         if letter == "N":
             if words:
-                found = f"line number {original!r} after another word"
-                raise place.fail(found, "N at the beginning of the line", column=column)
+                problem = f"line number {original!r} after another word"
+                raise place.fail(problem, "N at the beginning of the line", column=column)
         elif letter not in LETTERS:
             raise place.fail(f"word {original!r} is not known", column=column)
         else:
@@ -232,30 +232,30 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
     character = compact[position]
     tail = compact[position : position + 12]
     follower = compact[position + 1 : position + 3].lstrip("+-")[:1]  # `X-[...]` and `X-#1` too
-    found, expected, hint = f"{tail!r} is not a word", "a letter and a number", ""
+    problem, expected, hint = f"{tail!r} is not a word", "a letter and a number", ""
     if character.isalpha() and (not follower or follower.isalpha() or follower == "/"):
         if compact.startswith(("NAN", "INF"), position + 1):
-            found, expected = f"{tail!r} is not a finite number", "a decimal number"
+            problem, expected = f"{tail!r} is not a finite number", "a decimal number"
         else:
-            found, expected = f"the word {character!r} has no number", f"a number after {character}"
-    macro = MACRO.match(compact, position)
-    if macro is not None:
-        found, expected = f"{macro[0]} is a statement of a control's macro language, which is not read", "plain blocks"
+            problem, expected = f"the word {character!r} has no number", f"a number after {character}"
+    word = MACRO.match(compact, position)
+    if word is not None:
+        problem, expected = f"{word[0]} is a statement of a control's macro language, which is not read", "plain blocks"
         hint = "post the program without macros"
     elif character == "#" or follower == "#" or character == "=":
-        found, expected = "variables (#) are not supported", "numbers"
+        problem, expected = "variables (#) are not supported", "numbers"
         hint = "post the program without variables, or give --interpreter linuxcnc"
     elif character == "[" or follower == "[":
-        found, expected = "expressions ([...]) are not supported", "numbers"
+        problem, expected = "expressions ([...]) are not supported", "numbers"
         hint = "post the program without expressions, or give --interpreter linuxcnc"
     elif character in POLAR:
-        found, expected = f"the polar word {character!r} has no number", f"a number after {character}"
+        problem, expected = f"the polar word {character!r} has no number", f"a number after {character}"
     elif character == "%":
-        found, expected = "`%` among other words", "`%` alone on its line"
+        problem, expected = "`%` among other words", "`%` alone on its line"
         if compact[1:].isalnum() and not position:  # DIN 66025
-            found = f"{compact[:20]!r} is a program's name behind `%`, as Siemens', NUM's and ISG's controls have it"
+            problem = f"{compact[:20]!r} is a program's name behind `%`, as Siemens', NUM's and ISG's controls have it"
             hint = "take the name away; a Fanuc's number is read past with --dialect fanuc"
-    return place.fail(found, expected, hint, column=column)
+    return place.fail(problem, expected, hint, column=column)
 
 
 def through_pygcode(words: list[Word], place: Place) -> tuple[Word, ...]:
@@ -306,15 +306,15 @@ def leader(lines: Sequence[str], name: str, semicolon: bool) -> int:
 
     Controls read nothing before the tape mark (Fanuc's operator's manuals, "Leader section").
     """
-    mark = next((at for at, line in enumerate(lines[: LONGEST_LEADER + 1]) if line.strip() == "%"), 0)
-    texts = [(at, line) for at, line in enumerate(lines[:mark]) if line.strip()]
+    mark = next((row for row, line in enumerate(lines[: LONGEST_LEADER + 1]) if line.strip() == "%"), 0)
+    texts = [(row, line) for row, line in enumerate(lines[:mark]) if line.strip()]
     computed = any(EXPRESSION.search(line) for _, line in texts)
     if not texts or computed or not any(line.strip() not in ("", "%") for line in lines[mark + 1 :]):
         return 0
     unread = 0
-    for at, line in texts:
+    for row, line in texts:
         try:
-            if read_block(line, at + 1, name, semicolon).words:
+            if read_block(line, row + 1, name, semicolon).words:
                 return 0
         except InputError:
             unread += 1
@@ -376,16 +376,16 @@ def split_lines(text: str, name: str) -> tuple[str, ...]:
     joined = text.replace("\r\n", "\n").replace("\r", "\n")
     binary = BINARY.search(joined) if _any_binary(joined) else None
     if binary is not None:
-        at = binary.start()
-        place = Place(name, joined.count("\n", 0, at) + 1, at - joined.rfind("\n", 0, at))
+        offset = binary.start()
+        place = Place(name, joined.count("\n", 0, offset) + 1, offset - joined.rfind("\n", 0, offset))
         raise place.fail(f"binary byte 0x{ord(binary[0]):02X}", "the text of an NC program")
-    found = joined.replace("\x1a", "").replace("\x0c", " ").split("\n")
-    if not found[-1]:
-        found.pop()
-    if max(map(len, found), default=0) > LONGEST_LINE:
-        at = next(number for number, line in enumerate(found, 1) if len(line) > LONGEST_LINE)
-        raise Place(name, at).fail(f"a line of {len(found[at - 1])} characters", f"lines of at most {LONGEST_LINE}")
-    return tuple(found)
+    lines = joined.replace("\x1a", "").replace("\x0c", " ").split("\n")
+    if not lines[-1]:
+        lines.pop()
+    if max(map(len, lines), default=0) > LONGEST_LINE:
+        row = next(row for row, line in enumerate(lines) if len(line) > LONGEST_LINE)
+        raise Place(name, row + 1).fail(f"a line of {len(lines[row])} characters", f"lines of at most {LONGEST_LINE}")
+    return tuple(lines)
 
 
 def _any_binary(text: str) -> bool:
