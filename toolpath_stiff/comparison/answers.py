@@ -65,7 +65,7 @@ class Answer:
 
     def least_p(self, pattern: Pattern) -> float:
         """Smallest adjusted probability that a pattern got, tested alone or beside others."""
-        tests = (*self.structure.tests, *self.structure.found)
+        tests = (*self.structure.tests, *self.structure.patterns)
         return min((test.p_adjusted for test in tests if test.pattern is pattern), default=1.0)
 
 
@@ -95,7 +95,7 @@ def summary_of(
         Commands that go on from here.
     """
     data, last, values = residuals.predictor.data, answers[-1], residuals.values
-    asked = question(residuals.predictor)
+    question_text = question(residuals.predictor)
 
     def by(label: TextArray) -> dict[str, GroupErrors]:
         return {str(level): _errors(values, answers, label == level) for level in np.unique(label)}
@@ -104,15 +104,15 @@ def summary_of(
     heights = {str(name): float(mm_from_m(data.position[where == name, 2]).mean()) for name in np.unique(where)}
     baseline = _baseline(values, answers)
     by_noise = {
-        one.noise.name: [_finding(f, values, one, first=i == 0) for i, f in enumerate(one.structure.found)]
-        for one in answers
+        answer.noise.name: [_finding(f, values, answer, first=i == 0) for i, f in enumerate(answer.structure.patterns)]
+        for answer in answers
     }
     findings, tests = _shared_findings(answers, by_noise), _tests(answers)
-    noises = [NoiseFigures.of(one.noise) for one in answers]
+    noises = [NoiseFigures.of(answer.noise) for answer in answers]
     suspects = suspect_entries([] if last.law is None else suspect_rows(last.problem, last.law), data, left_out=None)
-    doubts = [*dict.fromkeys(one.noise.remark for one in answers if one.noise.remark)]
+    doubts = [*dict.fromkeys(answer.noise.remark for answer in answers if answer.noise.remark)]
     doubts += [suspect.words for suspect in suspects]
-    text = [asked, overall_text(baseline, noises, pattern=bool(findings))]
+    text = [question_text, overall_text(baseline, noises, pattern=bool(findings))]
     text += [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in doubts]
     return ComparisonSummary(
         machine=residuals.predictor.machine.name,
@@ -137,20 +137,20 @@ def summary_of(
         model_free=ModelFree(_checks(answers), cannot),
         noise=noises,
         not_tested=[*(f"no column {name}" for name in data.missing), *residuals.notes],
-        assumptions=_assumptions([one.noise for one in answers]),
+        assumptions=_assumptions([answer.noise for answer in answers]),
         warnings=list(data.warnings),
         notes=[*data.notes, *doubts],
         suspect_rows=suspects,
         hints=[] if findings else _hints(last, tests, values),
         text=" ".join(filter(None, text)),
-        question=asked,
+        question=question_text,
         next=following,
     )
 
 
 def _errors(values: FloatArray, answers: Sequence[Answer], rows: BoolArray) -> GroupErrors:
     """Errors of some readings, and what scatter alone would give."""
-    squares = {one.noise.name: float(one.scattering.square[rows].mean()) for one in answers}
+    squares = {answer.noise.name: float(answer.scattering.square[rows].mean()) for answer in answers}
     measured = max(float((values[rows] ** 2).mean()), 1e-300)
     return GroupErrors(
         readings=int(rows.sum()),
@@ -164,8 +164,8 @@ def _baseline(values: FloatArray, answers: Sequence[Answer]) -> AllErrors:
     """The machine file as it stands, over all readings."""
     return AllErrors(
         **vars(_errors(values, answers, np.ones(len(values), dtype=bool))),
-        probability={one.noise.name: one.structure.probability for one in answers},
-        excess_scatter_percent={one.noise.name: 100.0 * one.structure.excess for one in answers},
+        probability={answer.noise.name: answer.structure.probability for answer in answers},
+        excess_scatter_percent={answer.noise.name: 100.0 * answer.structure.excess for answer in answers},
         strut_law_refitted=_refitted(answers[-1]),
     )
 
@@ -189,16 +189,16 @@ def _refitted(last: Answer) -> LawRefitted | None:
 def _checks(answers: Sequence[Answer]) -> list[CheckOutcome]:
     """The checks without a model; one holds if it does under any noise model."""
     checks = []
-    for outcomes in zip(*(one.model_free for one in answers), strict=True):
-        holds, p = any(one.holds for one in outcomes), max(one.p_adjusted for one in outcomes)
-        text = [one.text for one in outcomes if one.holds == holds][-1]
+    for outcomes in zip(*(answer.model_free for answer in answers), strict=True):
+        holds, p = any(outcome.holds for outcome in outcomes), max(outcome.p_adjusted for outcome in outcomes)
+        text = [outcome.text for outcome in outcomes if outcome.holds == holds][-1]
         checks.append(replace(outcomes[-1], holds=holds, p_adjusted=p, text=text))
     return checks
 
 
 def _tests(answers: Sequence[Answer]) -> list[PatternTest]:
     """Every pattern on its own, the strongest first; probabilities are the larger of the noise models."""
-    p = [{test.pattern: test.p_adjusted for test in one.structure.tests} for one in answers]
+    p = [{test.pattern: test.p_adjusted for test in answer.structure.tests} for answer in answers]
     tests = [
         PatternTest(
             *_about(test.pattern),
@@ -222,22 +222,22 @@ def _hint(test: FoundPattern, values: FloatArray, *, first: bool) -> PatternHint
     return PatternHint(text, test.statistic, test.p_adjusted, *_about(test.pattern), size, alike)
 
 
-def _finding(found: FoundPattern, values: FloatArray, answer: Answer, *, first: bool) -> PatternHint:
+def _finding(detection: FoundPattern, values: FloatArray, answer: Answer, *, first: bool) -> PatternHint:
     """The same, with its statistic beside the refitted strut law where the data tell that."""
-    hint = _hint(found, values, first=first)
+    hint = _hint(detection, values, first=first)
     if answer.refitted is None:
         return hint
-    test = next((test for test in answer.refitted.tests if test.pattern is found.pattern), None)
+    test = next((test for test in answer.refitted.tests if test.pattern is detection.pattern), None)
     after = None if test is None else Statistic(test.statistic, test.p_adjusted)
     return RefittedHint(**vars(hint), after_strut_law_refit=after)
 
 
 def _shared_findings(answers: Sequence[Answer], by_noise: dict[str, list[PatternHint]]) -> list[PatternHint]:
     """Findings that hold under every noise model, with the larger of their probabilities."""
-    fewest = min(answers, key=lambda one: len(one.structure.found))
+    fewest = min(answers, key=lambda answer: len(answer.structure.patterns))
     kept = []
-    for found, finding in zip(fewest.structure.found, by_noise[fewest.noise.name], strict=True):
-        others = [one.least_p(found.pattern) for one in answers if one is not fewest]
+    for detection, finding in zip(fewest.structure.patterns, by_noise[fewest.noise.name], strict=True):
+        others = [answer.least_p(detection.pattern) for answer in answers if answer is not fewest]
         worst = max([finding.p_adjusted, *others])
         if worst < SIGNIFICANT:
             kept.append(replace(finding, p_adjusted=worst))
@@ -277,7 +277,7 @@ def _far_readings(residuals: Residuals, last: Answer) -> list[FarReading]:
 def _assumptions(noises: Sequence[Noise]) -> list[str]:
     noise = noises[0]
     return [
-        *(f"noise, {one.name}: {one.origin}" for one in noises),
+        *(f"noise, {model.name}: {model.origin}" for model in noises),
         f"struts alike to {100 * noise.strut_spread:.2g} %, joints where the machine file has them to "
         f"{mm_from_m(noise.joint_error):.2g} mm (standard deviations, assumed)",
         f"{100 * noise.outliers:.2g} % of the readings wild, {noise.outlier_width:g} times wider (assumed)",

@@ -203,11 +203,11 @@ def compare(
     residuals = Residuals.of(Predictor(machine, data, effect_files))
     noises = noise_models(data, noise, strut_spread)
     checks, cannot = model_free_checks(machine, data)
-    answers = [_answer(residuals, checks, one, draws, seed) for one in noises]
+    answers = [_answer(residuals, checks, noise_model, draws, seed) for noise_model in noises]
     files = tuple(dict.fromkeys(data.file.tolist()))
-    asked = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
+    request = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
     beside = _beside_tip(machine, every, effect_files, noise_models(every, noise, strut_spread)[-1], seed)
-    following = [hint("which effect would explain it", asked.command("diagnose"))]
+    following = [hint("which effect would explain it", request.command("diagnose"))]
     scattering = answers[-1].scattering
     return Comparison(
         residuals.predictor,

@@ -150,14 +150,14 @@ def assess(checks: list[Check], data: Readings, covariance: Covariance, draws: F
 def _cells(data: Readings) -> dict[tuple[Any, ...], NDArray[np.int64]]:
     """Rows of one pose, tool, set-up, loop, load and direction: (pose, rest, direction) -> rows."""
     groups = repeat_groups(data)
-    found = {}
+    cells = {}
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
         i = int(rows[0])
         pose = (*np.round(data.position[i], 6).tolist(), *np.round(data.angles[i], 6).tolist())
         rest = (float(data.tool_extension[i]), float(data.force[i]), str(data.setup[i]), str(data.loop[i]))
-        found[(pose, rest, tuple(np.round(data.direction[i], 6).tolist()))] = rows
-    return found
+        cells[(pose, rest, tuple(np.round(data.direction[i], 6).tolist()))] = rows
+    return cells
 
 
 def _mean(n: int, rows: NDArray[np.int64], weight: float = 1.0) -> FloatArray:
@@ -175,11 +175,11 @@ def _on_axis(data: Readings, cells: dict[tuple[Any, ...], NDArray[np.int64]]) ->
         across = next((rows for key, rows in cells.items() if key[:2] == (pose, rest) and abs(key[2][1]) == 1.0), None)
         if across is not None:
             weights = _mean(len(data), rows) - _mean(len(data), across)
-            at = f"z = {mm_from_m(float(data.position[i, 2])):.0f} mm" + (f", set-up {rest[2]}" if rest[2] else "")
+            place = f"z = {mm_from_m(float(data.position[i, 2])):.0f} mm" + (f", set-up {rest[2]}" if rest[2] else "")
             yield Check(
                 ON_AXIS,
                 weights,
-                f"On the axis at {at}, X against Y: {{percent}}",
+                f"On the axis at {place}, X against Y: {{percent}}",
                 "the three legs, table or instruments are not alike (table, set-up, gauge, one strut or vertex)",
             )
 
@@ -193,23 +193,23 @@ def _images(
     poses: dict[tuple[Any, ...], dict[tuple[float, ...], NDArray[np.int64]]] = {}
     for (pose, rest, direction), rows in cells.items():
         poses.setdefault((pose, rest), {})[direction] = rows
-    for (first, one), (second, other) in combinations(poses.items(), 2):
+    for (first, cells_here), (second, cells_there) in combinations(poses.items(), 2):
         if first[1] != second[1] or first[0] == second[0]:
             continue
-        i, j = (int(next(iter(rows.values()))[0]) for rows in (one, other))
+        i, j = (int(next(iter(rows.values()))[0]) for rows in (cells_here, cells_there))
         q = next((q for q in turns if _is_image(data, q, i, j)), None)
         if q is None:
             continue
         where = f"Point {data.point[i]} and its image {data.point[j]}"
-        for direction, rows in one.items():
-            for image, rows_there in other.items():
+        for direction, rows in cells_here.items():
+            for image, rows_there in cells_there.items():
                 if abs(float(np.dot(q @ direction, image))) > 1.0 - 1e-6:
                     yield Check(IMAGES, _mean(n, rows) - _mean(n, rows_there), f"{where}, along "
                                 f"{_named(direction)}: {{percent}}", broken)  # fmt: skip
         x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-        if abs(q[0, 1]) > 1e-9 and {x, y} <= set(one) and {x, y} <= set(other):
+        if abs(q[0, 1]) > 1e-9 and {x, y} <= set(cells_here) and {x, y} <= set(cells_there):
             weights, size = np.zeros(n), 0.0
-            for sign, which in ((1.0, one), (-1.0, other)):
+            for sign, which in ((1.0, cells_here), (-1.0, cells_there)):
                 softness = {d: float(np.exp(-np.log(data.stiffness[which[d]]).mean())) for d in (x, y)}
                 size -= sign * float(np.log(sum(softness.values())))
                 for d in (x, y):
@@ -256,16 +256,16 @@ def _setups(data: Readings) -> Iterator[Check]:
     columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
     columns += [data.tool_extension[:, None], data.force[:, None]]
     groups = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
-    along = directions(data)
+    n, along = len(data), directions(data)
     for a, b in combinations(np.unique(data.setup).tolist(), 2):
         for name in np.unique(along):
             both = [
                 (rows[data.setup[rows] == a], rows[data.setup[rows] == b])
                 for rows in (np.flatnonzero((groups == g) & (along == name)) for g in np.unique(groups))
             ]
-            both = [(one, other) for one, other in both if len(one) and len(other)]
+            both = [(rows_a, rows_b) for rows_a, rows_b in both if len(rows_a) and len(rows_b)]
             if both:
-                weights = sum(_mean(len(data), one) - _mean(len(data), other) for one, other in both) / len(both)
+                weights = sum(_mean(n, rows_a) - _mean(n, rows_b) for rows_a, rows_b in both) / len(both)
                 yield Check(
                     "set-ups",
                     np.asarray(weights),

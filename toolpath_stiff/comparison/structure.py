@@ -126,7 +126,7 @@ class FoundPatterns:
 
     Attributes
     ----------
-    found
+    patterns
         Patterns that stand out, one after the other.
     tests
         Every pattern on its own.
@@ -136,7 +136,7 @@ class FoundPatterns:
         Of residuals this large in scatter alone.
     """
 
-    found: tuple[FoundPattern, ...]
+    patterns: tuple[FoundPattern, ...]
     tests: tuple[FoundPattern, ...]
     excess: float
     excess_left: float
@@ -198,11 +198,11 @@ class Scattering:
         if again and noise.name == "measured":
             clamped = clamped * np.sqrt(again / rng.chisquare(again, (draws, 1)))
         wild = np.where(rng.random((draws, n)) < noise.outliers, noise.outlier_width, 1.0)
-        own = rng.standard_normal((draws, n)) * noise.repeat * wild
+        repeat_error = rng.standard_normal((draws, n)) * noise.repeat * wild
         if np.isfinite(noise.freedom) and noise.freedom > 0:
             # The noise is itself an estimate: what it is for depends on the draw.
-            own = own * np.sqrt(noise.freedom / rng.chisquare(noise.freedom, (draws, 1)))
-        return common + clamped + own, rng.standard_normal((draws, self.places.count))[:, self.places.of]
+            repeat_error = repeat_error * np.sqrt(noise.freedom / rng.chisquare(noise.freedom, (draws, 1)))
+        return common + clamped + repeat_error, rng.standard_normal((draws, self.places.count))[:, self.places.of]
 
     def draws(self, excess: float) -> FloatArray:
         """(draws, n) simulated residuals with that excess."""
@@ -243,10 +243,10 @@ def _turn_blocks(
 
     spread, parts = np.zeros(len(clamp)), []
     for rows in _connected(clamp, place).members():
-        own, of, at = covariance.own[rows], clamp[rows], place[rows]
+        own_variance, of, place_of = covariance.own_variance[rows], clamp[rows], place[rows]
         same = (of[:, None] == of) & (of >= 0)
-        inverse = np.linalg.inv(np.linalg.cholesky(np.diag(own) + covariance.common * same))
-        spread[rows], turn = np.linalg.eigh(inverse @ ((at[:, None] == at) & (at >= 0)) @ inverse.T)
+        inverse = np.linalg.inv(np.linalg.cholesky(np.diag(own_variance) + covariance.common * same))
+        spread[rows], turn = np.linalg.eigh(inverse @ ((place_of[:, None] == place_of) & (place_of >= 0)) @ inverse.T)
         parts.append((turn.T @ inverse, np.repeat(rows, len(rows)), np.tile(rows, len(rows))))
     data, row, column = (np.concatenate([np.ravel(part[k]) for part in parts]) for k in range(3))
     return csr_array((data, (row, column)), shape=(len(clamp),) * 2), spread
@@ -338,12 +338,12 @@ class _Fit:
         if self.scattering.repeated >= FEWEST_REPEATED:
             inflation = np.maximum(self._squares(turned, -1) / self._within, 1.0)
         chosen = self._excess(turned, self._target * inflation)
-        found = np.zeros((len(turned), self._turned.shape[1]))
+        t = np.zeros((len(turned), self._turned.shape[1]))
         for grid in np.unique(chosen).tolist():
             rows = chosen == grid
-            found[rows] = turned[rows] @ self.columns(grid)[2]
+            t[rows] = turned[rows] @ self.columns(grid)[2]
         factor = np.sqrt(inflation)
-        return found / factor[:, None], chosen, factor
+        return t / factor[:, None], chosen, factor
 
 
 def _orthonormal(columns: FloatArray) -> FloatArray:
@@ -377,46 +377,46 @@ def find_structure(
         So many patterns are taken out one after the other.
     """
     n = len(residual)
-    columns = np.array([one.values for one in patterns])
+    columns = np.array([pattern.values for pattern in patterns])
     base = np.zeros((0, n)) if fixed is None else fixed
-    found: list[FoundPattern] = []
+    detections: list[FoundPattern] = []
     tests: tuple[FoundPattern, ...] = ()
     excess = left = 0.0
     for step in range(most + 1):
         fit = _Fit(scattering, columns, base)
         statistic, grid, factor = fit.statistics(residual[None])
-        t, at = statistic[0], int(grid[0])
-        left = float(EXCESSES[at])
+        t, excess_index = statistic[0], int(grid[0])
+        left = float(EXCESSES[excess_index])
         drawn = np.abs(fit.statistics(scattering.draws(left))[0]).max(axis=1)
         p = (1.0 + (drawn[:, None] >= np.abs(t)[None, :] - 1e-12).sum(axis=0)) / (1.0 + len(drawn))
-        x, sizes, _ = fit.columns(at)
+        x, sizes, _ = fit.columns(excess_index)
         sizes = sizes / float(factor[0])
         alike = np.abs(x.T @ x) > ALIKE
         np.fill_diagonal(alike, val=False)
         answers = [
-            FoundPattern(one, float(t[i]), float(p[i]), float(t[i] / sizes[i]), float(1.0 / sizes[i]),
+            FoundPattern(pattern, float(t[i]), float(p[i]), float(t[i] / sizes[i]), float(1.0 / sizes[i]),
                          tuple(patterns[j] for j in np.flatnonzero(alike[i])))
-            for i, one in enumerate(patterns)
+            for i, pattern in enumerate(patterns)
         ]  # fmt: skip
         if step == 0:
             excess = left
-            tests = tuple(one for one in answers if one.standard_error > 0.0)
+            tests = tuple(test for test in answers if test.standard_error > 0.0)
         best = int(np.argmax(np.abs(t) >= (1.0 - TIED) * np.abs(t).max()))
         if p[best] >= SIGNIFICANT or step == most:
             break
-        found.append(answers[best])
+        detections.append(answers[best])
         base = np.concatenate([base, columns[[best]]])
     square = float(scattering.covariance.precision.squares(residual))
     simulated = scattering.covariance.precision.squares(scattering.draws(0.0))
     probability = (1.0 + float((simulated >= square).sum())) / (1.0 + len(simulated))
-    return FoundPatterns(tuple(found), tests, excess, left, probability)
+    return FoundPatterns(tuple(detections), tests, excess, left, probability)
 
 
 def far_off(
     residual: FloatArray, scattering: Scattering, structure: FoundPatterns
 ) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
     """(n,) residuals with the patterns found taken out, rows far from nought, the furthest first, and (n,) in sd."""
-    columns = np.array([answer.pattern.values for answer in structure.found]).reshape(-1, len(residual)).T
+    columns = np.array([answer.pattern.values for answer in structure.patterns]).reshape(-1, len(residual)).T
     rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0] if columns.size else residual
     ratio = rest / np.sqrt(scattering.covariance.diagonal + structure.excess_left**2)
     order = np.argsort(-np.abs(ratio), kind="stable")

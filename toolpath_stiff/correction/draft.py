@@ -96,16 +96,16 @@ def draft(diagnosis: Diagnosis, file: str) -> EffectDraft:
     reason = _nothing_to_describe(diagnosis)
     if reason or portrait is None:
         return EffectDraft(name, diagnosis, reason=reason)
-    asked = diagnosis.asked or Asked(diagnosis.names, diagnosis.machine.name)
+    request = diagnosis.asked or Asked(diagnosis.names, diagnosis.machine.name)
     source = (
         f"{len(diagnosis.data)} readings of {joined(list(diagnosis.names))} "
         f"(SHA-256 {data_hash(diagnosis.names)[:16]}), machine {diagnosis.machine.name}"
     )
-    drawn = asked.command("effects draft", "-o", file, *options(seed=diagnosis.seed or None))
+    drawn = request.command("effects draft", "-o", file, *options(seed=diagnosis.seed or None))
     commands = {
         "read it, change it, then try it": command_line("effects", "check", file),
-        "let it compete with the catalogue": asked.command("diagnose", effects=[file]),
-        "measure where it would show, or fail": asked.command("plan", effects=[file]),
+        "let it compete with the catalogue": request.command("diagnose", effects=[file]),
+        "measure where it would show, or fail": request.command("plan", effects=[file]),
     }
     marks = sorted(set(reading_marks(diagnosis.data).tolist()))
     origin = f"Drawn by `{drawn}` from {source}."

@@ -107,9 +107,11 @@ def _uncertainty(machine: Machine, fit: Fit, widened: float) -> Uncertainty | No
         return machine.uncertainty
     scale = widened * np.array(slopes)
     covariance = np.outer(scale, scale) * fit.covariance[np.ix_(rows, rows)]
-    found = Uncertainty.of(names, covariance)
+    uncertainty = Uncertainty.of(names, covariance)
     certain = replace(
-        found, sd=np.array([_certain(float(sd)) for sd in found.sd]), correlation=np.round(found.correlation, 9)
+        uncertainty,
+        sd=np.array([_certain(float(sd)) for sd in uncertainty.sd]),
+        correlation=np.round(uncertainty.correlation, 9),
     )
     return _beside(machine.uncertainty, certain)
 

@@ -99,7 +99,7 @@ def update(
     ['as given: 9.62 %', 'strut law refitted: 9.72 %']
     """
     files = tuple(files) or tuple(dict.fromkeys(data.file.tolist()))
-    asked = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
+    request = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
     common: dict[str, Any] = {
         "force": force, "noise": noise, "strut_spread": strut_spread, "effect_files": effect_files, "seed": seed,
         "progress": progress,
@@ -125,11 +125,11 @@ def update(
     )  # fmt: skip
     result = replace(
         result, names=files, seed=seed, machine_file=machine_file,
-        provenance=_provenance(result, files, asked.command("update", *words)),
+        provenance=_provenance(result, files, request.command("update", *words)),
     )  # fmt: skip
     if result.corrected is None:
         return result
-    return replace(result, next=_next(result.corrected, machine_file, asked, effect_files))
+    return replace(result, next=_next(result.corrected, machine_file, request, effect_files))
 
 
 def update_by_mean_error(
@@ -203,14 +203,14 @@ def _provenance(update: Update, files: Sequence[str], command: str) -> dict[str,
     }
 
 
-def _next(updated: Machine, machine_file: str, asked: Asked, effect_files: Sequence[str | Path]) -> list[str]:
+def _next(updated: Machine, machine_file: str, request: Asked, effect_files: Sequence[str | Path]) -> list[str]:
     """Commands that use the new machine; an effect that belongs to a set-up acts only where that is named."""
     model = build_model(updated, effect_files)
     setups = [name for active in model.effects if (name := setup_of(active))]
     shown = options(machine=machine_file, effects=list(effect_files), setup=setups[0] if setups else None)
     also = " (analyze, place and pose take the same options)"
     return [
-        hint("what is left", asked.command("compare", machine=machine_file)),
+        hint("what is left", request.command("compare", machine=machine_file)),
         hint(f"the stiffness over the workspace{also}", command_line("map", *shown)),
     ]
 

@@ -86,7 +86,7 @@ class Covariance:
 
     Attributes
     ----------
-    own
+    own_variance
         (n,) variance of each reading's own scatter, more than 0.
     groups, common
         Readings that scatter together, and the variance that they have in common.
@@ -94,38 +94,38 @@ class Covariance:
         (q, n) by how much one standard deviation of each shared nuisance moves each reading.
     """
 
-    own: FloatArray
+    own_variance: FloatArray
     groups: Groups
     common: float
     shared: FloatArray
 
     def __len__(self) -> int:
-        return len(self.own)
+        return len(self.own_variance)
 
     @property
     def diagonal(self) -> FloatArray:
         """(n,) variance of each reading."""
-        return np.asarray(self.own + self.common + (self.shared**2).sum(axis=0))
+        return np.asarray(self.own_variance + self.common + (self.shared**2).sum(axis=0))
 
     def dense(self) -> FloatArray:
         """(n, n), for a few readings only."""
         same = self.groups.of[:, None] == self.groups.of[None, :]
-        return np.asarray(np.diag(self.own) + self.common * same + self.shared.T @ self.shared)
+        return np.asarray(np.diag(self.own_variance) + self.common * same + self.shared.T @ self.shared)
 
     def squares(self, rows: FloatArray) -> FloatArray:
         """(...,) x V x^T of rows (..., n): variances of these combinations of readings."""
-        own = (rows**2 * self.own).sum(axis=-1) + self.common * (self.groups.sums(rows) ** 2).sum(axis=-1)
-        return np.asarray(own + ((rows @ self.shared.T) ** 2).sum(axis=-1))
+        unshared = (rows**2 * self.own_variance).sum(axis=-1) + self.common * (self.groups.sums(rows) ** 2).sum(axis=-1)
+        return np.asarray(unshared + ((rows @ self.shared.T) ** 2).sum(axis=-1))
 
     def widened(self, rows: Rows, variance: FloatArray) -> Covariance:
         """With more scatter of their own for some readings."""
-        own = self.own.copy()
-        own[rows] += variance
-        return replace(self, own=own)
+        own_variance = self.own_variance.copy()
+        own_variance[rows] += variance
+        return replace(self, own_variance=own_variance)
 
     def select(self, kept: NDArray[np.bool_] | Rows) -> Covariance:
         """Of some of the readings."""
-        return Covariance(self.own[kept], Groups.by(self.groups.of[kept]), self.common, self.shared[:, kept])
+        return Covariance(self.own_variance[kept], Groups.by(self.groups.of[kept]), self.common, self.shared[:, kept])
 
     def draw(self, rng: np.random.Generator, draws: int) -> FloatArray:
         """(draws, n) normal scatter that readings have in common, without that of each reading on its own."""
@@ -144,11 +144,11 @@ class Covariance:
 
     @cached_property
     def _inverted(self) -> tuple[Precision, float]:
-        none = np.zeros((0, len(self.own)))
-        blocks = Precision(self.own, self.groups, self.common, none, none)
+        none = np.zeros((0, len(self.own_variance)))
+        blocks = Precision(self.own_variance, self.groups, self.common, none, none)
         solved = blocks.times(self.shared)
         lower = np.linalg.cholesky(np.eye(len(self.shared)) + solved @ self.shared.T)
-        determinant = np.log(self.own).sum() + np.log1p(self.common * blocks.weights).sum()
+        determinant = np.log(self.own_variance).sum() + np.log1p(self.common * blocks.weights).sum()
         determinant += 2.0 * np.log(np.diag(lower)).sum()
         return replace(blocks, factors=np.linalg.solve(lower, solved)), float(determinant)
 
@@ -159,7 +159,7 @@ class Precision:
 
     Attributes
     ----------
-    own, groups, common
+    own_variance, groups, common
         The blocks C, as in `Covariance`.
     factors
         F (q, n).
@@ -168,19 +168,19 @@ class Precision:
         of `factors`.
     """
 
-    own: FloatArray
+    own_variance: FloatArray
     groups: Groups
     common: float
     factors: FloatArray
     fitted: FloatArray
 
     def __len__(self) -> int:
-        return len(self.own)
+        return len(self.own_variance)
 
     @cached_property
     def weights(self) -> FloatArray:
         """(groups,) sum of 1 / own over each group."""
-        return self.groups.sums(1.0 / self.own)
+        return self.groups.sums(1.0 / self.own_variance)
 
     @cached_property
     def pull(self) -> FloatArray:
@@ -193,9 +193,9 @@ class Precision:
     def _of_blocks(self, rows: FloatArray) -> FloatArray:
         """C^-1 x of rows (..., n)."""
         if self.groups.alone:
-            return rows / (self.own + self.common)
-        moved = self.pull * self.groups.sums(rows / self.own)
-        return np.asarray((rows - moved[..., self.groups.of]) / self.own)
+            return rows / (self.own_variance + self.common)
+        moved = self.pull * self.groups.sums(rows / self.own_variance)
+        return np.asarray((rows - moved[..., self.groups.of]) / self.own_variance)
 
     def times(self, rows: FloatArray) -> FloatArray:
         """(..., n) rows times the matrix."""
@@ -206,33 +206,34 @@ class Precision:
     def squares(self, rows: FloatArray) -> FloatArray:
         """(...,) of rows (..., n): each with itself."""
         flat = rows.reshape(-1, rows.shape[-1])
-        over = flat / self.own
+        over = flat / self.own_variance
         blocks = np.einsum("in,in->i", flat, over) - self.groups.sums(over) ** 2 @ self.pull
         shared = flat @ self.factors.T
         return np.asarray(blocks - np.einsum("iq,iq->i", shared, shared)).reshape(rows.shape[:-1])
 
     def products(self, rows: FloatArray) -> FloatArray:
         """(..., k, k) of rows (..., k, n): each with each of the same leading index. Cheaper than by `times`."""
-        over = rows / self.own
+        over = rows / self.own_variance
         sums = self.groups.sums(over)
         flat = rows.reshape(-1, rows.shape[-1]) @ self.factors.T
         shared = flat.reshape(*rows.shape[:-1], len(self.factors))
-        found = rows @ np.swapaxes(over, -1, -2) - (sums * self.pull) @ np.swapaxes(sums, -1, -2)
-        return np.asarray(found - shared @ np.swapaxes(shared, -1, -2))
+        blocks = rows @ np.swapaxes(over, -1, -2) - (sums * self.pull) @ np.swapaxes(sums, -1, -2)
+        return np.asarray(blocks - shared @ np.swapaxes(shared, -1, -2))
 
     @cached_property
     def diagonal(self) -> FloatArray:
         """(n,)."""
-        blocks = (1.0 - self.pull[self.groups.of] / self.own) / self.own
+        blocks = (1.0 - self.pull[self.groups.of] / self.own_variance) / self.own_variance
         return np.asarray(blocks - (self.factors**2).sum(axis=0))
 
-    def block(self, at: Rows) -> FloatArray:
+    def block(self, columns: Rows) -> FloatArray:
         """(..., k, k) some of its columns, of the same rows, for rows (..., k)."""
-        own, of, factors = self.own[at], self.groups.of[at], np.moveaxis(self.factors[:, at], 0, -2)
+        own_variance, of = self.own_variance[columns], self.groups.of[columns]
+        factors = np.moveaxis(self.factors[:, columns], 0, -2)
         same = of[..., :, None] == of[..., None, :]
-        blocks = -(same * (self.pull[of] / own)[..., None, :]) / own[..., :, None]
-        diagonal = np.arange(at.shape[-1])
-        blocks[..., diagonal, diagonal] += 1.0 / own
+        blocks = -(same * (self.pull[of] / own_variance)[..., None, :]) / own_variance[..., :, None]
+        diagonal = np.arange(columns.shape[-1])
+        blocks[..., diagonal, diagonal] += 1.0 / own_variance
         return np.asarray(blocks - np.swapaxes(factors, -1, -2) @ factors)
 
     def beside(self, fitted: FloatArray, prior: FloatArray) -> Precision:
@@ -251,8 +252,8 @@ class Precision:
         """
         group = self.groups.of[row]
         column = -(self.factors[:, row] @ self.factors)
-        column -= (self.groups.of == group) * (self.pull[group] / self.own[row]) / self.own
-        column[row] += 1.0 / self.own[row]
+        column -= (self.groups.of == group) * (self.pull[group] / self.own_variance[row]) / self.own_variance
+        column[row] += 1.0 / self.own_variance[row]
         share = variance / (1.0 + variance * float(column[row]))
         return replace(self, factors=np.concatenate([self.factors, np.sqrt(share) * column[None]])), column, share
 

@@ -35,12 +35,12 @@ def noise_doubt(problem: Problem, noise: Noise, gate: Gate, verdict: str, seed: 
     """
     if noise.name != "stated":
         return "", 1.0
-    told = 100.0 * noise.typical
+    size = 100.0 * noise.typical
     if float((gate.simulated <= gate.squares).mean()) < TOO_QUIET:
         factor = float(np.sqrt(gate.squares / np.median(gate.simulated)))
         return (
-            f"the stated noise of {told:.2g} % is too large: what the model leaves is about {factor:.2g} times what "
-            f"such a noise would leave; {factor * told:.2g} % would fit, and small effects would show"
+            f"the stated noise of {size:.2g} % is too large: what the model leaves is about {factor:.2g} times what "
+            f"such a noise would leave; {factor * size:.2g} % would fit, and small effects would show"
         ), factor
     loud = gate.probability <= ENOUGH and gate.squares_probability <= TOO_LOUD
     if not (verdict == "unexplained" or (verdict == "adequate" and loud)):
@@ -54,7 +54,7 @@ def noise_doubt(problem: Problem, noise: Noise, gate: Gate, verdict: str, seed: 
     if gate.probability <= ENOUGH:
         return "", 1.0
     return (
-        f"the stated noise of {told:.2g} % may be too small: were it {factor:.2g} times as large, {factor * told:.2g} "
+        f"the stated noise of {size:.2g} % may be too small: were it {factor:.2g} times as large, {factor * size:.2g} "
         "%, the model alone would explain the readings; repeat a few readings, re-clamped, and leave it to them"
     ), factor
 

@@ -122,10 +122,10 @@ class Forms:
 
     def __init__(self, features: Mapping[str, FloatArray], precision: Precision) -> None:
         self.names = tuple(features)
-        solved = [precision.times(one.T).T for one in features.values()]
-        self.own = [one.T @ mine for one, mine in zip(features.values(), solved, strict=True)]  # L^T A L
+        solved = [precision.times(form.T).T for form in features.values()]
+        self.grams = [form.T @ mine for form, mine in zip(features.values(), solved, strict=True)]  # L^T A L
         self.solved = np.ascontiguousarray(np.concatenate([*solved, np.zeros((len(precision), 0))], axis=1))  # A L
-        ends = np.cumsum([0, *(one.shape[1] for one in solved)])
+        ends = np.cumsum([0, *(form.shape[1] for form in solved)])
         self.slices = [slice(*pair) for pair in pairwise(ends.tolist())]
         self._drawn: tuple[FloatArray | None, FloatArray] = None, np.zeros((0, 0))
 
@@ -148,13 +148,13 @@ class Structure:
         self.removed = projected.factors[len(projected.factors) - len(self.fitted) :]  # G
         self.reached = self.fitted @ forms.solved  # G L, all forms
         inner = [self.inner(k) for k in range(len(forms.names))]
-        self.means = np.array([np.trace(one) for one in inner])
-        self.variances = np.array([max(2.0 * (one**2).sum(), 1e-300) for one in inner])
+        self.means = np.array([np.trace(gram) for gram in inner])
+        self.variances = np.array([max(2.0 * (gram**2).sum(), 1e-300) for gram in inner])
 
     def inner(self, k: int) -> FloatArray:
         """(r, r) L^T P L of form k."""
         reached = self.reached[:, self.forms.slices[k]]
-        return np.asarray(self.forms.own[k] - reached.T @ reached)
+        return np.asarray(self.forms.grams[k] - reached.T @ reached)
 
     def loads(self, residuals: FloatArray, taken: FloatArray, known: FloatArray | None = None) -> FloatArray:
         """(s, all features) L^T P (r - taken) of residuals (s, n); `known`: L^T A r."""

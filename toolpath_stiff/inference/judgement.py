@@ -303,8 +303,8 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
     if not singles or any(pair.log_evidence > least for pair in pairs):
         # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
         evidence |= {pair.names: pair.log_evidence for pair in tried}
-        triples, found = _standing(search_triples(search, bool(pairs)), evidence, fits, passes)
-        pairs, tried = [*pairs, *triples], [*tried, *found]
+        triples, tried_triples = _standing(search_triples(search, bool(pairs)), evidence, fits, passes)
+        pairs, tried = [*pairs, *triples], [*tried, *tried_triples]
     # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
     none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
     return Gates(alone, none_stands, tuple(f.name for f in singles), tuple(pairs), tuple(tried), by_name)

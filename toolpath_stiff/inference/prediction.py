@@ -111,7 +111,11 @@ class Predictor:
     def effects_that_act(self) -> list[str]:
         """Effects and instruments of the machine file that change these readings, for headings."""
         idle = idle_on(self.base, self.data)
-        return [one.effect.name for one in (*self.base.effects, *self.base.instruments) if one.effect.name not in idle]
+        return [
+            active.effect.name
+            for active in (*self.base.effects, *self.base.instruments)
+            if active.effect.name not in idle
+        ]
 
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
         """(n,) ln(N/m) that the readings should show; nan where the model has no answer.

@@ -156,7 +156,7 @@ class _Contrasts:
 
     Attributes
     ----------
-    left, own
+    left, redundancy
         (n,) M y; diagonal of M.
     reached, values
         (n, k) M Z E for eigenvectors E of Z^T M Z, and its eigenvalues (k,) that are not 0. None where every reading
@@ -190,7 +190,7 @@ class _Contrasts:
         largest = np.bincount(clamps.of).max(initial=0)  # of the eigenvalues, if nothing were projected out
         kept = values > largest * n * np.finfo(float).eps
         self.left, self.reached, self.values = left(logs)[:, 0], clamped @ vectors[:, kept], values[kept]
-        self.own = 1.0 - 1.0 / sizes[means.of] - (fixed**2).sum(axis=1)
+        self.redundancy = 1.0 - 1.0 / sizes[means.of] - (fixed**2).sum(axis=1)
         self.loads = (self.left @ self.reached) ** 2 / self.values
         self.count = int(n - means.count - fixed.shape[1])
 
@@ -204,10 +204,10 @@ class _Contrasts:
     def deviations(self, repeat: float, clamping: float) -> FloatArray:
         """(n,) how far each reading is off, in standard deviations, where it is left out itself."""
         repeat = max(repeat, 1e-12)
-        ratio, own = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if self.alone else 0.0)
+        ratio, variance = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if self.alone else 0.0)
         weights = ratio / (1.0 + ratio * self.values)
-        pull = (self.left - self.reached @ (weights * (self.left @ self.reached))) / own
-        scale = np.sqrt(np.maximum(self.own - self.reached**2 @ weights, 0.0) / own)
+        pull = (self.left - self.reached @ (weights * (self.left @ self.reached))) / variance
+        scale = np.sqrt(np.maximum(self.redundancy - self.reached**2 @ weights, 0.0) / variance)
         return np.asarray(np.abs(pull) / np.maximum(scale, 1e-12))
 
 

@@ -122,8 +122,8 @@ class SizePrior:
         out = np.full(len(sizes), -1e9)
         for sign, logs in self.log_sizes.items():
             where = sizes * sign > 0.0
-            at = np.log(np.abs(sizes[where]))
-            out[where] = np.interp(at, logs, self.log_density[sign], left=-1e9, right=-1e9) - at
+            log_size = np.log(np.abs(sizes[where]))
+            out[where] = np.interp(log_size, logs, self.log_density[sign], left=-1e9, right=-1e9) - log_size
         return out
 
     def integrate(self, sizes: FloatArray, log_likelihood: FloatArray) -> float:
@@ -136,10 +136,10 @@ class SizePrior:
         for sign, logs in self.log_sizes.items():
             fine = sign * (peak + sd * np.linspace(-6.0, 6.0, 241))
             inside = (fine > np.exp(logs[0])) & (fine < np.exp(logs[-1]))
-            at = np.unique(np.concatenate([logs, np.log(fine[inside])]))
-            likelihood = np.exp(-0.5 * ((sign * np.exp(at) - peak) / sd) ** 2)
-            values = np.exp(np.interp(at, logs, self.log_density[sign])) * likelihood
-            total += float((0.5 * (values[1:] + values[:-1]) * np.diff(at)).sum())
+            nodes = np.unique(np.concatenate([logs, np.log(fine[inside])]))
+            likelihood = np.exp(-0.5 * ((sign * np.exp(nodes) - peak) / sd) ** 2)
+            values = np.exp(np.interp(nodes, logs, self.log_density[sign])) * likelihood
+            total += float((0.5 * (values[1:] + values[:-1]) * np.diff(nodes)).sum())
         return float(np.log(max(total, 1e-300)))
 
     def log_density_around(self, size: float, sd: float) -> float:

@@ -165,7 +165,7 @@ def _other_beginnings(selection: Selection, start: Description, first: Term) -> 
         begun = selection.extended(start, entry.term)
         gain = float(selection.scores(begun).max(initial=0.0))
         outlook.append((begun.posterior + 0.5 * gain, entry, begun))
-    outlook.sort(key=lambda one: -one[0])
+    outlook.sort(key=lambda prospect: -prospect[0])
     links: dict[str, Description] = {}
     for _, entry, begun in outlook:
         links.setdefault(entry.local.link, begun)

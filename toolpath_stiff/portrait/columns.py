@@ -123,30 +123,30 @@ def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -
 
 def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
     """The same term with constants about its own: steps of a grid's spacing times `finer`."""
-    at = term.constants
-    names = set(at) - {"first", "second", "side", "power", "reference", "reach"}
+    constants = term.constants
+    names = set(constants) - {"first", "second", "side", "power", "reference", "reach"}
     if not names or term.shape == "sign":
         return []
     values = ground.values(term.variable, term.column)
     low, high = float(values.min()), float(values.max())
     step = finer * (high - low) / BUMPS
     about = np.linspace(-0.5, 0.5, 7)
-    moves = {name: at[name] + step * about for name in at if name in names}
+    moves = {name: constants[name] + step * about for name in constants if name in names}
     for name in {"width", "period"} & names:
-        spread = 0.7 if name == "width" else 0.25 * at["period"] / (high - low)
-        moves[name] = at[name] * np.exp(finer * np.linspace(-spread, spread, 7))
+        spread = 0.7 if name == "width" else 0.25 * constants["period"] / (high - low)
+        moves[name] = constants[name] * np.exp(finer * np.linspace(-spread, spread, 7))
     if "crest" in names:
-        moves["crest"] = at["crest"] + finer * at["period"] / (2 * PHASES) * about
-    begins = "from" if "from" in at else "start"
-    if "end" in at:  # where it begins; its end is a matter of scale
+        moves["crest"] = constants["crest"] + finer * constants["period"] / (2 * PHASES) * about
+    begins = "from" if "from" in constants else "start"
+    if "end" in constants:  # where it begins; its end is a matter of scale
         if begins == "start" and len(term.signs) > 1:
             return []
         moves = {begins: np.clip(moves[begins], low - step, high + step)}
     near = []
-    for constants in product(*(move.tolist() for move in moves.values())):
-        new = at | dict(zip(moves, constants, strict=True))
+    for combination in product(*(move.tolist() for move in moves.values())):
+        new = constants | dict(zip(moves, combination, strict=True))
         narrow = "width" in new and new["width"] < (high - low) / 30.0
-        turned = "end" in at and (new["end"] - new[begins]) * (at["end"] - at[begins]) <= 0.0
+        turned = "end" in constants and (new["end"] - new[begins]) * (constants["end"] - constants[begins]) <= 0.0
         if not (narrow or turned):
             near.append(replace(term, at=tuple(new.items())))
     return near
@@ -221,11 +221,11 @@ class Ground:
             return np.asarray(2.0 * self.forces[:, first] * self.forces[:, second] * (1.0 / pair_stiffness(term, path)))
         if term.action == "joint offset":
             strut, axis = (term.where or 1) - 1, "XYZ".index(term.direction)
-            at = 3 * (strut + 6 * (term.column == "platform")) + axis
-            return np.asarray(-self.compliance * self.predictor.joint_columns()[:, at])
+            index = 3 * (strut + 6 * (term.column == "platform")) + axis
+            return np.asarray(-self.compliance * self.predictor.joint_columns()[:, index])
         if term.action in ("reading factor", "reading shift"):
-            own = reading_share(plain, path)
-            return np.asarray(own * (self.compliance if term.action == "reading factor" else 1.0 / self.data.force))
+            share = reading_share(plain, path)
+            return np.asarray(share * (self.compliance if term.action == "reading factor" else 1.0 / self.data.force))
         rows = carriers(term.link, term.action, term.direction, term.where, path)
         return np.asarray((np.einsum("nkj,nj->nk", rows, self.forces) ** 2).sum(axis=1))
 
@@ -285,12 +285,12 @@ class Ground:
     def shapes(self, variable: str, column: str, signed: bool, where: int | None) -> Shapes:
         """All shapes of a variable over these readings, worked out once; of strut `where` where each has its own."""
         values = self.values(variable, column)
-        own = where if values.ndim == 2 else None
-        key = (variable, column, signed, own)
+        strut = where if values.ndim == 2 else None
+        key = (variable, column, signed, strut)
         if key not in self._shapes:
-            values = values if own is None else values[:, own - 1]
+            values = values if strut is None else values[:, strut - 1]
             named = tuple(shapes_of(variable, values, signed, column if variable == "tilt" else ""))
-            rows = [shape_values(shape, values, dict(at), signed) for shape, at in named]
+            rows = [shape_values(shape, values, dict(constants), signed) for shape, constants in named]
             self._shapes[key] = named, np.stack(rows) if rows else np.zeros((0, *values.shape))
         return self._shapes[key]
 
@@ -307,7 +307,7 @@ class Ground:
     def column(self, term: Term) -> FloatArray:
         """(n,) m/N per unit (SI) of a term's size."""
         share = self.share(term)
-        if share.ndim == 1 and any(self.values(*one).ndim == 2 for one in _asked(term)):
+        if share.ndim == 1 and any(self.values(*variable).ndim == 2 for variable in _asked(term)):
             raise ValueError(f"{term.link} has no {' or '.join(term.variables)} of its own")
         shape = self.shape(term)
         return np.asarray(self.columns(term, share, shape[None])[0])
@@ -315,8 +315,8 @@ class Ground:
 
 def _asked(term: Term) -> list[tuple[str, str]]:
     """Variables with their columns."""
-    own = [(term.variable, term.column)]
-    return own if term.times is None else [*own, (term.times.variable, term.times.column)]
+    pairs = [(term.variable, term.column)]
+    return pairs if term.times is None else [*pairs, (term.times.variable, term.times.column)]
 
 
 def _each(shape: FloatArray, term: Term) -> FloatArray:

@@ -54,7 +54,7 @@ class Local:
     where: int | None
     variables: tuple[str, ...]
     column: str = ""
-    at: Constants = ()
+    constants: Constants = ()
     side: tuple[str, ...] = ()
     crossed: tuple[str, ...] = ()
 
@@ -63,12 +63,12 @@ class Local:
         """Whether it is one of several places or channels: a joint, a vertex, the readings along one axis."""
         return self.where is not None or (self.link == "instrument" and self.direction != "reading")
 
-    def term(self, variable: str, shape: str, at: Constants, column: str = "", times: Factor | None = None) -> Term:
+    def term(
+        self, variable: str, shape: str, constants: Constants, column: str = "", times: Factor | None = None
+    ) -> Term:
         """With a variable and a shape, and a second one where there is one."""
-        column = column or self.column
-        return Term(
-            self.link, self.direction, variable, shape, self.action, self.where, (*self.at, *at), column, times=times
-        )
+        column, constants = column or self.column, (*self.constants, *constants)
+        return Term(self.link, self.direction, variable, shape, self.action, self.where, constants, column, times=times)
 
 
 def locals_of(extra: Iterable[str]) -> list[Local]:
@@ -111,16 +111,16 @@ def _of_vertices(link: str, directions: Iterable[str], variables: tuple[str, ...
     """The vertices of frame or platform, all together or one alone."""
     for direction in directions:
         for where in ALL_VERTICES:
-            own = ("constant", "load") if where else variables
-            yield Local(link, "vertex", direction, where, own, crossed=variables if where else ())
+            variables_here = ("constant", "load") if where else variables
+            yield Local(link, "vertex", direction, where, variables_here, crossed=variables if where else ())
 
 
 def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
     """Joints: they give along their strut or along a pin of their cross, resist turning, or stand off their place."""
     for where in ALL_STRUTS:
-        own = ("strut force", "force sign")
-        variables = ("constant", "load", "temperature", *own) if where else (*whole, *own, "tilt")
-        yield Local("joints", "strut", "along the struts", where, variables, crossed=(*whole, *own, "tilt"))
+        forces = ("strut force", "force sign")
+        variables = ("constant", "load", "temperature", *forces) if where else (*whole, *forces, "tilt")
+        yield Local("joints", "strut", "along the struts", where, variables, crossed=(*whole, *forces, "tilt"))
         turning = ("constant",) if where else ("constant", "load", "tilt")
         yield Local("joints", "turning", "all", where, turning, crossed=(*whole, "tilt"))
         for action, direction in product(PINS, ("radial", "tangential")):
@@ -133,13 +133,13 @@ def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
 
 def _of_struts(whole: tuple[str, ...]) -> Iterator[Local]:
     """Struts: their own share of the strut law, all together or one alone, and what couples two of them."""
-    own = (*whole[1:], "strut length", "strut force", "force sign", *PLACE)
-    yield Local("struts", "strut factor", "along the struts", None, (*own, "tilt"))
+    variables = (*whole[1:], "strut length", "strut force", "force sign", *PLACE)
+    yield Local("struts", "strut factor", "along the struts", None, (*variables, "tilt"))
     for first, second in combinations(range(1, 7), 2):
-        at = (("first", float(first)), ("second", float(second)))
-        yield Local("struts", "coupling", "along the struts", None, ("constant",), at=at)
+        constants = (("first", float(first)), ("second", float(second)))
+        yield Local("struts", "coupling", "along the struts", None, ("constant",), constants=constants)
     for where in ALL_STRUTS[1:]:
-        yield Local("one strut", "strut factor", "along the struts", where, ("constant", *own))
+        yield Local("one strut", "strut factor", "along the struts", where, ("constant", *variables))
 
 
 @dataclass(frozen=True)
@@ -150,14 +150,14 @@ class Entry:
     variable: str
     column: str
     shape: str
-    at: Constants
+    constants: Constants
     log_prior: float
     times: Factor | None = None
 
     @property
     def term(self) -> Term:
         """The term."""
-        return self.local.term(self.variable, self.shape, self.at, self.column, self.times)
+        return self.local.term(self.variable, self.shape, self.constants, self.column, self.times)
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,8 @@ def dictionary_of(ground: Ground) -> Dictionary:
                 kinds = Counter(shape for shape, _ in named)
                 log = prior.place(local, variable) - float(np.log(len(kinds) * len(columns)))
                 entries += [
-                    Entry(local, variable, column, shape, at, log - float(np.log(kinds[shape]))) for shape, at in named
+                    Entry(local, variable, column, shape, constants, log - float(np.log(kinds[shape])))
+                    for shape, constants in named
                 ]
                 limits += [limit] * len(named)
                 signs += [signed] * len(named)
@@ -279,8 +280,8 @@ def crossed(term: Term, ground: Ground) -> list[Entry]:
             continue
         signed, log = len(local.term("constant", "offset", ()).signs) > 1, prior.place(local, term.variable)
         entries += [
-            Entry(local, term.variable, term.column, shape, at, log, term.times)
-            for shape, at in _translated(term, signed, ground)
+            Entry(local, term.variable, term.column, shape, constants, log, term.times)
+            for shape, constants in _translated(term, signed, ground)
         ]
     return entries
 
@@ -298,7 +299,7 @@ def products(term: Term, ground: Ground) -> list[Term]:
             continue
         for column in columns_of(variable, ground, local.link == "joints"):
             named = ground.shapes(variable, column, False, local.where)[0]
-            factors = (Factor(variable, shape, at, column) for shape, at in named if shape != "periodic")
+            factors = (Factor(variable, shape, constants, column) for shape, constants in named if shape != "periodic")
             terms += [replace(term, times=factor) for factor in factors]
     return terms
 
@@ -315,7 +316,7 @@ def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Con
     values = ground.values(term.variable, term.column)
     low, high = float(values.min()), float(values.max())
     if term.shape == "slope":  # a straight line to both sides: up or down over the range
-        return [("slope", (("start", one), ("end", other))) for one, other in ((low, high), (high, low))]
+        return [("slope", (("start", start), ("end", end))) for start, end in ((low, high), (high, low))]
     if "side" in constants and not signed:  # more on one side is less on the other
         return [
             (term.shape, tuple((name, side if name == "side" else value) for name, value in term.at))

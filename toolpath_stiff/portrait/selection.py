@@ -158,8 +158,9 @@ class Selection:
         part, slopes = self.problem.predictor.strut_part_and_slopes(laws)
         added = np.einsum("gp,gpn->gn", size, columns) * self.compliance
         compliance = np.maximum(part + self.rest + added, 0.1 * self.compliance)
-        own = -columns * (self.compliance / compliance)[:, None]
-        return self.problem.observed + np.log(compliance), np.concatenate([-slopes / compliance[:, None], own], axis=1)
+        size_slopes = -columns * (self.compliance / compliance)[:, None]
+        jacobian = np.concatenate([-slopes / compliance[:, None], size_slopes], axis=1)
+        return self.problem.observed + np.log(compliance), jacobian
 
     def limits(self, terms: Sequence[Term], scale: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(p,) each, of scaled sizes."""
@@ -324,7 +325,9 @@ class Selection:
             if not near:
                 return best
             factors = [Factor(term.variable, term.shape, term.at, term.column) for term in near]
-            best, i = self._likelier(before, others, [replace(best.terms[-1], times=one) for one in factors], best)
+            best, i = self._likelier(
+                before, others, [replace(best.terms[-1], times=factor) for factor in factors], best
+            )
             second = second if i is None else near[i]
         return best
 

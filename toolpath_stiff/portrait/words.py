@@ -99,8 +99,8 @@ def _cause_in_link(term: Term) -> str:
         return f"the {term.link} {TIPS[term.direction]} under the load's moment"
     along = GIVES[term.direction]
     if term.link in ("tool", "platform"):
-        own = {"X": "along the platform's X", "Y": "along the platform's Y", "radial": "across the tool axis"}
-        along = own.get(term.direction, along)
+        axes = {"X": "along the platform's X", "Y": "along the platform's Y", "radial": "across the tool axis"}
+        along = axes.get(term.direction, along)
     return f"the {term.link} gives way {along}"
 
 
@@ -112,7 +112,7 @@ def _with(term: Term, signed: bool) -> str:
         return f" in set-up {term.column}"
     if term.variable == "force sign":
         return " in tension" if term.constants["side"] > 0.0 else " in compression"
-    at = term.constants
+    constants = term.constants
     name, si, unit = SAID.get(term.variable, (term.variable, 1.0, ""))
     if term.variable == "tilt" and term.column:
         name = f"the swing of the {term.column}s" if term.column in SWINGS else f"the lean towards {term.column}"
@@ -123,37 +123,41 @@ def _with(term: Term, signed: bool) -> str:
     if term.shape == "slope":
         return _slope_words(term, name, shown, signed)
     if term.shape == "square":
-        return f", with the square of {name} from {shown(at['centre'])}, in full {shown(at['reach'])} from there"
+        centre, reach = shown(constants["centre"]), shown(constants["reach"])
+        return f", with the square of {name} from {centre}, in full {reach} from there"
     if term.shape == "bump":
-        return f" where {name} is about {shown(at['centre'])} (to some {shown(2.0 * at['width'])} either side)"
+        centre, width = shown(constants["centre"]), shown(2.0 * constants["width"])
+        return f" where {name} is about {centre} (to some {width} either side)"
     if term.shape == "periodic":
-        return f" in a wave over {name} with a period of {shown(at['period'])}"
+        return f" in a wave over {name} with a period of {shown(constants['period'])}"
     return _threshold_words(term, name, shown)
 
 
 def _slope_words(term: Term, name: str, shown: Callable[[float], str], signed: bool) -> str:
     """A straight line or a power of a variable, in words."""
-    at = term.constants
-    if "power" in at:
-        fading = "less" if at["power"] < 0.0 else "more"
-        return f", {fading} with {name} (power {at['power']:.2g}, the size given at {shown(at['reference'])})"
+    constants = term.constants
+    if "power" in constants:
+        fading = "less" if constants["power"] < 0.0 else "more"
+        reference = shown(constants["reference"])
+        return f", {fading} with {name} (power {constants['power']:.2g}, the size given at {reference})"
+    start, end = shown(constants["start"]), shown(constants["end"])
     if signed:
-        return f" in a straight line with {name}, nothing at {shown(at['start'])} and in full at {shown(at['end'])}"
-    side = "above" if at["end"] > at["start"] else "below"
-    return f" where {name} is {side} {shown(at['start'])}, in full at {shown(at['end'])}"
+        return f" in a straight line with {name}, nothing at {start} and in full at {end}"
+    side = "above" if constants["end"] > constants["start"] else "below"
+    return f" where {name} is {side} {start}, in full at {end}"
 
 
 def _threshold_words(term: Term, name: str, shown: Callable[[float], str]) -> str:
     """A step, a line from a value on, or what friction holds, in words."""
-    at = term.constants
-    if "from" in at:
-        side = "above" if at["end"] > at["from"] else "below"
-        return f" where {name} is {side} {shown(at['from'])}, in full at {shown(at['end'])}"
-    if "within" in at:
-        return f" until {name} reaches {shown(at['within'])}, and no further"
-    if "beyond" in at:
-        return f" as far as {name} is above {shown(at['beyond'])}, which friction holds"
-    return f" where {name} is {'above' if at['side'] > 0.0 else 'below'} {shown(at['edge'])}"
+    constants = term.constants
+    if "from" in constants:
+        side = "above" if constants["end"] > constants["from"] else "below"
+        return f" where {name} is {side} {shown(constants['from'])}, in full at {shown(constants['end'])}"
+    if "within" in constants:
+        return f" until {name} reaches {shown(constants['within'])}, and no further"
+    if "beyond" in constants:
+        return f" as far as {name} is above {shown(constants['beyond'])}, which friction holds"
+    return f" where {name} is {'above' if constants['side'] > 0.0 else 'below'} {shown(constants['edge'])}"
 
 
 def size_words(sized: Sized) -> str:

@@ -100,7 +100,9 @@ class StrutHistory:
     @property
     def sentences(self) -> list[str]:
         """Strut by strut: changes or none, and tension against compression where they differ."""
-        texts = [(one.text, one.sides.text if one.sides and one.sides.p < SURE else "") for one in self.struts]
+        texts = [
+            (strut.text, strut.sides.text if strut.sides and strut.sides.p < SURE else "") for strut in self.struts
+        ]
         return [text for both in texts for text in both if text]
 
 
@@ -141,8 +143,8 @@ def _strut(series: Series, scatter: DateScatter, readings: StrutReadings, sides:
     n, name = len(series.day), series.name.replace(" alone", "")
     rows = readings.strut == series.name
     ln = series.mean if n else readings.log_stiffness[rows]
-    found, wild = changes_of(series.day, series.mean, scatter)
-    changes = [_change(change, readings.text) for change in found]
+    raw_changes, wild = changes_of(series.day, series.mean, scatter)
+    changes = [_change(change, readings.text) for change in raw_changes]
     sentences = [f"{name} {change.text}" for change in changes]
     sentences += [f"{name}: {readings.text(day)} stands out alone: measure again" for day in wild]
     slope = sd = least = None

@@ -41,10 +41,10 @@ BACKWARDS = 3.0  # times a reading of the wrong sign, so that its logarithm exis
 
 def loop_of(text: str) -> MeasuringLoop:
     """The loop that a cell names. Raises `InputError`."""
-    found = measuring_loop(text)
-    if found is None:
+    loop = measuring_loop(text)
+    if loop is None:
         raise MeasurementError(f"loop {text!r}", expected=WORDS)
-    return found
+    return loop
 
 
 @dataclass(frozen=True)

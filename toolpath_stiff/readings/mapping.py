@@ -136,12 +136,12 @@ def _refuse_other_form(table: Table, cells: Sequence[str]) -> None:
     forms = _forms(cells)
     if not forms or all(is_date(cell) for cell in cells):
         return
-    found = next(cell for cell in cells if not is_date(cell))
+    foreign_date = next(cell for cell in cells if not is_date(cell))
     heading = table.sources[DATE].heading if DATE in table.sources else DATE
     sources = {**table.sources, DATE: Source(heading, forms[0])}
     doubt = f"{' or '.join(forms)}? " if len(forms) > 1 else ""
     raise MeasurementError(
-        f"date {found!r}",
+        f"date {foreign_date!r}",
         expected=EXPECTED,
         hint=doubt + to_write(replace(table, sources=sources), ()),
         file=table.file,
@@ -163,8 +163,8 @@ def to_write(table: Table, needed: Sequence[str]) -> str:
         for i, heading in enumerate(table.heading)
         if heading and heading not in used
     }
-    told = [name for name in HELD if name in (DATE, *needed)]
-    lacking = [name for name in (*told, *needed) if name not in (*entries, *table.heading)]
+    known_by_cells = [name for name in HELD if name in (DATE, *needed)]
+    lacking = [name for name in (*known_by_cells, *needed) if name not in (*entries, *table.heading)]
     for name in dict.fromkeys(lacking):
         fits = {heading: _fit(name, heading, cells) for heading, cells in free.items()}
         heading = max(fits, key=lambda heading: fits[heading], default="")
@@ -208,8 +208,11 @@ def _unit(table: Table, name: str, heading: str, cells: Sequence[str]) -> str:
     """The unit that stands below or in a heading, else the column's own; of dates their form."""
     if name == DATE:
         return "" if all(is_date(cell) for cell in cells) else next(iter(_forms(cells)), "")
-    own = unit_of(name)
-    return next((unit for unit in (table.units.get(heading, ""), unit_of(heading)) if same_quantity(unit, own)), own)
+    column_unit = unit_of(name)
+    return next(
+        (unit for unit in (table.units.get(heading, ""), unit_of(heading)) if same_quantity(unit, column_unit)),
+        column_unit,
+    )
 
 
 def _forms(cells: Sequence[str]) -> list[str]:

@@ -60,12 +60,12 @@ def pose_warnings(
     for i in range(len(position)):
         where = f"pose {_shown(position[i], angles[i])}"
         if not index[i] >= SINGULAR:
-            found = f"{where} is singular: the struts cannot hold the platform"
+            mistake = f"{where} is singular: the struts cannot hold the platform"
         elif stiffness[i].min() <= 0.0:
-            found = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
+            mistake = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
         else:
             continue
-        errors.append(MeasurementError(found, hint="check the pose's unit", file=places[i][0], line=places[i][1]))
+        errors.append(MeasurementError(mistake, hint="check the pose's unit", file=places[i][0], line=places[i][1]))
     if errors:
         raise InputErrors(errors)
     stand = reach(machine, position, struts, rotation)

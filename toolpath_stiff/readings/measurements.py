@@ -447,8 +447,8 @@ def mechanical_stiffness(
     """
     if data.beside is None:
         return np.asarray(1.0 / exact.compliance_along(model, path, data.direction, equilibrium))
-    found = loop_compliance(model, path, data.direction, data.beside.loops, data.beside.which)
-    joined = data.beside.joined(found)
+    compliance = loop_compliance(model, path, data.direction, data.beside.loops, data.beside.which)
+    joined = data.beside.joined(compliance)
     return np.asarray(1.0 / np.where(joined > 0.0, joined, np.nan))
 
 

@@ -65,8 +65,8 @@ def ends_without_drift(
     bounds = [0, *((start + end) // 2 + 1 for start, end in pairwise(turns)), len(drive)]
     means = []
     for turn, start, stop in zip(turns, bounds[:-1], bounds[1:], strict=True):
-        at = start + np.flatnonzero(np.abs(drive[start:stop] - drive[turn]) <= same)
-        means.append((force[at].mean(), deflection[at].mean()))
+        rows = start + np.flatnonzero(np.abs(drive[start:stop] - drive[turn]) <= same)
+        means.append((force[rows].mean(), deflection[rows].mean()))
     second = np.diff(np.array(means), 2, axis=0)
     signs = np.where(drive[turns[1:-1]] < drive[turns[0:-2]], 1.0, -1.0)
     force_between, deflection_between = (0.5 * (signs[:, None] * second).mean(axis=0)).tolist()

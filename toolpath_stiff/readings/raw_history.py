@@ -22,28 +22,30 @@ OF_ONE_SIDE = ", which its lost motion blurs in records of one side alone"
 
 def struts_over_dates(figures: Sequence[LoopFigures]) -> StrutHistory:
     """Struts measured alone over their dates; those of several lengths by length, as a strut's stiffness varies."""
-    alone = [one for one in figures if one.loop.jog is None]
+    alone = [record for record in figures if record.loop.jog is None]
     lengths: dict[str, set[str]] = {}
-    for one in alone:
-        lengths.setdefault(one.loop.strut, set()).add(one.loop.place.get("length_mm", ""))
+    for record in alone:
+        lengths.setdefault(record.loop.strut, set()).add(record.loop.place.get("length_mm", ""))
 
-    def name(one: LoopFigures) -> str:
-        length = one.loop.place.get("length_mm")
-        return f"{one.loop.strut}, {length} mm" if len(lengths[one.loop.strut]) > 1 and length else one.loop.strut
+    def name(record: LoopFigures) -> str:
+        length = record.loop.place.get("length_mm")
+        return (
+            f"{record.loop.strut}, {length} mm" if len(lengths[record.loop.strut]) > 1 and length else record.loop.strut
+        )
 
     def readings(rows: list[tuple[LoopFigures, float, float]]) -> StrutReadings:
         return StrutReadings(
-            np.array([name(one) for one, _, _ in rows], dtype=str),
-            np.array([day_of(one.loop.date) for one, _, _ in rows]),
+            np.array([name(record) for record, _, _ in rows], dtype=str),
+            np.array([day_of(record.loop.date) for record, _, _ in rows]),
             np.log([stiffness for _, stiffness, _ in rows]),
             np.array([side for _, _, side in rows]),
-            short_dates(one.loop.date for one, _, _ in rows),
+            short_dates(record.loop.date for record, _, _ in rows),
         )
 
-    alone = [one for one in alone if not one.standstill]
-    judged = {strut: _judged([one for one in alone if one.loop.strut == strut]) for strut in lengths}
-    compared = [(one, *_compared(one, judged[one.loop.strut])) for one in alone]
-    slopes = [(one, k, side) for one in alone for k, side in ((one.tension, 1.0), (one.compression, -1.0))]
+    alone = [record for record in alone if not record.standstill]
+    judged = {strut: _judged([record for record in alone if record.loop.strut == strut]) for strut in lengths}
+    compared = [(record, *_compared(record, judged[record.loop.strut])) for record in alone]
+    slopes = [(record, k, side) for record in alone for k, side in ((record.tension, 1.0), (record.compression, -1.0))]
     slopes = [row for row in slopes if math.isfinite(row[1])]
     over_time, struts = history(readings(compared), readings(slopes or compared)), []
     for strut in over_time.struts:
@@ -56,27 +58,27 @@ def struts_over_dates(figures: Sequence[LoopFigures]) -> StrutHistory:
 
 def _judged(figures: Sequence[LoopFigures]) -> str:
     """What all records of a strut can be compared by."""
-    recorded = [one for one in figures if len(one.loop.force)]
+    recorded = [record for record in figures if len(record.loop.force)]
     if not recorded:
         return ""
-    both = [one for one in recorded if not one.side]
-    play = any(one.plays for one in both)
+    both = [record for record in recorded if not record.side]
+    play = any(record.plays for record in both)
     if len(recorded) == len(figures):
         # The side that every record has, where some have no other.
-        sides = {one.side for one in recorded}
-        if len(sides) == 2 and 0.0 in sides and all(math.isfinite(one.tension) for one in both):
+        sides = {record.side for record in recorded}
+        if len(sides) == 2 and 0.0 in sides and all(math.isfinite(record.tension) for record in both):
             return (IN_TENSION if 1.0 in sides else IN_COMPRESSION) + (OF_ONE_SIDE if play else "")
-        if play and all(math.isfinite(one.beyond) for one in figures):
+        if play and all(math.isfinite(record.beyond) for record in figures):
             return BEYOND
     return BLURRED if play else SECANT
 
 
-def _compared(one: LoopFigures, judged: str) -> tuple[float, float]:
+def _compared(record: LoopFigures, judged: str) -> tuple[float, float]:
     """Stiffness in N/m by which a record is compared with others, and the side on which that is."""
     if judged == BEYOND:
-        return one.beyond, one.side
-    if judged.startswith(IN_TENSION) and not one.side:
-        return one.tension, 1.0
-    if judged.startswith(IN_COMPRESSION) and not one.side:
-        return one.compression, -1.0
-    return one.stiffness, one.side
+        return record.beyond, record.side
+    if judged.startswith(IN_TENSION) and not record.side:
+        return record.tension, 1.0
+    if judged.startswith(IN_COMPRESSION) and not record.side:
+        return record.compression, -1.0
+    return record.stiffness, record.side

@@ -257,7 +257,7 @@ def read_stiffnesses(table: Table) -> tuple[list[KnownStiffness], list[str]]:
         return KnownStiffness(loop, stiffness, math.nan if failed else optional_number(record, STIFFNESS[1]))
 
     struts, errors = parsed_rows(table, strut)
-    failed = [one.loop.line for one in struts if math.isnan(one.stiffness)]
+    failed = [row.loop.line for row in struts if math.isnan(row.stiffness)]
     many = f"{len(failed)} of {len(table.rows)} rows with a stiffness within {SOFTEST:g} N/mm of zero"
     if len(failed) > FAILED * len(table.rows):
         first = next(table.record(cells) for line, cells in table.rows if line == failed[0])[STIFFNESS[0]]
@@ -269,7 +269,7 @@ def read_stiffnesses(table: Table) -> tuple[list[KnownStiffness], list[str]]:
         raise InputErrors(errors)
     if len(failed) == len(struts):
         raise MeasurementError("no rows below the heading", file=file, line=table.heading_line)
-    return [one for one in struts if not math.isnan(one.stiffness)], notes
+    return [row for row in struts if not math.isnan(row.stiffness)], notes
 
 
 def _record(line: int, record: dict[str, str]) -> RawRecord:

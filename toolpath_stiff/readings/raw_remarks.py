@@ -21,9 +21,9 @@ def remarks(figures: Sequence[LoopFigures], history: StrutHistory) -> Iterator[s
     yield from _standstills(figures)
     yield from _replaced(figures)
     beyond = {strut.strut for strut in history.struts if strut.judged_on == BEYOND}
-    playing = [one for one in figures if one.plays and one.loop.strut in beyond]
+    playing = [record for record in figures if record.plays and record.loop.strut in beyond]
     if playing:
-        most = max(playing, key=lambda one: one.elastic / one.stiffness)
+        most = max(playing, key=lambda record: record.elastic / record.stiffness)
         yield (
             f"{len(playing)} loops show lost motion; the rows of their struts hold the slope beyond it, their own "
             f"stiffness. The secant is at most {100.0 * (1.0 - most.stiffness / most.elastic):.2g} % less: "
@@ -33,10 +33,10 @@ def remarks(figures: Sequence[LoopFigures], history: StrutHistory) -> Iterator[s
     if both:
         yield f"tension and compression differ: a row of each side for {', '.join(both)}"
     softer: dict[str, dict[bool, str]] = {}  # strut -> in tension or not -> where first
-    for one in figures:
-        if max(one.tension, one.compression) > OTHER_SIDE * min(one.tension, one.compression):
-            where = softer.setdefault(one.loop.strut, {})
-            where.setdefault(one.tension < one.compression, one.loop.date or f"line {one.loop.line}")
+    for record in figures:
+        if max(record.tension, record.compression) > OTHER_SIDE * min(record.tension, record.compression):
+            where = softer.setdefault(record.loop.strut, {})
+            where.setdefault(record.tension < record.compression, record.loop.date or f"line {record.loop.line}")
     for strut, where in softer.items():
         if len(where) > 1:
             yield (
@@ -53,7 +53,7 @@ def remarks(figures: Sequence[LoopFigures], history: StrutHistory) -> Iterator[s
 
 def _standstills(figures: Sequence[LoopFigures]) -> Iterator[str]:
     """A note where indicators stood still while the force went on."""
-    stood = [(one.loop.title, still) for one in figures if (still := one.standstill)]
+    stood = [(record.loop.title, still) for record in figures if (still := record.standstill)]
     if stood:
         title, (displacement, start, end) = stood[0]
         others = f"; so in {len(stood) - 1} further loops" if len(stood) > 1 else ""
@@ -66,7 +66,7 @@ def _standstills(figures: Sequence[LoopFigures]) -> Iterator[str]:
 
 def _replaced(figures: Sequence[LoopFigures]) -> Iterator[str]:
     """Notes where a strut's serial number changes."""
-    loops = [one.loop for one in figures if one.loop.serial]
+    loops = [record.loop for record in figures if record.loop.serial]
     for strut in sorted({loop.strut for loop in loops}):
         dated = sorted((day_of(loop.date), loop.date, loop.serial) for loop in loops if loop.strut == strut)
         for (_, last, before), (_, first, after) in pairwise(dated):
@@ -79,5 +79,5 @@ def _replaced(figures: Sequence[LoopFigures]) -> Iterator[str]:
 
 def sided(figures: Sequence[LoopFigures], history: StrutHistory) -> set[str]:
     """Struts that differ in tension and compression and whose loops all say so: rows of both would not be alike."""
-    lacking = {one.loop.strut for one in figures if math.isnan(one.tension)}
-    return {one.strut for one in history.struts if one.sides is not None and one.sides.p < SURE} - lacking
+    lacking = {record.loop.strut for record in figures if math.isnan(record.tension)}
+    return {strut.strut for strut in history.struts if strut.sides is not None and strut.sides.p < SURE} - lacking

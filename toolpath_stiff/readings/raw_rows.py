@@ -64,27 +64,29 @@ def measurement_csv(reduced: Sequence[LoopFigures], history: StrutHistory) -> st
     both_sides = sided(reduced, history)
     mixed = {strut.strut for strut in history.struts if strut.judged_on != BEYOND}
     figures: list[LoopFigures] = []
-    for one in reduced:
-        if one.loop.strut in both_sides:
-            figures.append(replace(one, stiffness=one.tension, force=float(one.loop.force.max())))
-            figures.append(replace(one, stiffness=one.compression, force=float(one.loop.force.min())))
+    for record in reduced:
+        if record.loop.strut in both_sides:
+            figures.append(replace(record, stiffness=record.tension, force=float(record.loop.force.max())))
+            figures.append(replace(record, stiffness=record.compression, force=float(record.loop.force.min())))
         else:
-            figures.append(replace(one, stiffness=one.stiffness if one.loop.strut in mixed else one.elastic))
-    loops = [one.loop for one in figures]
+            figures.append(
+                replace(record, stiffness=record.stiffness if record.loop.strut in mixed else record.elastic)
+            )
+    loops = [record.loop for record in figures]
     # Of struts alone only columns with something in them.
     alone = all(loop.jog is None for loop in loops)
     place = [n for n in PLACE if any(loop.place.get(n) if alone else n in loop.place for loop in loops)]
     forces = sorted({_force_column(loop) for loop in loops})
     conditions = [name for name in CONDITIONS if all(name in loop.conditions for loop in loops)]
-    shown = [_shop_figures(one) for one in figures]
+    shown = [_shop_figures(record) for record in figures]
     further = [name for name in shown[0] if all(math.isfinite(numbers[name]) for numbers in shown)]
     rows = []
-    for one, numbers in zip(figures, shown, strict=True):
-        force = f"{one.force:.2f}" if math.isfinite(one.force) else ""
-        cells = [one.loop.place.get(name, "") for name in place]
-        cells += [f"{n_per_mm_from_n_per_m(one.stiffness):.1f}"]
-        cells += [force if name == _force_column(one.loop) else "" for name in forces]
-        cells += [f"{one.loop.conditions[name]:.6g}" for name in conditions]
+    for record, numbers in zip(figures, shown, strict=True):
+        force = f"{record.force:.2f}" if math.isfinite(record.force) else ""
+        cells = [record.loop.place.get(name, "") for name in place]
+        cells += [f"{n_per_mm_from_n_per_m(record.stiffness):.1f}"]
+        cells += [force if name == _force_column(record.loop) else "" for name in forces]
+        cells += [f"{record.loop.conditions[name]:.6g}" for name in conditions]
         rows.append([*cells, *(f"{numbers[name] + 0.0:.3f}" for name in further)])
     return csv_text([*place, "stiffness_N_per_mm", *forces, *conditions, *further], rows)
 

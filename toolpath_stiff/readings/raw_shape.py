@@ -76,17 +76,18 @@ class Shape:
 
     def __str__(self) -> str:
         """A sentence with N and N/mm; "" where a straight line will do."""
-        one, other = (f"{1e-3 * slope:,.0f} N/mm" for slope in (self.first, self.second))
+        first, second = (f"{1e-3 * slope:,.0f} N/mm" for slope in (self.first, self.second))
         if self.kind == "sticking":
             return (
-                f"sticks after the load has turned and breaks away at {self.force:.3g} N: {one} before, {other} after"
+                f"sticks after the load has turned and breaks away at {self.force:.3g} N: "
+                f"{first} before, {second} after"
             )
         if self.kind == "kink":
             what = "closes" if self.first < self.second else "slips"
-            return f"{what} at {self.force:.3g} N: {one} below, {other} above"
+            return f"{what} at {self.force:.3g} N: {first} below, {second} above"
         if self.kind == "sides":
             side = "softer" if self.first < self.second else "stiffer"
-            return f"{side} in tension than in compression: {one} against {other}"
+            return f"{side} in tension than in compression: {first} against {second}"
         return ""
 
 
@@ -113,8 +114,8 @@ def shape_of(force: FloatArray, deflection: FloatArray, ways: Sequence[slice], w
     straight = _left([f], y, constants)[0]
     best, chance, squares = Shape(lost=lost), SURE, {"": straight}
     least: dict[str, float] = {}
-    for kind, at, one, other in tried:
-        left, found_slopes = _left([one, other], y, constants)
+    for kind, position, first_column, second_column in tried:
+        left, found_slopes = _left([first_column, second_column], y, constants)
         first, second = found_slopes[-2:]
         slopes = (abs(1.0 / first), abs(1.0 / second)) if first * second > 0.0 else (0.0, 0.0)
         if left >= least.get(kind, np.inf) or not max(slopes) >= TELLING * min(slopes) > 0.0:
@@ -125,9 +126,9 @@ def shape_of(force: FloatArray, deflection: FloatArray, ways: Sequence[slice], w
         least[kind] = left
         # A kink's force is fitted, too: one more figure than its two slopes.
         more = 1 if kind == "sides" else 2
-        found = _chance(straight, left, more, len(f) - len(ways) - 1 - more) * len(tried)
-        if found < chance:
-            best, chance, squares[kind] = Shape(kind, at, slopes[0], slopes[1], lost), found, left
+        probability = _chance(straight, left, more, len(f) - len(ways) - 1 - more) * len(tried)
+        if probability < chance:
+            best, chance, squares[kind] = Shape(kind, position, slopes[0], slopes[1], lost), probability, left
             of_sides = best if kind == "sides" else of_sides
     # On one way alone, sticking that breaks away near zero force looks like two sides, which has no force to fit.
     if of_sides is not None and best is not of_sides:
@@ -184,8 +185,8 @@ def play_of(force: FloatArray, deflection: FloatArray, way: FloatArray) -> Play:
     friction = way[inside, None] * np.stack([np.ones_like(f), f**2], axis=1)
     others = [np.ones_like(f), np.flatnonzero(inside).astype(float), *friction.T]
     before = _left(lines, y, others)[0]
-    after, found = _left([np.sign(f), *lines], y, others)
-    size = 2.0 * float(found[-3])
+    after, coefficients = _left([np.sign(f), *lines], y, others)
+    size = 2.0 * float(coefficients[-3])
     telling = size >= APART * float(np.ptp(deflection))
     return Play(size, telling and _chance(before, after, 1, len(f) - len(others) - 3) < SURE)
 
@@ -195,14 +196,18 @@ def _averaged(
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
     """Force, deflection and number of its way, at most `MOST` values of all ways, means of runs."""
     most = MOST // len(ways)
-    found: list[list[FloatArray]] = []
+    runs: list[list[FloatArray]] = []
     for way in ways:
         both = [force[way], deflection[way]]
         if len(both[0]) > most:
-            both = [np.array([run.mean() for run in np.array_split(one, most)]) for one in both]
-        found.append(both)
-    which = np.repeat(np.arange(len(ways)), [len(one) for one, _ in found])
-    return np.concatenate([one for one, _ in found]), np.concatenate([other for _, other in found]), which
+            both = [np.array([run.mean() for run in np.array_split(values, most)]) for values in both]
+        runs.append(both)
+    which = np.repeat(np.arange(len(ways)), [len(forces) for forces, _ in runs])
+    return (
+        np.concatenate([forces for forces, _ in runs]),
+        np.concatenate([deflections for _, deflections in runs]),
+        which,
+    )
 
 
 Tried = tuple[str, float, FloatArray, FloatArray]
@@ -216,31 +221,34 @@ def _sticking(force: FloatArray, which: NDArray[np.int64]) -> list[Tried]:
     way = np.abs(force - starts[which])
     steps = np.sort(way)
     forces = _between(np.unique(steps[A_SIDE - 1 : 1 - A_SIDE]))
-    return [("sticking", 0.5 * at, sign * np.minimum(way, at), sign * np.maximum(way - at, 0.0)) for at in forces]
+    return [
+        ("sticking", 0.5 * position, sign * np.minimum(way, position), sign * np.maximum(way - position, 0.0))
+        for position in forces
+    ]
 
 
 def _kinks(force: FloatArray) -> list[Tried]:
     """Kinks alike on both sides of zero: what lies below them, and above them."""
-    found: list[Tried] = []
-    for at in _between(np.unique(np.abs(force))):
-        below = np.clip(force, -at, at)
-        if min((np.abs(force) < at).sum(), (np.abs(force) > at).sum()) >= A_SIDE:
-            found.append(("kink", at, below, force - below))
-    return found
+    kinks: list[Tried] = []
+    for position in _between(np.unique(np.abs(force))):
+        below = np.clip(force, -position, position)
+        if min((np.abs(force) < position).sum(), (np.abs(force) > position).sum()) >= A_SIDE:
+            kinks.append(("kink", position, below, force - below))
+    return kinks
 
 
 def _between(steps: FloatArray) -> list[float]:
     """Forces between rising steps, `POSITIONS` in each gap: a kink seldom lies where a record was taken."""
     shares = (np.arange(POSITIONS) + 0.5) / POSITIONS
-    return sorted({float(at) for at in (steps[:-1, None] + np.diff(steps)[:, None] * shares).ravel()})
+    return sorted({float(position) for position in (steps[:-1, None] + np.diff(steps)[:, None] * shares).ravel()})
 
 
 def _left(columns: list[FloatArray], y: FloatArray, others: list[FloatArray]) -> tuple[float, FloatArray]:
     """Squares that least squares leave beside the others, and the coefficients, theirs first."""
     design = np.stack([*others, *columns], axis=1)
     scale = np.abs(design).max(axis=0)
-    found = np.linalg.lstsq(design / scale, y, rcond=None)[0] / scale
-    return float(((y - design @ found) ** 2).sum()), found
+    coefficients = np.linalg.lstsq(design / scale, y, rcond=None)[0] / scale
+    return float(((y - design @ coefficients) ** 2).sum()), coefficients
 
 
 def _chance(before: float, after: float, more: int, freedom: int) -> float:

@@ -228,9 +228,9 @@ def changes_of(day: FloatArray, ln: FloatArray, scatter: DateScatter) -> tuple[l
         days = float(day[0]), float(day[-1])
         return [Change(kind, days, ends, sd * float(np.ptp(years)), p, slope)], []
     places = np.array(_places(len(day)))
-    at = int(places[int(np.argmax(step))])
-    before, wild_before = changes_of(day[:at], ln[:at], scatter)
-    after, wild_after = changes_of(day[at:], ln[at:], scatter)
+    place = int(places[int(np.argmax(step))])
+    before, wild_before = changes_of(day[:place], ln[:place], scatter)
+    after, wild_after = changes_of(day[place:], ln[place:], scatter)
     # The fewest places that hold 95 % of the probability, all places alike beforehand.
     order = np.argsort(-weights, kind="stable")
     held = np.cumsum(weights[order]) / weights.sum()
@@ -238,8 +238,8 @@ def changes_of(day: FloatArray, ln: FloatArray, scatter: DateScatter) -> tuple[l
     change = Change(
         "step",
         (float(day[likely[0] - 1]), float(day[likely[-1]])),
-        (float(ln[:at].mean()), float(ln[at:].mean())),
-        scatter.sd * (1.0 / at + 1.0 / (len(day) - at)) ** 0.5,
+        (float(ln[:place].mean()), float(ln[place:].mean())),
+        scatter.sd * (1.0 / place + 1.0 / (len(day) - place)) ** 0.5,
         p,
     )
     return [*before, change, *after], [*wild_before, *wild_after]
@@ -261,7 +261,7 @@ def _shapes(day: FloatArray) -> FloatArray:
     """(n, m): every step as 0 and 1, and last the drift from 0 to 1, less their means."""
     order = np.arange(len(day))
     shapes = np.stack(
-        [*((order >= at).astype(float) for at in _places(len(day))), (day - day[0]) / (day[-1] - day[0])], axis=1
+        [*((order >= place).astype(float) for place in _places(len(day))), (day - day[0]) / (day[-1] - day[0])], axis=1
     )
     return np.asarray(shapes - shapes.mean(axis=0))
 
