@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.comparison.residuals import Label, Variable
+    from toolpath_stiff.comparison.residuals import ReadingNames, Variable
     from toolpath_stiff.comparison.summary import PatternTest
 
 
@@ -46,8 +46,8 @@ WIDE = 7.5  # median deviations, some 5 standard deviations: readings further of
 def variables_png(comparison: Comparison) -> Figure:
     """PNG: residual against each variable, the strongest first; readings far off stand at the edge."""
     limits = _limits(comparison)
-    panels: list[tuple[float, str, Variable | Label]] = []
-    held_against: list[Variable | Label] = [*comparison.numbers, *comparison.names]
+    panels: list[tuple[float, str, Variable | ReadingNames]] = []
+    held_against: list[Variable | ReadingNames] = [*comparison.numbers, *comparison.names]
     for variable in held_against:
         tests = [t for t in comparison.summary.tests if _about(t, variable.name)]
         p = min((t.p_adjusted for t in tests), default=1.0)
@@ -116,7 +116,7 @@ def _key(figure: object, comparison: Comparison) -> None:
         )  # fmt: skip
 
 
-def _panel(axes: Axes, comparison: Comparison, variable: Variable | Label, limits: tuple[float, float]) -> None:
+def _panel(axes: Axes, comparison: Comparison, variable: Variable | ReadingNames, limits: tuple[float, float]) -> None:
     """Points by direction; a trend line a direction, or the means of levels."""
     residual, along = deviation_percent(comparison.residual), directions(comparison.data)
     x, names = _places(variable)
@@ -135,7 +135,7 @@ def _panel(axes: Axes, comparison: Comparison, variable: Variable | Label, limit
     _name_levels(axes, names)
 
 
-def _places(variable: Variable | Label) -> tuple[FloatArray, list[str]]:
+def _places(variable: Variable | ReadingNames) -> tuple[FloatArray, list[str]]:
     """Where the readings stand across a panel, and the names of the levels there, if it has any."""
     if variable.values.dtype.kind == "f":
         return np.asarray(variable.values, dtype=float), []
