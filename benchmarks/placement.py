@@ -28,12 +28,12 @@ from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.fronts import apart
-from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
+from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.placing import place_program
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.rows import FIGURES
-from toolpath_stiff.placement.task import Task
+from toolpath_stiff.placement.task import PlacementTask
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import closed_form
 from toolpath_stiff.stiffness.model import build_model
@@ -84,7 +84,7 @@ def placed(program: ReadProgram, step: float = 2e-3) -> Placement:
         raise AssertionError("no program here goes to machine coordinates")
 
     present = program.origin
-    return place_program(Task(MODEL, program, present, read, BOUNDS, SearchRules(), LOAD, step, 1000.0))
+    return place_program(PlacementTask(MODEL, program, present, read, BOUNDS, SearchRules(), LOAD, step, 1000.0))
 
 
 def kept(program: ReadProgram) -> tuple[str, bool]:
@@ -148,7 +148,7 @@ def against_grid(name: str) -> tuple[str, bool]:
     whole, few = (Evaluator(MODEL, part, LOAD, 1000.0) for part in (path, representative_path(path, GRID_SAMPLES)))
     best = np.array(found.best.origin)
     now = whole.figures(np.array([program.origin]))
-    rules = Rules(0.01, float(now.extrapolated[0]))
+    rules = PlacementRules(0.01, float(now.extrapolated[0]))
     ours, ours_few = (evaluator.figures(best[None]).objectives[0] for evaluator in (whole, few))
     grid = grid_placements()
     figures = few.figures(grid)
@@ -197,7 +197,7 @@ def ends(program: ReadProgram) -> tuple[str, bool]:
     path = work_path(program, ENDS_STEP, LOAD, program.origin)
     whole = Evaluator(MODEL, path, LOAD, 1000.0)
     now = whole.figures(np.array([program.origin]))
-    rules = Rules(0.01, float(now.extrapolated[0]) if now.margin[0] >= 0.0 else np.inf)
+    rules = PlacementRules(0.01, float(now.extrapolated[0]) if now.margin[0] >= 0.0 else np.inf)
     points = BOUNDS.placements(qmc.Sobol(len(BOUNDS.free), seed=7).random(SOBOL))
     figures = whole.figures(points)
     short = []

@@ -32,7 +32,7 @@ from toolpath_stiff.planning.result import plan
 from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.tables import TABLES, tables_of
 from toolpath_stiff.readings.measurements import read_measurements
-from toolpath_stiff.rig.case import Case, again, draw_case
+from toolpath_stiff.rig.case import DrawnCase, again, draw_case
 from toolpath_stiff.rig.exercise import csv_text, read_plan
 
 POSES = 6
@@ -117,7 +117,7 @@ def _needed(folder: Path, files: list[str]) -> int:
     return len(files)
 
 
-def _measured(case: Case, planned: RivalPlan, visit: int, file: Path, number: int) -> str:
+def _measured(case: DrawnCase, planned: RivalPlan, visit: int, file: Path, number: int) -> str:
     """A visit measured on the case's machine, as a file."""
     rows = plan_rows(planned.visits, [visit])
     for row in rows:

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.case import Case, clamp_of, rows_of
+from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
 from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.sizes import Covariance, scale_of
+from toolpath_stiff.rig.sizes import NuisanceCovariance, scale_of
 
 STEP = 0.05  # relative change of a parameter, for differences
 
 
-def shows_beside(case: Case) -> list[float]:
+def shows_beside(case: DrawnCase) -> list[float]:
     """Detectability of each hidden effect beside strut law, nuisances and the sizes of all other hidden effects.
 
     The whitened length of what taking the effect away changes, once the best that the others can do about it has been
@@ -42,7 +42,9 @@ def shows_beside(case: Case) -> list[float]:
         free = np.stack([one for i, own in enumerate(columns) if i != k for one in own], axis=1)
         free = free / np.maximum(np.sqrt(np.mean(free**2, axis=0)), 1e-12)  # as unknown as 100 %: free
         found.append(
-            Covariance(known.clamps, np.concatenate([known.spread, free], axis=1), case.nuisances).length(change)
+            NuisanceCovariance(known.clamps, np.concatenate([known.spread, free], axis=1), case.nuisances).length(
+                change
+            )
         )
     return found
 

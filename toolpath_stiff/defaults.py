@@ -51,11 +51,11 @@ def usable_cpus() -> int:
     return os.cpu_count() or 1
 
 
-def job_count(asked: int | None, items: int) -> int:
-    """Processes for so many items: as asked, else one a CPU. Raises `InputError` for fewer than one."""
-    if asked is not None and asked < 1:
-        raise InputError(f"--jobs {asked}", expected="1 or more")
-    return max(1, min(asked or usable_cpus(), items))
+def job_count(jobs: int | None, items: int) -> int:
+    """Processes for so many items: `jobs`, else one a CPU. Raises `InputError` for fewer than one."""
+    if jobs is not None and jobs < 1:
+        raise InputError(f"--jobs {jobs}", expected="1 or more")
+    return max(1, min(jobs or usable_cpus(), items))
 
 
 def one_thread() -> None:

@@ -101,8 +101,8 @@ class Asked:
     strut_spread: float = defaults.STRUT_SPREAD
     columns: str | None = None
 
-    def command(self, name: str, *own: str, machine: str | None = None, effects: Sequence[str] = ()) -> str:
-        """`tps name` on the same data with the same options; `own` words of that command come after the machine.
+    def command(self, name: str, *further: str, machine: str | None = None, effects: Sequence[str] = ()) -> str:
+        """`tps name` on the same data with the same options; `further` words of that command come after the machine.
 
         `name` may be two words, "effects draft". `machine` is another one, `effects` are further files.
         """
@@ -111,7 +111,7 @@ class Asked:
             *name.split(),
             *self.data,
             *options(columns=self.columns, machine=chosen if chosen != defaults.MACHINE else None),
-            *own,
+            *further,
             *options(effects=[*self.effects, *effects], noise=self._noise()),
             *options(strut_spread=percent(self.strut_spread) if self.strut_spread != defaults.STRUT_SPREAD else None),
         )

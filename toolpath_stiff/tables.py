@@ -260,8 +260,8 @@ def _score(cells: Sequence[str], columns: Columns) -> int:
     """How many cells of a row are headings."""
     known = keys((*columns.numbers, *columns.texts))
     mapped = {source.heading for source in columns.sources.values()}
-    found = {heading_key(cell) for cell in cells if cell and cell not in mapped}
-    return sum(key in known or meant(key, known) is not None for key in found) + len(mapped & {*cells} - {""})
+    headings = {heading_key(cell) for cell in cells if cell and cell not in mapped}
+    return sum(key in known or meant(key, known) is not None for key in headings) + len(mapped & {*cells} - {""})
 
 
 def _is_unit_row(cells: Sequence[str], heading: Sequence[str]) -> bool:
@@ -284,10 +284,10 @@ def _named(
             name, doubt = _name(cell, below, known)
             taken = doubt is not None and doubt.name in columns.sources
             doubts += [doubt] if doubt and not taken else []
-        elif own := unit_of(name):
+        elif column_unit := unit_of(name):
             stated = (columns.sources[name].unit, UNITS.get(heading_key(below), ""), unit_of(cell))
-            unit = next((unit for unit in stated if same_quantity(unit, own)), own)
-            scales[i] = (unit, own)
+            unit = next((unit for unit in stated if same_quantity(unit, column_unit)), column_unit)
+            scales[i] = (unit, column_unit)
         heading.append(name)
     return heading, scales, doubts
 

@@ -146,9 +146,9 @@ class TomlReader:
         name = re.sub(r"[ \t'\"]", "", heading[1]) if heading else ""
         return name if name.partition(".")[0] in self.data else ""  # else a row of an array, as [-25.4]
 
-    def error(self, found: str, expected: str = "", hint: str = "", where: str = "") -> InputError:
+    def error(self, mistake: str, expected: str = "", hint: str = "", where: str = "") -> InputError:
         """An error at the line of the dotted name `where`."""
-        return self.kind(found, expected=expected, hint=hint, file=self.file, line=self.line_at(where))
+        return self.kind(mistake, expected=expected, hint=hint, file=self.file, line=self.line_at(where))
 
     def only(self, where: str, table: Mapping[str, Any], known: Iterable[str], of: str = "") -> None:
         """Refuse a key of a table that is not known; `of` ends the sentence."""

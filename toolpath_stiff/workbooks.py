@@ -21,8 +21,8 @@ SAVE_AS = "save it as .xlsx or CSV"
 
 def split_name(path: str) -> tuple[str, str]:
     """File and sheet of `FILE.xlsx#SHEET`; a file that has the whole name comes first."""
-    found = re.fullmatch(r"(.+\.xls[xm])#(.+)", path, re.IGNORECASE)
-    return (path, "") if found is None or os.path.lexists(path) else (found[1], found[2])
+    parts = re.fullmatch(r"(.+\.xls[xm])#(.+)", path, re.IGNORECASE)
+    return (path, "") if parts is None or os.path.lexists(path) else (parts[1], parts[2])
 
 
 def is_workbook(content: bytes) -> bool:
@@ -120,9 +120,9 @@ def _refuse_formulas(cells: list[list[Any]], written: Any, file: str) -> None:
     for line, row in enumerate(written.iter_rows(), 1):
         for column, cell in enumerate(row):
             if cell.data_type == "f" and cells[line - 1][column] is None:
-                found = f"cell {cell.coordinate} holds the formula {cell.value!s} without a stored value"
+                mistake = f"cell {cell.coordinate} holds the formula {cell.value!s} without a stored value"
                 hint = "open and save the workbook in Excel once, or save it as CSV"
-                errors.append(TableError(found, hint=hint, file=file, line=line))
+                errors.append(TableError(mistake, hint=hint, file=file, line=line))
     if errors:
         raise InputErrors(errors)
 

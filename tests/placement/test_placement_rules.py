@@ -25,7 +25,7 @@ from toolpath_stiff.path import place
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.fronts import apart
-from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
+from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.linear_programmes import least_costs
 from toolpath_stiff.placement.paths import representative_path, work_path
@@ -301,7 +301,7 @@ def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt
     bounds = Bounds(np.array([-0.3, -0.3, 0.4, -lean, -lean, 0]), np.array([0.3, 0.3, 1.25, lean, lean, 2 * np.pi]))
     evaluator, rules, goal = (
         Evaluator(MODEL, path, TANGENTIAL, 1000.0),
-        Rules(0.01),
+        PlacementRules(0.01),
         Goal(OBJECTIVES[objective], NO_FLOORS),
     )
 
@@ -361,7 +361,7 @@ def test_a_climb_ends_no_lower_than_nelder_mead():
 
     path = representative_path(work_path(program_of("pocket"), 5e-3, TANGENTIAL, PRESENT), 150)
     evaluator = Evaluator(MODEL, path, TANGENTIAL, 1000.0)
-    climber = Climber(evaluator, README_BOUNDS, Rules(0.01))
+    climber = Climber(evaluator, README_BOUNDS, PlacementRules(0.01))
     goal = Goal(OBJECTIVES["balanced"], NO_FLOORS)
     for first in ([0.1, 0.05, 0.9, 0, 0, 1.0], [-0.05, 0.1, 1.0, 0, 0, 4.0]):
         ours = climber.climb(np.array([first], dtype=float), goal, 40)[0]

@@ -12,7 +12,7 @@ import pytest
 from tests.browser import needs_browser, run_in
 from tests.report.test_report_page import EVIL, Page
 from toolpath_stiff.report.batch.index import batch_page
-from toolpath_stiff.report.batch.outcomes import Outcome, summary_csv, terminal_summary
+from toolpath_stiff.report.batch.outcomes import ProgramOutcome, summary_csv, terminal_summary
 from toolpath_stiff.report.pages import script_hash
 
 
@@ -23,11 +23,11 @@ def outcome(name, low, mean, high, **more):
         "range_N_per_mm": None if high is None else high - low, "weakest_line": 3, "weakest_text": "G1 X1",
         "out_of_reach_samples": 0, "extrapolated_share": 0.0, "warnings": 0, "not_acted_upon": 0, **more,
     }  # fmt: skip
-    return Outcome(name, f"/jobs/{name}", "", f"{name.removesuffix('.nc')}/report.html", figures)
+    return ProgramOutcome(name, f"/jobs/{name}", "", f"{name.removesuffix('.nc')}/report.html", figures)
 
 
 SOFT, STIFF = outcome("p10.nc", 20e3, 30e3, 60e3), outcome("p9.nc", 40e3, 50e3, 100e3)
-BAD = Outcome("bad.nc", "/jobs/bad.nc", "/jobs/bad.nc:3:1: G77 is not known")
+BAD = ProgramOutcome("bad.nc", "/jobs/bad.nc", "/jobs/bad.nc:3:1: G77 is not known")
 
 
 def bars(text):
@@ -118,7 +118,7 @@ def test_failures_have_their_reason_and_no_row():
 
 @pytest.mark.parametrize("name", [EVIL, 'a"b.nc', "ä ü%20#?.nc", "\udcff.nc", "$1{{headline}}.nc", "<b>.nc"])
 def test_names_are_text_and_links_lead_to_their_folder(name):
-    text = batch_page([outcome(name, 1e3, 2e3, 3e3, weakest_text=EVIL), Outcome("b", "b", f"b: {EVIL}")])
+    text = batch_page([outcome(name, 1e3, 2e3, 3e3, weakest_text=EVIL), ProgramOutcome("b", "b", f"b: {EVIL}")])
     page = Page(text)
     (link,) = [attrs["href"] for tag, attrs in page.elements if tag == "a"]
     assert unquote(link, errors="surrogateescape") == f"{name.removesuffix('.nc')}/report.html"

@@ -14,7 +14,7 @@ from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import OUTSIDE, Nuisances, disturb_readings
 from toolpath_stiff.rig.nominal import load_nominal, reachable
-from toolpath_stiff.rig.sizes import Covariance
+from toolpath_stiff.rig.sizes import NuisanceCovariance
 
 NIST = load_nominal("nist")
 
@@ -127,7 +127,7 @@ def test_whitened_length_against_the_dense_covariance():
     dense = 0.02**2 * np.eye(100) + 0.01**2 * (clamps[:, None] == clamps) + spread @ spread.T
     expected = np.sqrt(x @ np.linalg.solve(dense, x))
     # The dense matrix has a condition number of 1e6.
-    assert Covariance(clamps, spread, Nuisances()).length(x) == pytest.approx(expected, rel=1e-8)
+    assert NuisanceCovariance(clamps, spread, Nuisances()).length(x) == pytest.approx(expected, rel=1e-8)
 
 
 def test_strut_spread_and_joint_errors_over_many_machines():

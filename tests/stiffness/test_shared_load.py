@@ -133,7 +133,7 @@ def test_one_pass_was_too_stiff_by_several_per_cent():
             wrench = np.array([[*along, 0.0, 0.0, 0.0]])[..., None]
             forces = exact.respond(path, exact.assemble_links(linear, path), wrench)[1][0, :, 0] * 500.0
             struts = exact.assemble_links(linear, path).strut + 4e-6 / np.abs(forces)
-            links = exact.Links(struts, None, exact.assemble_links(linear, path).parallel)
+            links = exact.AssembledLinks(struts, None, exact.assemble_links(linear, path).parallel)
             once = 1.0 / (exact.respond(path, links, wrench)[0][0, :3, 0] @ along)
             worst = max(worst, once / stiffness(model, i, along, 500.0) - 1.0)
     assert 0.03 < worst < 0.2

@@ -13,7 +13,7 @@ from tests.effects.cases import all_effects
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.inference import candidates
-from toolpath_stiff.inference.candidates import Candidate, Component, Table, candidates_of, tabulate
+from toolpath_stiff.inference.candidates import Candidate, CandidateTable, Component, candidates_of, tabulate
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.size_priors import EXPECTED, VISIBLE, SizePrior
@@ -30,13 +30,13 @@ def problem(layout: str = "tilted") -> Problem:
 
 
 @cache
-def tables(name: str) -> tuple[Table, ...]:
+def tables(name: str) -> tuple[CandidateTable, ...]:
     """The effect's tables in the tilted campaign."""
     found = (tabulate(c, problem().predictor, np.zeros(2)) for c in candidates_of(EFFECTS[name], campaign(11)[0]))
     return tuple(table for table in found if table is not None)
 
 
-def added(table: Table, sizes: np.ndarray) -> np.ndarray:
+def added(table: CandidateTable, sizes: np.ndarray) -> np.ndarray:
     """(n,) m/N by the model itself."""
     predictor = problem().predictor
     logs = predictor.log_stiffness((0.0, 0.0), [table.candidate.active(sizes)])
@@ -153,7 +153,7 @@ def test_effects_without_their_columns_are_named_with_what_they_lack():
 # -- prior of the size ---------------------------------------------------------------------------------------------
 
 
-def priors() -> Iterator[tuple[str, Table, int, SizePrior]]:
+def priors() -> Iterator[tuple[str, CandidateTable, int, SizePrior]]:
     for name in ("weak_strut", "gauge_scale", "tool_length_error", "platform_flexibility", "spindle_compliance"):
         table = tables(name)[0]
         for j in range(len(table.candidate.components)):
@@ -187,12 +187,12 @@ def test_mean_likelihood_is_the_integral_over_the_prior():
             assert prior.log_mean_likelihood(peak, sd) == pytest.approx(np.log(total), abs=0.02), name
 
 
-def linear_table(per_unit: float, unit: float = 1.0) -> Table:
+def linear_table(per_unit: float, unit: float = 1.0) -> CandidateTable:
     """One parameter, linear, its unit chosen freely: the same physics in other units."""
     declared = Parameter("a", "", 1.0, (0.0, 1e6 * unit), (0.01 * unit, 0.1 * unit), "made for a test")
     column = per_unit / unit * problem().base_compliance[:, None]
     column = column * np.linspace(0.0, 1.0, len(column))[:, None]
-    return Table(Candidate(EFFECTS["joint_compliance"], (), (Component.of(declared),)), column, dict)
+    return CandidateTable(Candidate(EFFECTS["joint_compliance"], (), (Component.of(declared),)), column, dict)
 
 
 def test_the_unit_of_a_parameter_does_not_matter():

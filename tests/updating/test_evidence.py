@@ -27,7 +27,7 @@ from tests.updating.cases import (
     readings_by_hand,
     simple_noise,
 )
-from toolpath_stiff.inference.candidates import Table, candidates_of, tabulate
+from toolpath_stiff.inference.candidates import CandidateTable, candidates_of, tabulate
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Problem
 from toolpath_stiff.inference.hypotheses import probabilities, score_families, score_family
 from toolpath_stiff.inference.quadrature import score_single
@@ -60,7 +60,7 @@ def by_hand(logs: FloatArray, outliers: float = 0.0, scale: float = 1.0) -> Prob
     return Problem(predictor, Scatter.of(simple_noise(COUNT, scale * 0.02, outliers=outliers), spread))
 
 
-def table_of(problem: Problem, name: str) -> Table:
+def table_of(problem: Problem, name: str) -> CandidateTable:
     (candidate,) = candidates_of(find_effect(name), problem.predictor.data)
     table = tabulate(candidate, problem.predictor, np.zeros(2))
     assert table is not None
@@ -209,7 +209,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 
 
 @cache
-def one_table() -> Table:
+def one_table() -> CandidateTable:
     return table_of(by_hand(logs_by_hand()), "joint_compliance")
 
 

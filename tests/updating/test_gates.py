@@ -17,8 +17,8 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.gates import (
     DRAWS,
     Forms,
+    FormStatistics,
     Gate,
-    Structure,
     absolute_gate,
     largest_gain,
     set_wild_aside,
@@ -154,7 +154,7 @@ def test_structure_of_pure_noise_surprises_no_one():
     law = problem.law_jacobian(np.zeros(2), problem.base_compliance)
     projected = problem.projected(law)
     draws = simulator_of(4, 1000)
-    structure = Structure(forms, projected)
+    structure = FormStatistics(forms, projected)
     tails = np.exp(-structure.surprises(structure.loads(draws, np.zeros_like(draws))))
     for column, name in zip(tails.T, forms.names, strict=True):
         assert 0.02 < np.mean(column < 0.05) < 0.08, name

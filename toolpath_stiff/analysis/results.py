@@ -220,14 +220,14 @@ def analyze(
     direction = parse_load(load) if isinstance(load, str) else load
     place_at, source = _effective_origin(model.machine, program, origin)
     samples = sample_moves(place(program.moves, place_at), step, model.machine.rapid_feed, place_at)
-    at = evaluate(
+    evaluation = evaluate(
         model, samples.position, samples.abc, samples.tangent, samples.tool_length, direction, force, progress
     )
     tool_given = not np.isnan(samples.tool_length[samples.cutting]).any()
-    warnings = [*program.warnings, *condition_warnings(model, tool_given), *_warnings(samples, at)]
+    warnings = [*program.warnings, *condition_warnings(model, tool_given), *_warnings(samples, evaluation)]
     analysis = Analysis(
         program=program, model=model, origin=place_at, origin_source=source, load=direction, force=force, step=step,
-        samples=samples, at=at, warnings=warnings,
+        samples=samples, at=evaluation, warnings=warnings,
     )  # fmt: skip
     _check_reach(analysis, partial)
     return analysis
@@ -249,17 +249,17 @@ def _effective_origin(machine: Machine, program: ReadProgram, origin: Pose | Non
     return chosen, source
 
 
-def _warnings(samples: Samples, at: Evaluation) -> list[str]:
+def _warnings(samples: Samples, evaluation: Evaluation) -> list[str]:
     """What the evaluation itself has to say."""
     warnings = []
-    rapids = ~samples.cutting & ~at.reachable
+    rapids = ~samples.cutting & ~evaluation.reachable
     if rapids.any():
         first = int(np.argmax(rapids))
         warnings.append(
             f"line {samples.line[first]}: {int(rapids.sum())} samples of rapid moves are out of reach, first "
-            f"{describe_pose(samples, first)}: {at.reach.describe(first)}"
+            f"{describe_pose(samples, first)}: {evaluation.reach.describe(first)}"
         )
-    swapped = samples.cutting & at.substituted
+    swapped = samples.cutting & evaluation.substituted
     if swapped.any():
         lines = np.unique(samples.line[swapped])
         warnings.append(
@@ -285,7 +285,7 @@ def describe_pose(samples: Samples, i: int) -> str:
 
 def _check_reach(analysis: Analysis, partial: bool) -> None:
     """Refuse a program that cuts nothing, or, unless `partial`, whose cuts leave the machine's reach."""
-    samples, at = analysis.samples, analysis.at
+    samples, evaluation = analysis.samples, analysis.at
     if not samples.cutting.any():
         raise ProgramError(
             "no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=analysis.program.name
@@ -300,7 +300,7 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
         hint += "; if the program was posted for another machine, name it with [kinematics] in a controller file"
     raise UnreachableError(
         f"{int(bad.sum())} of {int(samples.cutting.sum())} cutting samples are out of reach, first "
-        f"{describe_pose(samples, first)}: {at.reach.describe(first)}",
+        f"{describe_pose(samples, first)}: {evaluation.reach.describe(first)}",
         hint=hint,
         file=analysis.program.name,
         line=int(samples.line[first]),

@@ -347,16 +347,16 @@ def describe_sample(path: EvaluatedPath, row: int) -> dict[str, Any]:
 
 def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, AnyArray]:
     """Column name -> values in the shop's units, for some rows."""
-    at = path.at
-    names = np.array([limit.name for limit in at.limits] or ["none"])
+    evaluation = path.at
+    names = np.array([limit.name for limit in evaluation.limits] or ["none"])
     moving = (path.samples.motion[rows] != RAPID) & path.samples.tangent[rows].any(axis=1)
     return {
         **path_columns(path.samples, rows),
-        "stiffness_N_per_mm": n_per_mm_from_n_per_m(at.stiffness[rows]),
-        "deflection_um": um_from_m(path.force / at.stiffness[rows]),
-        **{f"strut{i + 1}_mm": mm_from_m(at.strut_lengths[rows, i]) for i in range(6)},
-        "margin": at.margin[rows],
-        "margin_limit": names[at.limit[rows]],
+        "stiffness_N_per_mm": n_per_mm_from_n_per_m(evaluation.stiffness[rows]),
+        "deflection_um": um_from_m(path.force / evaluation.stiffness[rows]),
+        **{f"strut{i + 1}_mm": mm_from_m(evaluation.strut_lengths[rows, i]) for i in range(6)},
+        "margin": evaluation.margin[rows],
+        "margin_limit": names[evaluation.limit[rows]],
         "operation": path.operations.of_move[path.samples.move[rows]] + 1,
         "cut": np.where(moving, np.where(path.along_axis[rows], "plunge", "across"), ""),  # whatever the load
     }

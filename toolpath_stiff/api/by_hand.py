@@ -27,16 +27,16 @@ class Preview:
     <Machine nist: 6 struts, weak_strut>
     """
 
-    def __init__(self, asked: Question) -> None:
+    def __init__(self, question: Question) -> None:
         from toolpath_stiff.inference.evidence import Problem
         from toolpath_stiff.inference.noise import noise_models
         from toolpath_stiff.inference.prediction import Predictor
 
-        data = asked.readings
+        data = question.readings
         # Under the noise that a diagnosis writes out in full.
-        noise = max(noise_models(data, asked.noise, asked.strut_spread), key=lambda noise: noise.typical)
-        self._problem = Problem.of(Predictor(asked.model, data, asked.on.effect_files), noise)
-        self._on = asked.on
+        noise = max(noise_models(data, question.noise, question.strut_spread), key=lambda noise: noise.typical)
+        self._problem = Problem.of(Predictor(question.model, data, question.on.effect_files), noise)
+        self._on = question.on
         self._near: tuple[Mapping[str, Mapping[str, Any]], Fit] | None = None
 
     def machine(self, effects: Mapping[str, Mapping[str, Any]]) -> Machine:
@@ -91,9 +91,9 @@ class Preview:
 
     def _fit_near(self, effects: Mapping[str, Mapping[str, Any]]) -> Fit:
         """The fit beside these effects; the last one is kept."""
-        asked = {name: dict(keys) for name, keys in effects.items()}
-        if self._near is None or self._near[0] != asked:
-            self._near = (asked, self._fit(asked))
+        wanted = {name: dict(keys) for name, keys in effects.items()}
+        if self._near is None or self._near[0] != wanted:
+            self._near = (wanted, self._fit(wanted))
         return self._near[1]
 
     def _fit(self, effects: Mapping[str, Mapping[str, Any]], law_free: bool = True, near: Fit | None = None) -> Fit:
@@ -114,7 +114,9 @@ class Preview:
             effect = find_effect(entry.name, self._problem.predictor.effect_files)
             values = read_parameters(effect, entry, "by hand")
             real = tuple(Component.of(parameter) for parameter in effect.parameters if not parameter.discrete)
-            choice = tuple((one.name, values[one.name]) for one in effect.parameters if one.discrete)
+            choice = tuple(
+                (parameter.name, values[parameter.name]) for parameter in effect.parameters if parameter.discrete
+            )
             candidates.append(Candidate(effect, choice, real))
             sizes.append(np.array([component.size(values[component.parameter.name]) for component in real]))
         if near is not None:
@@ -137,10 +139,10 @@ def with_effects(
     from toolpath_stiff.stiffness.model import build_model
 
     entries, given = _entries(effects), machine.model.given or machine.model.machine
-    read = [one for one in entries if find_effect(one.name, machine.effect_files).is_instrument]
+    read = [entry for entry in entries if find_effect(entry.name, machine.effect_files).is_instrument]
     added = given.with_changes(
         strut_law=strut_law or given.strut_law,
-        effects=(*given.effects, *(one for one in entries if one not in read)),
+        effects=(*given.effects, *(entry for entry in entries if entry not in read)),
         instruments=(*given.instruments, *read),
     )
     model = build_model(added, machine.effect_files, conditions=machine.model.conditions)

@@ -86,19 +86,19 @@ def update(
     from toolpath_stiff.correction.update import update as update_machine
     from toolpath_stiff.stiffness.model import build_model
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
-    on = asked.on
+    question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
+    on = question.on
 
     def opened(corrected: MachineModel) -> Machine:
         model = replace(build_model(corrected, on.effect_files), unchecked=on.model.unchecked)
         return Machine(model, on.asked, on.effect_files, allow_unchecked_effects=on.allow_unchecked_effects)
 
     corrected = update_machine(
-        asked.model, asked.readings, [add] if isinstance(add, str) else list(add), strut_law=strut_law,
-        keep_strut_law=keep_strut_law, auto=auto, force=force, objective=objective, files=asked.files,
-        machine_file=str(machine_file), asked=asked.asked, progress=teller(progress), **asked.common,
+        question.model, question.readings, [add] if isinstance(add, str) else list(add), strut_law=strut_law,
+        keep_strut_law=keep_strut_law, auto=auto, force=force, objective=objective, files=question.files,
+        machine_file=str(machine_file), asked=question.request, progress=teller(progress), **question.common,
     )  # fmt: skip
-    return replace(corrected, inputs=asked.inputs, opened=opened)
+    return replace(corrected, inputs=question.inputs, opened=opened)
 
 
 @checked
@@ -176,13 +176,13 @@ def plan(
     from toolpath_stiff.planning.result import plan as plan_visits
     from toolpath_stiff.planning.result import usual_menu
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
+    question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     minutes = {name: float(value) for name, value in (minutes or {}).items()}
     for name, value in minutes.items():
         one_of("minutes", name, COSTS)
         if not value >= 0.0:
             raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
-    line = asked.asked.command(
+    line = question.request.command(
         "plan",
         *options(
             between=_word(between or None), n=n, radius=_word(radius_mm), heights=_word(heights_mm),
@@ -191,7 +191,7 @@ def plan(
             indicators=indicators,
         ),
     )  # fmt: skip
-    readings = None if asked.data is None else asked.readings
+    readings = None if question.data is None else question.readings
     menu = usual_menu(readings).with_options(
         radius=None if radius_mm is None else m_from_mm(radius_mm),
         heights=_in_metres(heights_mm),
@@ -204,9 +204,9 @@ def plan(
     )
     judgement = None if diagnosis is None else diagnosis.main
     proposal = plan_visits(
-        asked.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **asked.common
+        question.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **question.common
     )
-    return replace(proposal, names=asked.files, line=line, inputs=asked.inputs)
+    return replace(proposal, names=question.files, line=line, inputs=question.inputs)
 
 
 def _cost(text: str) -> tuple[str, float]:

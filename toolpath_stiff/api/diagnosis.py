@@ -179,7 +179,7 @@ class Question:
         self.seed = seed
         self.files = self.data.files if self.data else ()
         columns = self.data.columns if self.data else None
-        self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread, columns)
+        self.request = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread, columns)
         self.inputs = (*self.files, *self.on.inputs)
 
     @property
@@ -275,10 +275,10 @@ def compare(
     """
     from toolpath_stiff.comparison.compare import compare as compare_readings
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
+    question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     teller(progress)("comparing")
-    comparison = compare_readings(asked.model, asked.readings, asked=asked.asked, **asked.common)
-    return replace(comparison, inputs=asked.inputs)
+    comparison = compare_readings(question.model, question.readings, asked=question.request, **question.common)
+    return replace(comparison, inputs=question.inputs)
 
 
 @checked
@@ -330,23 +330,25 @@ def diagnose(
     from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
     from toolpath_stiff.placement.case_study import case_study_program
 
-    asked = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
+    question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     part = None if program is None else program_from(program)
-    origin, conditions = origin_si(origin_mm_deg), asked.on.running(part).conditions
-    own = options(
+    origin, conditions = origin_si(origin_mm_deg), question.on.running(part).conditions
+    circumstances = options(
         program=None if part is None else part.file,
         origin=None if origin is None else origin_word(origin),
-        setup=asked.on.setup,
-        temperature=asked.on.temperature_C,
+        setup=question.on.setup,
+        temperature=question.on.temperature_C,
         seed=seed or None,
     )
-    found = replace(
-        diagnose_readings(asked.model, asked.readings, names=asked.files, progress=teller(progress), **asked.common),
-        line=asked.asked.command("diagnose", *own, *(part.words if part else ())),
-        asked=asked.asked,
-        inputs=(*asked.inputs, *(part.inputs if part else ())),
+    diagnosis = replace(
+        diagnose_readings(
+            question.model, question.readings, names=question.files, progress=teller(progress), **question.common
+        ),
+        line=question.request.command("diagnose", *circumstances, *(part.words if part else ())),
+        asked=question.request,
+        inputs=(*question.inputs, *(part.inputs if part else ())),
     )
-    if found.verdict != "ambiguous":
-        return found
-    moves = case_study_program() if part is None else part.moves(origin, asked.model.default_origin)
-    return replace(found, path=choice_on_path(found, moves, origin, conditions))
+    if diagnosis.verdict != "ambiguous":
+        return diagnosis
+    moves = case_study_program() if part is None else part.moves(origin, question.model.default_origin)
+    return replace(diagnosis, path=choice_on_path(diagnosis, moves, origin, conditions))

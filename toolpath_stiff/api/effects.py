@@ -144,8 +144,8 @@ def draft_effect(
             progress=teller(progress),
             **question.common,
         ),
-        line=question.asked.command("diagnose", *options(seed=seed or None)),
-        asked=question.asked,
+        line=question.request.command("diagnose", *options(seed=seed or None)),
+        asked=question.request,
         inputs=question.inputs,
     )
     return draft(diagnosis, str(file))

@@ -20,7 +20,7 @@ from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.processes import ProcessPool, death
-from toolpath_stiff.report.batch.outcomes import Outcome, figures_of
+from toolpath_stiff.report.batch.outcomes import ProgramOutcome, figures_of
 from toolpath_stiff.report.batch.programs import Listed
 from toolpath_stiff.results_folder import Rules, clear_up
 
@@ -28,7 +28,7 @@ _ALONE = threading.Lock()  # a process analyzes one program at a time, however m
 
 
 @dataclass(frozen=True)
-class Run:
+class BatchRun:
     """What all programs share: small and picklable.
 
     Attributes
@@ -64,14 +64,14 @@ class Task:
     program: Program
     listed: Listed
     inputs: tuple[str, ...]
-    run: Run
+    run: BatchRun
 
     @property
     def folder(self) -> Path:
         """The folder of its report."""
         return self.run.out / self.listed.folder
 
-    def failed(self, reason: str) -> Outcome:
+    def failed(self, reason: str) -> ProgramOutcome:
         """A failure: a sentence in one line that begins with the file as named; errors know its last name alone."""
         file = self.listed.file
         line = "; ".join(reason.splitlines())
@@ -79,10 +79,10 @@ class Task:
         last = Path(file).name
         if line.startswith(f"{last}:"):
             line = file + line[len(last) :]
-        return Outcome(self.listed.name, file, line if file in line else f"{file}: {line}")
+        return ProgramOutcome(self.listed.name, file, line if file in line else f"{file}: {line}")
 
 
-def answers(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> Iterator[tuple[int, Outcome]]:
+def answers(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> Iterator[tuple[int, ProgramOutcome]]:
     """Position and outcome of each task, as they come; of no executor, from so many processes, one being this one."""
     if executor is None and jobs == 1:
         yield from enumerate(map(analyze_task, tasks))
@@ -97,7 +97,7 @@ def answers(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> Iter
         clear_up(task.folder for task in tasks)
 
 
-def _from_executor(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[int, Outcome]]:
+def _from_executor(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[int, ProgramOutcome]]:
     # The largest first, so that no process is left alone with one at the end.
     order = sorted(range(len(tasks)), key=lambda i: -_size(tasks[i].program))
     futures = {_submit(executor, tasks[i]): i for i in order}
@@ -118,16 +118,16 @@ def _from_executor(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[
             future.cancel()
 
 
-def _worker_died(future: Future[Outcome]) -> bool:
+def _worker_died(future: Future[ProgramOutcome]) -> bool:
     """True where a Dask cluster gave a call up because its workers died; by name, as Dask need not be installed."""
     return not future.cancelled() and type(future.exception()).__name__ == "KilledWorker"
 
 
-def _submit(executor: Executor, task: Task) -> Future[Outcome]:
+def _submit(executor: Executor, task: Task) -> Future[ProgramOutcome]:
     try:
         return executor.submit(analyze_task, task)
     except RuntimeError as error:  # it has been shut down, or it broke
-        failed: Future[Outcome] = Future()
+        failed: Future[ProgramOutcome] = Future()
         failed.set_exception(error)
         return failed
 
@@ -139,7 +139,7 @@ def _size(program: Program) -> int:
         return 0
 
 
-def _answer(task: Task, future: Future[Outcome]) -> Outcome:
+def _answer(task: Task, future: Future[ProgramOutcome]) -> ProgramOutcome:
     """What became of a program, also where its process gave no answer."""
     if future.cancelled():
         return task.failed("was cancelled: the executor was shut down, or lost its workers")
@@ -158,7 +158,7 @@ def _named(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())
 
 
-def analyze_task(task: Task) -> Outcome:
+def analyze_task(task: Task) -> ProgramOutcome:
     """Analyse a program and write its report: what an executor is handed, in whatever process."""
     run, listed = task.run, task.listed
     if run.version != VERSION:
@@ -178,7 +178,7 @@ def analyze_task(task: Task) -> Outcome:
     except Exception as error:  # a defect of ours: it must not stop the other programs
         return task.failed(f"{_named(error)} (a defect; analyze it alone to see where)")
     report = (listed.folder / ("report.html" if run.plots else "summary.json")).as_posix()
-    return Outcome(listed.name, listed.file, "", report, figures_of(analysis.to_dict()))
+    return ProgramOutcome(listed.name, listed.file, "", report, figures_of(analysis.to_dict()))
 
 
 @lru_cache(maxsize=2)

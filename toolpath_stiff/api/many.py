@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from toolpath_stiff.api.hand_out import Run, Task, answers
+from toolpath_stiff.api.hand_out import BatchRun, Task, answers
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import JOBS, ShowPlunges, Table, analyze, check_options
 from toolpath_stiff.defaults import job_count
@@ -22,7 +22,7 @@ from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import arguments_of, checked
 from toolpath_stiff.report.analysis.summary import check_table
 from toolpath_stiff.report.batch.index import files, names
-from toolpath_stiff.report.batch.outcomes import Outcome, columns_of, terminal_summary
+from toolpath_stiff.report.batch.outcomes import ProgramOutcome, columns_of, terminal_summary
 from toolpath_stiff.report.batch.programs import Found, Listed, find_programs, report_folders
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, Result
@@ -47,11 +47,11 @@ class ManyAnalyses(Result):
 
     command: ClassVar[str] = "analyze"
 
-    def __init__(self, folder: Path, outcomes: Sequence[Outcome], written: Sequence[Path]) -> None:
+    def __init__(self, folder: Path, outcomes: Sequence[ProgramOutcome], written: Sequence[Path]) -> None:
         self.folder, self.outcomes, self.written = folder, tuple(outcomes), tuple(written)
 
     @property
-    def failed(self) -> list[Outcome]:
+    def failed(self) -> list[ProgramOutcome]:
         """The programs that have no report, each with its reason."""
         return [outcome for outcome in self.outcomes if outcome.status == "failed"]
 
@@ -61,7 +61,7 @@ class ManyAnalyses(Result):
         return all(outcome.status == "done" for outcome in self.outcomes)
 
     @property
-    def below_required(self) -> list[Outcome]:
+    def below_required(self) -> list[ProgramOutcome]:
         """The programs with a cut below what was required."""
         return [outcome for outcome in self.outcomes if outcome.figure("lines_below_required")]
 
@@ -73,7 +73,7 @@ class ManyAnalyses(Result):
         """The JSON document of the command, a list: each program's summary, its file and its report; or the error."""
         return self._document
 
-    def _entry(self, outcome: Outcome) -> dict[str, Any]:
+    def _entry(self, outcome: ProgramOutcome) -> dict[str, Any]:
         if outcome.reason:
             return {"program": Path(outcome.file).name, "file": outcome.file, "error": outcome.reason}
         report = self.folder / outcome.opens
@@ -188,13 +188,15 @@ def analyze_many(
     rules = Rules(inputs=(*files_read, *on.inputs, *(other.inputs if other else ())), replace=replace)
     out = Path(folder)
     check_folder(out, names(), rules)
-    run = Run(out.absolute(), str(out), pickle.dumps((on, other)), path_options, plots, table, show_plunges, replace)
+    run = BatchRun(
+        out.absolute(), str(out), pickle.dumps((on, other)), path_options, plots, table, show_plunges, replace
+    )
     reports = report_folders(listed)
     with _folders_for(out, reports):
         # The overview of an earlier run goes, as its reports do from now on, one after the other.
         write_folder(out, {}, command="analyze", rules=rules, unfinished=True)
         tasks = _tasks(run, reports, given, example, _file_ids(rules.inputs))
-        outcomes = dict.fromkeys(range(len(tasks)), Outcome("", ""))
+        outcomes = dict.fromkeys(range(len(tasks)), ProgramOutcome("", ""))
         if progress is not None:
             progress(f"{count} at a time" if executor is None else type(executor).__name__, 0, len(tasks))
         for done, (place, outcome) in enumerate(answers(tasks, executor, count), 1):
@@ -238,7 +240,11 @@ def _check_shared(on: Machine, other: Machine | None, programs: Iterable[Program
 
 
 def _tasks(
-    run: Run, reports: Sequence[Listed], given: dict[str, Program], example: Program, inputs: dict[tuple[int, int], str]
+    run: BatchRun,
+    reports: Sequence[Listed],
+    given: dict[str, Program],
+    example: Program,
+    inputs: dict[tuple[int, int], str],
 ) -> list[Task]:
     """A task for each program; with it the inputs of any that lie in its folder: of thousands, hardly ever one."""
     tasks = []

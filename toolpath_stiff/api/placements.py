@@ -122,14 +122,14 @@ def place(
     from toolpath_stiff.analysis.loads import parse_load
     from toolpath_stiff.placement.goals import SearchRules
     from toolpath_stiff.placement.placing import place_again, place_program
-    from toolpath_stiff.placement.task import SearchedFront, Task
+    from toolpath_stiff.placement.task import PlacementTask, SearchedFront
 
     on, part = machine_from(machine), program_from(program)
     model = on.running(part)
     default = model.machine.default_origin
     origin = origin_si(origin_mm_deg)
     read = part.moves(origin, default)
-    task = Task(
+    task = PlacementTask(
         model=model,
         program=read,
         present=origin or (read.origin if read.origin_source == "program" else default),

@@ -20,7 +20,7 @@ from toolpath_stiff.comparison.answers import Answer, summary_of
 from toolpath_stiff.comparison.load_path import LinkShares, load_path_shares
 from toolpath_stiff.comparison.loop_readings import BesideTip, beside_tip, strut_history
 from toolpath_stiff.comparison.principles import Check, assess, model_free_checks
-from toolpath_stiff.comparison.residuals import Label, Residuals, Variable
+from toolpath_stiff.comparison.residuals import ReadingNames, Residuals, Variable
 from toolpath_stiff.comparison.structure import Scattering, find_structure
 from toolpath_stiff.comparison.summary import ComparisonSummary
 from toolpath_stiff.defaults import STRUT_SPREAD
@@ -107,7 +107,7 @@ class Comparison(FolderResult):
     places: Groups
     excess: float
     numbers: tuple[Variable, ...]
-    names: tuple[Label, ...]
+    names: tuple[ReadingNames, ...]
     shares: LinkShares
     summary: ComparisonSummary
     inputs: tuple[str, ...] = ()

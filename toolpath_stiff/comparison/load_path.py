@@ -66,7 +66,7 @@ def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def _platform_motion(jacobian: FloatArray, links: exact.Links, f: FloatArray, w: FloatArray) -> FloatArray:
+def _platform_motion(jacobian: FloatArray, links: exact.AssembledLinks, f: FloatArray, w: FloatArray) -> FloatArray:
     """(n, 6) x from J x = Q_ff f + Q_fw w."""
     stretch = links.strut * f
     if links.loads is not None:

@@ -1,6 +1,6 @@
 """Residuals, and what they are held against: every column of the data, and every quantity that the model does not use.
 
-A `Variable` is numbers (height, time, force), a `Label` is names (set-up, clamping, plane). Planes are groups of
+A `Variable` is numbers (height, time, force), `ReadingNames` are names (set-up, clamping, plane). Planes are groups of
 heights, zones are distances from the machine's axis.
 """
 
@@ -58,7 +58,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Label:
+class ReadingNames:
     """Names, one a reading: `text` turns a level into words such as "with set-up riser"."""
 
     name: str
@@ -89,7 +89,7 @@ class Residuals:
     log_model: FloatArray
     values: FloatArray
     numbers: list[Variable]
-    names: list[Label]
+    names: list[ReadingNames]
     notes: list[str]
     patterns: list[Pattern]
 
@@ -223,21 +223,21 @@ def varies(values: FloatArray) -> bool:
     return len(known) >= 3 and float(np.ptp(known)) > 1e-9 * max(float(np.abs(known).max()), 1e-12)
 
 
-def labels(data: Readings) -> tuple[list[Label], list[str]]:
+def labels(data: Readings) -> tuple[list[ReadingNames], list[str]]:
     """Names to hold residuals against, only those with two levels or more; notes about those with too many."""
     clamp, file = data.clamp, data.file
     if len(set(file.tolist())) == 1:
         prefix = f"{file[0]}: "
         clamp = np.array([name.removeprefix(prefix) for name in clamp.tolist()])
     every = [
-        Label("plane", "at the {}", planes(data), True),
-        Label("zone", "{}", zones(data), True),
-        Label("setup", "with set-up {}", data.setup, True),
-        Label("loop", "read {}", data.loop, True),
-        Label("file", "in {}", file, True),
-        Label("repeat", "in repeat {}", data.repeat, True),
-        Label("clamp", "in clamping ({})", clamp, False),
-        Label("point", "at point {}", data.point, False),
+        ReadingNames("plane", "at the {}", planes(data), True),
+        ReadingNames("zone", "{}", zones(data), True),
+        ReadingNames("setup", "with set-up {}", data.setup, True),
+        ReadingNames("loop", "read {}", data.loop, True),
+        ReadingNames("file", "in {}", file, True),
+        ReadingNames("repeat", "in repeat {}", data.repeat, True),
+        ReadingNames("clamp", "in clamping ({})", clamp, False),
+        ReadingNames("point", "at point {}", data.point, False),
     ]
     kept, notes = [], []
     for label in every:
@@ -258,7 +258,7 @@ CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose
 ALL = "all"
 
 
-def patterns(data: Readings, numbers: list[Variable], names: list[Label]) -> list[Pattern]:
+def patterns(data: Readings, numbers: list[Variable], names: list[ReadingNames]) -> list[Pattern]:
     """Everything that is looked for in n residuals; patterns equal to one before are only named with it."""
     kept: dict[bytes, list[Pattern]] = {}
     for pattern in _candidates(data, numbers, names):
@@ -270,7 +270,7 @@ def patterns(data: Readings, numbers: list[Variable], names: list[Label]) -> lis
     return [replace(first, same=tuple(other.name for other in others)) for first, *others in kept.values()]
 
 
-def _candidates(data: Readings, numbers: list[Variable], names: list[Label]) -> Iterator[Pattern]:
+def _candidates(data: Readings, numbers: list[Variable], names: list[ReadingNames]) -> Iterator[Pattern]:
     """Levels of the labels and slopes along the variables, in all directions and in each."""
     along, whole = directions(data), np.ones(len(data), dtype=bool)
     axes = np.unique(along).tolist()

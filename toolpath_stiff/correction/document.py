@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.correction.outcome import Outcome
+from toolpath_stiff.correction.outcome import UpdateOutcome
 from toolpath_stiff.correction.steps import Support
 from toolpath_stiff.correction.strut_law import StrutLawSearch
 from toolpath_stiff.correction.words import assumptions, text
@@ -19,7 +19,7 @@ from toolpath_stiff.machine.model import Uncertainty
 from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
 
 
-def document_of(update: Outcome) -> dict[str, Any]:
+def document_of(update: UpdateOutcome) -> dict[str, Any]:
     """Everything that `update.json` holds."""
     steps = [rounded_step(update, k) for k in range(len(update.steps))]
     document: dict[str, Any] = {
@@ -53,7 +53,7 @@ def document_of(update: Outcome) -> dict[str, Any]:
     return document if update.search is None else {**document, "search": _search(update.search)}
 
 
-def rounded_step(update: Outcome, k: int) -> Document:
+def rounded_step(update: UpdateOutcome, k: int) -> Document:
     """Step k; of all but the first also what it gains over the one before."""
     step, widening = update.steps[k], update.widening
     document: Document = {
@@ -115,7 +115,7 @@ def _search(search: StrutLawSearch) -> Document:
     }
 
 
-def residuals_csv(update: Outcome) -> str:
+def residuals_csv(update: UpdateOutcome) -> str:
     """One row a reading of the tip: measured, modelled as given and after, deviations, that with its point left out."""
     data, given, last = update.data.of_tip, update.steps[0], update.last
     wild = np.isin(np.flatnonzero(update.data.tip), last.fit.scatter.wild)

@@ -26,7 +26,7 @@ import numpy as np
 
 from toolpath_stiff.correction.machines import fitted_machine
 from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.steps import Step, Support, dispersion
+from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.words import NEEDED
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.diagnosis.diagnose import FEWEST
@@ -172,8 +172,8 @@ class _Work:
     def data(self) -> Readings:
         return self.problem.predictor.data
 
-    def step(self, name: str, fit: Fit) -> Step:
-        return Step.of(name, fit, self.data)
+    def step(self, name: str, fit: Fit) -> LadderStep:
+        return LadderStep.of(name, fit, self.data)
 
     def fitted(self, fit: Fit, groups: Iterable[Sequence[Candidate]]) -> Fit:
         """A fit with one effect of each group on top."""
@@ -181,16 +181,16 @@ class _Work:
             fit = add_effect(self.problem, fit, candidates, self.law_free)
         return fit
 
-    def added(self, before: Step, candidates: Sequence[Candidate]) -> Step:
+    def added(self, before: LadderStep, candidates: Sequence[Candidate]) -> LadderStep:
         """A rung higher."""
         return self.together(before, [candidates])
 
-    def together(self, before: Step, groups: Sequence[Sequence[Candidate]]) -> Step:
+    def together(self, before: LadderStep, groups: Sequence[Sequence[Candidate]]) -> LadderStep:
         """Several effects as one step."""
         fit = self.fitted(before.fit, groups)
         return self.step(f"+ {' + '.join(candidate.label for candidate in fit.candidates[-len(groups) :])}", fit)
 
-    def ladder(self, start: Step, wanted: Sequence[Sequence[Candidate]]) -> list[Step]:
+    def ladder(self, start: LadderStep, wanted: Sequence[Sequence[Candidate]]) -> list[LadderStep]:
         """Steps that add the effects asked for, each lower than the one before; one step if no order does."""
         rest, steps = list(wanted), [start]
         while rest:
@@ -204,7 +204,7 @@ class _Work:
             rest.pop(best)
         return steps[1:]
 
-    def without(self, full: Fit, j: int) -> Step:
+    def without(self, full: Fit, j: int) -> LadderStep:
         """The model with all effects but one, fitted again."""
         others = [[candidate] for k, candidate in enumerate(full.candidates) if k != j]
         return self.step("", self.fitted(base_fit(self.problem, self.law_free), others))
@@ -231,7 +231,7 @@ class _Work:
             self.fields[key] = _Field(problem, base, effects, threshold)
         return self.fields[key]
 
-    def support(self, before: Step, fit: Fit, j: int, candidates: Sequence[Candidate]) -> Support:
+    def support(self, before: LadderStep, fit: Fit, j: int, candidates: Sequence[Candidate]) -> Support:
         """Judge effect j of a fit against the model with the other effects."""
         name, after = fit.names[j], self.step("", fit)
         fall = float(error_falls(before.held, after.held).mean())
@@ -262,7 +262,7 @@ class _Work:
             )
         return Support(name, in_se, fall, after.error, after.held.mean_error, gained, threshold, tuple(reasons))
 
-    def next_effect(self, before: Step) -> tuple[Step | None, tuple[Support, ...]]:
+    def next_effect(self, before: LadderStep) -> tuple[LadderStep | None, tuple[Support, ...]]:
         """The most likely effect that the data support on top of a step, and the supports of all that were tried."""
         others, tried = self.field(before.fit), list[Support]()
         families = score_families(others.problem, others.effects, others.base)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.correction.machines import fitted_machine
-from toolpath_stiff.correction.steps import Step, Support, dispersion
+from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.strut_law import BarCurve, StrutLawSearch
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.evidence import Problem
@@ -27,7 +27,7 @@ WORSE = 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Outcome:
+class UpdateOutcome:
     """The steps of an update, judged.
 
     Attributes
@@ -60,8 +60,8 @@ class Outcome:
     data: Readings
     noise: Noise
     problem: Problem
-    steps: tuple[Step, ...]
-    refitted: Step
+    steps: tuple[LadderStep, ...]
+    refitted: LadderStep
     supports: tuple[Support, ...] = ()
     turned_down: tuple[Support, ...] = ()
     forced: bool = False
@@ -83,7 +83,7 @@ class Outcome:
         return None if self.drawn is None or self.drawn.confirmed else self.drawn
 
     @property
-    def last(self) -> Step:
+    def last(self) -> LadderStep:
         """The last model of the ladder; the machine file as given where nothing is to be changed."""
         return self.steps[-1] if self.changed else self.steps[0]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.correction import words
 from toolpath_stiff.correction.document import document_of, rounded_step
-from toolpath_stiff.correction.outcome import Outcome
+from toolpath_stiff.correction.outcome import UpdateOutcome
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.machine.model import Machine
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Update(Outcome, FolderResult):
+class Update(UpdateOutcome, FolderResult):
     """A machine's model corrected by measurements, or why it was not.
 
     Attributes

@@ -30,7 +30,7 @@ class LawEnd:
 
 
 @dataclass(frozen=True)
-class Step:
+class LadderStep:
     """One rung of the ladder: its fit to all readings, its errors over those of the tip.
 
     Attributes
@@ -50,7 +50,7 @@ class Step:
     along: NDArray[np.str_]
 
     @classmethod
-    def of(cls, name: str, fit: Fit, data: Readings, held: HeldOut | None = None) -> Step:
+    def of(cls, name: str, fit: Fit, data: Readings, held: HeldOut | None = None) -> LadderStep:
         """Of a fit to these data; `held`: its residuals at left-out points, where they are known."""
         left_out = held_out(fit, data.point) if held is None else held
         return cls(name, fit, left_out.of_readings(data.tip), data.tip, np.asarray(directions(data.of_tip)))

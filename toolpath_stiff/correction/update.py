@@ -13,7 +13,7 @@ from toolpath_stiff.correction.additions import parse_addition
 from toolpath_stiff.correction.ladder import build_ladder
 from toolpath_stiff.correction.machines import data_hash
 from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.steps import Step
+from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.correction.strut_law import (
     BarCurve,
     bar_curve,
@@ -179,8 +179,8 @@ def update_by_mean_error(
         resampled_covariance(predictor, law, seed), problem.scatter,
     )  # fmt: skip
     left_out = HeldOut(leave_points_out(predictor, law), np.zeros((0, 2)), data.point)
-    steps = Step.of(AS_GIVEN, as_given, data), Step.of("strut law by mean error", last, data, left_out)
-    refitted = Step.of(LAW_REFITTED, law_refitted, data)
+    steps = LadderStep.of(AS_GIVEN, as_given, data), LadderStep.of("strut law by mean error", last, data, left_out)
+    refitted = LadderStep.of(LAW_REFITTED, law_refitted, data)
     return Update(
         machine, data, worst, problem, steps, refitted, forced=force, law_asked=True, objective="mean-error",
         question=question(predictor), search=search, seed=seed,

@@ -6,14 +6,14 @@ from textwrap import fill
 
 import numpy as np
 
-from toolpath_stiff.correction.outcome import FORCED, NOTHING, REFUSED, Outcome
+from toolpath_stiff.correction.outcome import FORCED, NOTHING, REFUSED, UpdateOutcome
 from toolpath_stiff.inference.errors import LAW_REFITTED, errors_text
 from toolpath_stiff.stiffness.sizes import joined
 
 NEEDED = 1.0  # standard errors by which the error at left-out points must fall
 
 
-def text(update: Outcome) -> str:
+def text(update: UpdateOutcome) -> str:
     """What was done, the cause first, then the error step by step."""
     question = f"{update.question} " if update.question else ""
     last, verdict = update.steps[-1], update.verdict
@@ -40,7 +40,7 @@ def text(update: Outcome) -> str:
     return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {unconfirmed}{errors}"
 
 
-def _errors(update: Outcome) -> str:
+def _errors(update: UpdateOutcome) -> str:
     """Mean error of every step; of a law that is kept also what refitting it would leave."""
     steps = [(step.name.replace("+ ", "with ", 1), 100.0 * step.error) for step in update.steps]
     kept = update.refitted not in update.steps and update.objective == "likelihood"
@@ -48,7 +48,7 @@ def _errors(update: Outcome) -> str:
     return errors_text(steps[0][1], None, [*law, *steps[1:]])
 
 
-def assumptions(update: Outcome) -> list[str]:
+def assumptions(update: UpdateOutcome) -> list[str]:
     """What the result rests on, sentences."""
     sentences = [
         f"noise: {update.noise.origin}",
@@ -74,7 +74,7 @@ def assumptions(update: Outcome) -> list[str]:
     return sentences
 
 
-def machine_heading(update: Outcome) -> str:
+def machine_heading(update: UpdateOutcome) -> str:
     """The remark above the machine file that an update writes."""
     return (
         f"{fill(f'Machine {update.given.name}, updated. {text(update)}', 110)}\n"

@@ -8,7 +8,7 @@ import numpy as np
 
 from toolpath_stiff.diagnosis.beside import beside_text, would_tell
 from toolpath_stiff.diagnosis.examination import Examination
-from toolpath_stiff.diagnosis.rows import Row, Rows, percent_of, rounded_errors
+from toolpath_stiff.diagnosis.rows import HypothesisRow, HypothesisRows, percent_of, rounded_errors
 from toolpath_stiff.diagnosis.words import assumptions, doubts, next_steps, verdict_text, why
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.inference.confounding import CONFOUNDED
@@ -26,7 +26,7 @@ ERRORS = (
 )  # fmt: skip
 
 
-def document_of(diagnosis: Examination, rows: Rows) -> dict[str, Any]:
+def document_of(diagnosis: Examination, rows: HypothesisRows) -> dict[str, Any]:
     """Everything that `diagnose.json` holds."""
     main, alike, noise = diagnosis.main, diagnosis.alike, diagnosis.noise
     drawn = diagnosis.unconfirmed or main.drawn
@@ -87,7 +87,7 @@ def document_of(diagnosis: Examination, rows: Rows) -> dict[str, Any]:
     }
 
 
-def _baseline(diagnosis: Examination, rows: Rows) -> Document:
+def _baseline(diagnosis: Examination, rows: HypothesisRows) -> Document:
     """The model as given, and with its strut law refitted."""
     law, row = diagnosis.machine.strut_law, rows.refitted
     count = len(law.parameters)  # of a constant law one, which belongs to no length
@@ -114,11 +114,11 @@ def _baseline(diagnosis: Examination, rows: Rows) -> Document:
     }
 
 
-def _part(row: Row, names: tuple[str, ...]) -> Document:
+def _part(row: HypothesisRow, names: tuple[str, ...]) -> Document:
     return {name: getattr(row, name) for name in names}
 
 
-def _candidate(row: Row, link: str) -> Document:
+def _candidate(row: HypothesisRow, link: str) -> Document:
     """A single effect; without the probability of its gate where it fits best when it is absent."""
     return {
         "effect": row.name,
@@ -132,7 +132,7 @@ def _candidate(row: Row, link: str) -> Document:
     }
 
 
-def _pair(row: Row) -> Document:
+def _pair(row: HypothesisRow) -> Document:
     """Several effects; parameters by effect, with what it acts on."""
     return {
         "effects": row.name.split(" + "),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.diagnosis.document import document_of
 from toolpath_stiff.diagnosis.examination import Examination
-from toolpath_stiff.diagnosis.rows import Rows, rows_of
+from toolpath_stiff.diagnosis.rows import HypothesisRows, rows_of
 from toolpath_stiff.files import Content
 from toolpath_stiff.results import FolderResult
 
@@ -26,7 +26,7 @@ class Diagnosis(Examination, FolderResult):
     shown_by: ClassVar[str] = "diagnose.page"
 
     @cached_property
-    def rows(self) -> Rows:
+    def rows(self) -> HypothesisRows:
         """Every hypothesis with its figures, in shop units."""
         return rows_of(self)
 

@@ -36,7 +36,7 @@ class FittedSize:
 
 
 @dataclass(frozen=True)
-class Row:
+class HypothesisRow:
     """A hypothesis: figures rounded as documents have them, None where there is none.
 
     Attributes
@@ -83,23 +83,25 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Rows:
+class HypothesisRows:
     """All hypotheses; pairs and candidates with the likeliest first. `best`: the explanation that is written about."""
 
-    as_given: Row
-    refitted: Row
-    outside: Row
-    pairs: tuple[Row, ...]
-    candidates: tuple[Row, ...]
-    best: Row | None
+    as_given: HypothesisRow
+    refitted: HypothesisRow
+    outside: HypothesisRow
+    pairs: tuple[HypothesisRow, ...]
+    candidates: tuple[HypothesisRow, ...]
+    best: HypothesisRow | None
 
 
-def rows_of(examination: Examination) -> Rows:
+def rows_of(examination: Examination) -> HypothesisRows:
     """The rows of a diagnosis."""
     main = examination.main
     # Nothing is fitted: leaving points out changes nothing.
     error, title = percent_of(float(examination.as_given.errors.mean())), "the machine file as it stands"
-    as_given = Row(AS_GIVEN, AS_GIVEN, title=title, mean_abs_error_percent=error, held_out_error_percent=error)
+    as_given = HypothesisRow(
+        AS_GIVEN, AS_GIVEN, title=title, mean_abs_error_percent=error, held_out_error_percent=error
+    )
     refitted = replace(
         _row(examination, NONE, main.base.log_evidence),
         label="strut law refitted (none)", title="no further effect", held_out_gain_in_se=None,
@@ -121,20 +123,20 @@ def rows_of(examination: Examination) -> Rows:
     pairs.sort(key=lambda row: (-(row.probability or 0.0), -(row.log_evidence or 0.0)))
     every = [*candidates, *pairs]
     offered = max((row for row in every if row.offered), key=lambda row: row.probability or 0.0, default=None)
-    return Rows(
-        as_given, refitted, Row(OUTSIDE, OUTSIDE, title="a smooth unknown", probability=chance), tuple(pairs),
+    return HypothesisRows(
+        as_given, refitted, HypothesisRow(OUTSIDE, OUTSIDE, title="a smooth unknown", probability=chance), tuple(pairs),
         tuple(candidates), next((row for row in every if row.name == examination.best), offered),
     )  # fmt: skip
 
 
-def _row(examination: Examination, name: str, log_evidence: float) -> Row:
+def _row(examination: Examination, name: str, log_evidence: float) -> HypothesisRow:
     """A hypothesis with its final fit; the model alone where the effect fits best when it is absent."""
     main, base = examination.main, examination.held_out_base
     fit, held = examination.fits.get(name, examination.base), examination.held_out.get(name, base)
     if not any(size.any() for size in fit.sizes):
         fit, held = examination.base, base
     labels = {candidate.name: candidate.label for candidate in fit.candidates}
-    return Row(
+    return HypothesisRow(
         name,
         " + ".join(labels.get(effect, effect) for effect in name.split(" + ")),
         name in examination.explanations,
@@ -151,7 +153,7 @@ def _row(examination: Examination, name: str, log_evidence: float) -> Row:
     )
 
 
-def _candidate(examination: Examination, family: Family) -> Row:
+def _candidate(examination: Examination, family: Family) -> HypothesisRow:
     """A single effect; where it fits best when it is absent, without sizes."""
     gate = examination.main.gates.get(family.name)
     base_passes = examination.main.base_gate.probability > FALSE_ALARM

@@ -189,7 +189,7 @@ def candidates_of(effect: Effect, data: Readings) -> list[Candidate]:
     return candidates
 
 
-class Table:
+class CandidateTable:
     """`delta`, (n,) m/N that a candidate adds to the compliance of each reading, as a function of its sizes.
 
     One component: tabulated over its size and interpolated (delta / size over ln size, which is almost constant).
@@ -247,18 +247,18 @@ class Table:
         return np.asarray((ends[0] - ends[1])[:, None] / (2.0 * step))
 
 
-def table_of(candidate: Candidate, predictor: Predictor) -> Table | None:
+def table_of(candidate: Candidate, predictor: Predictor) -> CandidateTable | None:
     """`tabulate` at the machine file's own strut law, once for a set of readings."""
     key = (candidate.name, candidate.choice)
     if key not in predictor.tables:
         predictor.tables[key] = tabulate(candidate, predictor, np.zeros(2))
-    table: Table | None = predictor.tables[key]
+    table: CandidateTable | None = predictor.tables[key]
     return table
 
 
 def tabulate(
     candidate: Candidate, predictor: Predictor, law: FloatArray, beside: Sequence[ActiveEffect] = ()
-) -> Table | None:
+) -> CandidateTable | None:
     """The candidate's table at a strut law, beside other effects; None where it does nothing to these data."""
     base = predictor.log_stiffness(law, beside)
     compliance = np.exp(-base)
@@ -288,7 +288,7 @@ def tabulate(
         signs = starts.items() if len(components) == 1 else ()
         return {sign: _knots(components[0], sign, start, along(np.ones(1)), compliance) for sign, start in signs}
 
-    return Table(candidate, columns, knots)
+    return CandidateTable(candidate, columns, knots)
 
 
 def _rms(delta: FloatArray, compliance: FloatArray) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpath_stiff.inference.candidates import Table
+from toolpath_stiff.inference.candidates import CandidateTable
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.stiffness.contract import Parameter
@@ -63,7 +63,7 @@ def detectable_sizes(problem: Problem, families: Sequence[Family], gain_threshol
     return detectable
 
 
-def _smallest(problem: Problem, table: Table, j: int, sign: float, wanted: float) -> Detectable:
+def _smallest(problem: Problem, table: CandidateTable, j: int, sign: float, wanted: float) -> Detectable:
     name, component, prior = table.candidate.name, table.candidate.components[j], problem.prior(table, j)
     logs, rms, lengths = prior.log_sizes[sign], prior.rms[sign], np.maximum.accumulate(prior.lengths[sign])
     if lengths[-1] < wanted:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import Candidate, Component, Table
+from toolpath_stiff.inference.candidates import Candidate, CandidateTable, Component
 from toolpath_stiff.inference.covariances import Precision
 from toolpath_stiff.inference.noise import Noise, NormalEquations, Scatter, covariance, gauss_newton, scaled_inverse
 from toolpath_stiff.inference.prediction import Predictor
@@ -90,7 +90,7 @@ class Fit:
     scatter: Scatter
     law_free: bool = True
     absent: dict[int, tuple[float, float]] = field(default_factory=dict)
-    tables: tuple[Table, ...] = ()
+    tables: tuple[CandidateTable, ...] = ()
     log_evidence: float = np.nan
     interval: FloatArray | None = None
     possible: bool = True
@@ -178,7 +178,7 @@ class Problem:
         self.observed = np.log(predictor.data.stiffness)
         self.base_compliance = np.exp(-predictor.log_stiffness())
         self.rest = self.base_compliance - predictor.strut_part()
-        self._priors: dict[tuple[int, int], tuple[Table, SizePrior]] = {}
+        self._priors: dict[tuple[int, int], tuple[CandidateTable, SizePrior]] = {}
         jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
         self.sight = Sight(self.base_compliance, self.projected(jacobian))
 
@@ -194,7 +194,7 @@ class Problem:
         """
         return self.scatter.precision.beside(jacobian.T, law_prior(jacobian.shape[1]))
 
-    def prior(self, table: Table, j: int) -> SizePrior:
+    def prior(self, table: CandidateTable, j: int) -> SizePrior:
         """Prior of a component's size, worked out once."""
         key = (id(table), j)
         if key not in self._priors:
@@ -247,7 +247,7 @@ class Problem:
         )  # fmt: skip
 
     def score_subset(
-        self, tables: Sequence[Table], free: tuple[int, ...], start: Fit, sizes: FloatArray | None = None
+        self, tables: Sequence[CandidateTable], free: tuple[int, ...], start: Fit, sizes: FloatArray | None = None
     ) -> Fit | None:
         """Candidates with these components free (counted over all of them); None if one ends at zero or at its bound.
 
@@ -293,8 +293,8 @@ class Problem:
     def _integrated(
         self,
         peak: float,
-        tables: Sequence[Table],
-        chosen: Sequence[tuple[Table, int]],
+        tables: Sequence[CandidateTable],
+        chosen: Sequence[tuple[CandidateTable, int]],
         sizes: FloatArray,
         deviations: FloatArray,
         information: FloatArray,
@@ -319,14 +319,14 @@ class Problem:
                     evidence += log_comparable(change / max(changes)) - np.log(abs(around[i]))
         return float(evidence)
 
-    def _rms_alone(self, table: Table, j: int, size: float) -> float:
+    def _rms_alone(self, table: CandidateTable, j: int, size: float) -> float:
         """Rms change of ln stiffness by one component alone."""
         unit = np.zeros(len(table.candidate.components))
         unit[j] = size
         return float(np.sqrt(np.mean(self.sight.change(table.delta(unit)) ** 2)))
 
     def _gauss_newton(
-        self, tables: Sequence[Table], start: FloatArray, unknowns: Sequence[int], precision: Precision
+        self, tables: Sequence[CandidateTable], start: FloatArray, unknowns: Sequence[int], precision: Precision
     ) -> tuple[FloatArray, FloatArray, NormalEquations] | None:
         """Law and all sizes (2 + p,) with the `unknowns` among them fitted, the residual, the last equations.
 
@@ -362,7 +362,7 @@ class Problem:
         return x, self.observed + np.log(self.compliance(x[:2], added(x))), last
 
 
-def split(tables: Sequence[Table], sizes: FloatArray) -> Iterator[tuple[Table, FloatArray]]:
+def split(tables: Sequence[CandidateTable], sizes: FloatArray) -> Iterator[tuple[CandidateTable, FloatArray]]:
     """Each table with its own of the sizes (p,)."""
     start = 0
     for table in tables:

@@ -136,7 +136,7 @@ class Forms:
         return self._drawn[1]
 
 
-class Structure:
+class FormStatistics:
     """Fit statistics of the forms of discrepancy for one fit, as surprises: -ln of a tail probability.
 
     r^T P K P r is a weighted sum of chi-squares; its tail is that of one scaled chi-square with the same mean tr(P K)
@@ -196,7 +196,7 @@ def absolute_gate(
     observed = set_wild_aside(projected.times(residual[None]), projected, scatter)
     pulls, taken = set_wild_aside(projected.times(draws), projected, scatter)
     observed_squares, squares = float(squares_of(*observed)[0]), squares_of(pulls, taken)
-    structure = Structure(forms, projected)
+    structure = FormStatistics(forms, projected)
     seen = structure.surprises(structure.loads(residual[None], observed[1]))
     # Squares far beyond all simulated ones settle it; what the structure would look like by chance matters no more.
     simulated = np.zeros((len(squares), seen.shape[1]))

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import Table, candidates_of, table_of
+from toolpath_stiff.inference.candidates import CandidateTable, candidates_of, table_of
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.gates import Forms, Structure, set_wild_aside
+from toolpath_stiff.inference.gates import Forms, FormStatistics, set_wild_aside
 from toolpath_stiff.inference.quadrature import score_single
 from toolpath_stiff.inference.tails import normal_below
 from toolpath_stiff.stiffness.contract import Effect
@@ -37,7 +37,7 @@ class Family:
     """
 
     effect: Effect
-    tables: tuple[Table, ...]
+    tables: tuple[CandidateTable, ...]
     best: Fit | None
     log_evidence: float
     subsets: tuple[tuple[Fit, float], ...] = ()
@@ -66,7 +66,7 @@ def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
     return Family(effect, tuple(tables), best, total, subsets)
 
 
-def _scores(problem: Problem, table: Table, base: Fit) -> list[tuple[Fit, float]]:
+def _scores(problem: Problem, table: CandidateTable, base: Fit) -> list[tuple[Fit, float]]:
     """Fits of one candidate with the log prior weight of each subset of components."""
     if table.knots:
         return [(score_single(problem, table, base), 0.0)]
@@ -87,13 +87,13 @@ def score_families(problem: Problem, effects: Iterable[Effect], base: Fit) -> li
     return sorted(families, key=lambda family: (-family.log_evidence, family.name))
 
 
-def tables_of(problem: Problem, effect: Effect) -> list[Table]:
+def tables_of(problem: Problem, effect: Effect) -> list[CandidateTable]:
     """The tables of an effect, one a choice that does something to these data."""
     candidates = candidates_of(effect, problem.predictor.data)
     return list(filter(None, (table_of(candidate, problem.predictor) for candidate in candidates)))
 
 
-def signatures(problem: Problem, tables: Iterable[Table]) -> list[list[FloatArray]]:
+def signatures(problem: Problem, tables: Iterable[CandidateTable]) -> list[list[FloatArray]]:
     """One-sided small-size signatures d ln k / d size of every candidate: subsets of columns (n, p), sizes >= 0."""
     signs = []
     for table in tables:
@@ -189,7 +189,7 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[fl
     """
     projected = problem.projected(score.jacobian)
     _, taken = set_wild_aside(projected.times(score.residual[None]), projected, problem.scatter)
-    structure = Structure(forms, projected)
+    structure = FormStatistics(forms, projected)
     loads = structure.loads(score.residual[None], taken)
     gains = []
     order = np.argsort(structure.surprises(loads)[0])[::-1][:FORMS] if forms.names else np.zeros(0, dtype=int)

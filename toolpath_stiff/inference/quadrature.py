@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import Table
+from toolpath_stiff.inference.candidates import CandidateTable
 from toolpath_stiff.inference.covariances import Precision
 from toolpath_stiff.inference.evidence import MOST_ROUNDS, Fit, Problem, law_prior, law_terms
 from toolpath_stiff.inference.size_priors import likely_interval
@@ -18,7 +18,7 @@ GRID = 24  # sizes a sign
 ZOOMS = 3
 
 
-def score_single(problem: Problem, table: Table, start: Fit) -> Fit:
+def score_single(problem: Problem, table: CandidateTable, start: Fit) -> Fit:
     """A candidate of one parameter: quadrature over its size."""
     sizes = np.sort(
         np.concatenate([s * np.geomspace(np.exp(k[0][0]), table.reach(s), GRID) for s, k in table.knots.items()])
@@ -54,7 +54,7 @@ def _scan(
     return _Scan(sizes, -0.5 * precision.squares(residuals) + law_terms(laws, information), laws, residuals)
 
 
-def _refined(problem: Problem, table: Table, scan: _Scan, precision: Precision) -> _Scan:
+def _refined(problem: Problem, table: CandidateTable, scan: _Scan, precision: Precision) -> _Scan:
     """With more sizes about the peak: zooms, then five standard deviations to each side."""
     for _ in range(ZOOMS):
         peak = int(np.argmax(scan.profile))

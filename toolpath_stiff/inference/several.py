@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.inference.candidates import Table, tabulate
+from toolpath_stiff.inference.candidates import CandidateTable, tabulate
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
 
@@ -229,12 +229,12 @@ class LinearSearch:
             combinations.append(Combination(tuple(sorted(names)), fit, float(evidence)))
         return sorted(combinations, key=lambda combination: (-combination.log_evidence, combination.names))
 
-    def _side_by_side(self, chosen: TableSet) -> tuple[list[Table], FloatArray]:
+    def _side_by_side(self, chosen: TableSet) -> tuple[list[CandidateTable], FloatArray]:
         """Tables that may be added up, with their sizes: an instrument's acts on what the others before it have added.
 
         Sizes are held to 0.9 of their bounds: at a bound the model may have no answer.
         """
-        known: list[tuple[Table, FloatArray]] = []
+        known: list[tuple[CandidateTable, FloatArray]] = []
         parts = [(self.tables[t], sizes) for t, sizes in zip(chosen.tables, chosen.sizes, strict=True)]
         for table, sizes in sorted(parts, key=lambda part: part[0].candidate.effect.is_instrument):
             bounds = np.array([component.bounds for component in table.candidate.components])
@@ -245,7 +245,7 @@ class LinearSearch:
             known.append((moved or table, np.clip(sizes, 0.9 * bounds[:, 0], 0.9 * bounds[:, 1])))
         return [table for table, _ in known], np.concatenate([sizes for _, sizes in known])
 
-    def _likeliest_subset(self, tables: Sequence[Table], sizes: FloatArray) -> Fit | None:
+    def _likeliest_subset(self, tables: Sequence[CandidateTable], sizes: FloatArray) -> Fit | None:
         """The tables with those of their components that make the data most likely: from all, the faintest dropped."""
         weight = -sum(float(np.log(len(list(table.candidate.subsets())))) for table in tables)
         owners = np.repeat(np.arange(len(tables)), [len(table.candidate.components) for table in tables]).tolist()
@@ -271,7 +271,7 @@ class LinearSearch:
             free = tuple(i for i in free if i != min(faint, key=lambda i: faint[i]))
 
 
-def _linear_pieces(table: Table, compliance: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _linear_pieces(table: CandidateTable, compliance: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Columns (n, p) and bounds (p, 2) that stand for a table: small sizes, and what it adds per size at large ones.
 
     Where what an effect adds is not in proportion to its size, the second differs from the first.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import Table
+from toolpath_stiff.inference.candidates import CandidateTable
 from toolpath_stiff.inference.covariances import Precision
 
 # Rms change of ln stiffness between which an effect's size is expected, flat in its logarithm; assumed: effects are
@@ -95,7 +95,7 @@ class SizePrior:
     lengths: dict[float, FloatArray]
 
     @classmethod
-    def of(cls, table: Table, j: int, sight: Sight) -> SizePrior:
+    def of(cls, table: CandidateTable, j: int, sight: Sight) -> SizePrior:
         """Of component `j` of a table."""
         component = table.candidate.components[j]
         logs, density, rms, lengths = {}, {}, {}, {}
@@ -173,7 +173,7 @@ def _log_integral(sizes: FloatArray, logs: FloatArray) -> tuple[float, FloatArra
     return top + float(np.log(total)), np.concatenate([[0.0], np.cumsum(pieces)]) / total
 
 
-def _sizes(table: Table, j: int, sign: float, sight: Sight) -> FloatArray:
+def _sizes(table: CandidateTable, j: int, sign: float, sight: Sight) -> FloatArray:
     """Sizes of one sign to tabulate the prior at."""
     if table.knots:
         logs = table.knots[sign][0]

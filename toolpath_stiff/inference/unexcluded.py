@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import LARGEST, SMALLEST, Candidate, Table
+from toolpath_stiff.inference.candidates import LARGEST, SMALLEST, Candidate, CandidateTable
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.inference.minima import bounded_step
@@ -92,7 +92,7 @@ class _Beside:
         self.low = np.array([-np.inf] * 2 + [min(component.bounds[0] - size, 0.0) for component, size in free])
         self.high = np.array([np.inf] * 2 + [max(component.bounds[1] - size, 0.0) for component, size in free])
 
-    def room(self, table: Table, j: int) -> tuple[Unexcluded, float]:
+    def room(self, table: CandidateTable, j: int) -> tuple[Unexcluded, float]:
         """How far component `j` of a table may go: of both signs the one at which it changes more.
 
         And the mean of the likelihood over the prior of the size, 1 where the readings say nothing.
@@ -119,7 +119,7 @@ class _Beside:
         candidate, value = table.candidate, component.value(size)
         return Unexcluded(candidate.effect, candidate, component.parameter, value, rms, left), gain / mass
 
-    def _sizes(self, table: Table, j: int) -> Iterator[FloatArray]:
+    def _sizes(self, table: CandidateTable, j: int) -> Iterator[FloatArray]:
         """Sizes (g,) of each sign, rising."""
         component = table.candidate.components[j]
         for sign in component.signs:

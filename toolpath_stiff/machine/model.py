@@ -204,10 +204,10 @@ class EffectEntry:
     file: str = field(default="", compare=False)
     lines: Mapping[str, int] = field(default_factory=dict, compare=False)
 
-    def error(self, found: str, key: str = "", expected: str = "", hint: str = "", where: str = "") -> InputError:
+    def error(self, mistake: str, key: str = "", expected: str = "", hint: str = "", where: str = "") -> InputError:
         """An error at one of its keys, or at its heading; `where` names an entry that no file holds."""
         line = self.lines.get(key, self.lines.get(""))
-        text = found if self.file or not where else f"{where}: {found}"
+        text = mistake if self.file or not where else f"{where}: {mistake}"
         return EffectError(text, expected=expected, hint=hint, file=self.file or None, line=line)
 
 

@@ -63,7 +63,7 @@ class Bounds:
 
 
 @dataclass(frozen=True)
-class Rules:
+class PlacementRules:
     """Rules that a placement has to keep.
 
     Attributes

@@ -30,7 +30,7 @@ from toolpath_stiff.placement.rows import (
     placement_mm_deg,
 )
 from toolpath_stiff.placement.search import search_placements
-from toolpath_stiff.placement.task import Rewriting, SearchedFront, SearchRecord, Task
+from toolpath_stiff.placement.task import PlacementTask, Rewriting, SearchedFront, SearchRecord
 from toolpath_stiff.placement.working import Search
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.units import Pose, m_from_mm
@@ -39,7 +39,7 @@ COMPARED = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "min": "min_N_pe
 USUAL_CHORD_MM = 0.01  # tried where a program cannot be written without chords
 
 
-def place_program(task: Task, progress: Callable[[int, int], None] | None = None) -> Placement:
+def place_program(task: PlacementTask, progress: Callable[[int, int], None] | None = None) -> Placement:
     r"""Search, and place the program where the search recommends.
 
     Raises
@@ -87,7 +87,7 @@ def place_program(task: Task, progress: Callable[[int, int], None] | None = None
     return _placed(task, rows, record, front.best + 1, front.present)
 
 
-def place_again(task: Task, earlier: SearchedFront, number: int) -> Placement:
+def place_again(task: PlacementTask, earlier: SearchedFront, number: int) -> Placement:
     """Place the program at point `number` (from 1) of the front of an earlier search, without a search.
 
     Raises
@@ -115,7 +115,7 @@ def place_again(task: Task, earlier: SearchedFront, number: int) -> Placement:
 
 
 def _placed(
-    task: Task, rows: Sequence[PlacementRow], search: SearchRecord, number: int, present: PlacementFigures
+    task: PlacementTask, rows: Sequence[PlacementRow], search: SearchRecord, number: int, present: PlacementFigures
 ) -> Placement:
     """Analyze, before and at the chosen point."""
     before, reason = _analyzed(task, task.program, task.present)
@@ -141,7 +141,7 @@ def _placed(
     )
 
 
-def _analyzed(task: Task, program: ReadProgram, origin: Pose) -> tuple[Analysis | None, str]:
+def _analyzed(task: PlacementTask, program: ReadProgram, origin: Pose) -> tuple[Analysis | None, str]:
     """The program at a placement, or None and why."""
     try:
         return analyze(task.model, program, origin=origin, load=task.load, step=task.step, force=task.force), ""
@@ -150,7 +150,7 @@ def _analyzed(task: Task, program: ReadProgram, origin: Pose) -> tuple[Analysis 
 
 
 def _rewritten(
-    task: Task, writing: Rewriting, program: ReadProgram, best: Analysis
+    task: PlacementTask, writing: Rewriting, program: ReadProgram, best: Analysis
 ) -> tuple[bytes | None, Written | NotWritten]:
     """The transformed program's bytes, and how it compares; or why there is none, and what chords would bring."""
 

@@ -18,7 +18,7 @@ from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
-from toolpath_stiff.placement.task import SearchedFront, SearchRecord, Task
+from toolpath_stiff.placement.task import PlacementTask, SearchedFront, SearchRecord
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
 from toolpath_stiff.stiffness.model import effects_stated
@@ -112,7 +112,7 @@ class Placement(FolderResult, SearchedFront):
     command: ClassVar[str] = "place"
     shown_by: ClassVar[str] = "place.page"
 
-    task: Task
+    task: PlacementTask
     chosen: PlacementRow
     present: PlacementRow | None
     present_figures: PlacementFigures

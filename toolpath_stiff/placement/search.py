@@ -16,7 +16,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.placement.ascents import climbed
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.fronts import front_rows, thin
-from toolpath_stiff.placement.goals import Goal, Rules
+from toolpath_stiff.placement.goals import Goal, PlacementRules
 from toolpath_stiff.placement.unreachable import LeftOutRapid, infeasible, let_go
 from toolpath_stiff.placement.working import ENDS, NO_FLOORS, Search
 
@@ -59,7 +59,7 @@ class PlacementResult:
     figures: PlacementFigures
     best: int
     present: PlacementFigures | None
-    rules: Rules
+    rules: PlacementRules
     rapids_left_out: tuple[LeftOutRapid, ...] = ()
     pose_evaluations: int = 0
     searches: int = 1

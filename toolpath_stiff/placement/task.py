@@ -102,7 +102,7 @@ def _text_of(file: Path) -> str:
 
 
 @dataclass(frozen=True)
-class Task:
+class PlacementTask:
     """A program to be placed: the machine, the bounds and rules, the load. SI.
 
     Attributes

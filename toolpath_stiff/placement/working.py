@@ -13,7 +13,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
 from toolpath_stiff.placement.fronts import apart
-from toolpath_stiff.placement.goals import Bounds, Goal, Rules, SearchRules
+from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
 from toolpath_stiff.placement.paths import WorkPath, representative_path, with_rows
 from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -53,13 +53,13 @@ class Search:
     report: Callable[[int, int], None] = lambda done, total: None
     start: FloatArray = field(init=False)
     now: PlacementFigures | None = None
-    rules: Rules = field(init=False)
+    rules: PlacementRules = field(init=False)
     evaluators: dict[str, Evaluator] = field(default_factory=dict)
     made: list[Evaluator] = field(default_factory=list)
     heeded: IntArray = field(init=False)
 
     def __post_init__(self) -> None:
-        self.rules, self.start = Rules(self.wanted.margin), np.zeros((0, 6))
+        self.rules, self.start = PlacementRules(self.wanted.margin), np.zeros((0, 6))
         self.sample(self.path)
         if self.present is not None:
             self.now = self.whole.figures(self.present[None])
@@ -107,7 +107,7 @@ class Search:
         """A climber on some of the samples."""
         return Climber(self.evaluators[name], self.bounds, self.rules_for(name))
 
-    def rules_for(self, name: str) -> Rules:
+    def rules_for(self, name: str) -> PlacementRules:
         """The rules as some samples see them: of those that stand for the path another share is outside the law."""
         if name == "whole" or self.present is None or not 0.0 < self.rules.extrapolated < np.inf:
             return self.rules

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from toolpath_stiff.diagnosis.beside import beside_text
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.diagnosis.rows import SHOWN, FittedSize, Row, percent_of
+from toolpath_stiff.diagnosis.rows import SHOWN, FittedSize, HypothesisRow, percent_of
 from toolpath_stiff.diagnosis.words import assumptions, next_steps, verdict_text, why
 from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import parted
@@ -35,7 +35,7 @@ def probability_text(value: float | None) -> str:
     return "> 99.5 %" if 0.995 < value < 1.0 else f"{100.0 * value:.0f} %"
 
 
-def size_texts(row: Row, intervals: bool = True) -> list[str]:
+def size_texts(row: HypothesisRow, intervals: bool = True) -> list[str]:
     """Each fitted size in words: "radial 5.12 nm/N (4.40 to 5.90)"; of a pair its effect before it."""
     return [
         plain(f"{effect if len(row.sizes) > 1 else ''} {_size_text(key, size, intervals)}".strip())
@@ -53,7 +53,7 @@ def _size_text(key: str, size: FittedSize, intervals: bool) -> str:
     return f"{text} ({low} to {high})" if intervals else text
 
 
-def remark_text(row: Row) -> str:
+def remark_text(row: HypothesisRow) -> str:
     """How a hypothesis stands, and what is against it."""
     if not row.eligible and (row.probability or 0.0) < SHOWN:
         return plain(row.remark)
@@ -206,7 +206,7 @@ def _table(diagnosis: Diagnosis) -> list[str]:
     return [*lines, f"  and {more} less likely, in diagnose.json"] if more > 0 else lines
 
 
-def _cells(row: Row) -> list[str]:
+def _cells(row: HypothesisRow) -> list[str]:
     """Name, four figures, words, and what stands on a line of its own below: sizes and a remark."""
     figures = ((row.mean_abs_error_percent, 2), (row.held_out_error_percent, 2), (row.held_out_gain_in_se, 1))
     return [

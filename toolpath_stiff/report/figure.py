@@ -325,8 +325,8 @@ class Marks:
     def draw_markers(self, gc: Any, marker: Any, size: Any, path: Any, transform: Any, face: Any = None) -> None:
         """Markers along a path."""
         pen = self._pen(gc)
-        at = size + _scaled(self.FINER), path, transform + self._there()
-        self._canvas.draw_markers(pen, marker, *at, face)
+        placed = size + _scaled(self.FINER), path, transform + self._there()
+        self._canvas.draw_markers(pen, marker, *placed, face)
 
     def draw_path_collection(self, gc: Any, *others: Any, **named: Any) -> None:
         """Paths at places, with colours and lines of their own."""

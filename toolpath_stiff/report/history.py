@@ -72,8 +72,8 @@ def history_text(history: StrutHistory, undated: bool = False) -> list[str]:
         "  " + "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
         for row in rows
     ]
-    said = [f"  {plain(line)}" for line in [*_remark(history), *history.sentences]]
-    return ["", TITLE.lower(), *lines, *said]
+    sentences = [f"  {plain(line)}" for line in [*_remark(history), *history.sentences]]
+    return ["", TITLE.lower(), *lines, *sentences]
 
 
 def history_section(history: StrutHistory) -> list[Markup]:

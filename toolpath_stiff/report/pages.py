@@ -60,9 +60,9 @@ def render_pieces(
     template: str, *, styles: Sequence[str] = (), scripts: Sequence[str] = (), data: Any = None, **values: Any
 ) -> Iterator[str]:
     """The same in pieces: the data of a long program are most of a page, and stand in memory once."""
-    script = '\n"use strict";\n(() => {\n' + "".join(asset(one) for one in scripts) + "})();\n" if scripts else ""
+    script = '\n"use strict";\n(() => {\n' + "".join(asset(file) for file in scripts) + "})();\n" if scripts else ""
     text = _templates().get_template(template).render(
-        style=Markup("".join(asset(one) for one in ("page.css", *styles))),
+        style=Markup("".join(asset(file) for file in ("page.css", *styles))),
         script=Markup(script),
         script_hash=script_hash(script),
         data=None if data is None else DATA,

@@ -142,11 +142,11 @@ def _directions(data: Readings) -> NDArray[np.str_]:
 def _levels(data: Readings) -> NDArray[np.int64]:
     """(n,) number of the height group, the highest first: each height its own, or as many equal bands as are shown."""
     height = np.round(data.position[:, 2], 3)
-    own = np.unique(height)
-    if len(own) > MOST_LEVELS:
-        edges = np.linspace(own[0], own[-1], MOST_LEVELS + 1)[1:-1]
+    heights = np.unique(height)
+    if len(heights) > MOST_LEVELS:
+        edges = np.linspace(heights[0], heights[-1], MOST_LEVELS + 1)[1:-1]
         return np.asarray(MOST_LEVELS - np.digitize(height, edges), dtype=np.int64)
-    return np.asarray(len(own) - np.searchsorted(own, height), dtype=np.int64)
+    return np.asarray(len(heights) - np.searchsorted(heights, height), dtype=np.int64)
 
 
 def _level_text(data: Readings, chosen: NDArray[np.bool_]) -> str:

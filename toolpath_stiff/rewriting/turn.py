@@ -136,7 +136,7 @@ SHORTEST_UNITS = 4.0
 START, END, AXIS, SHAPE = "start", "end", "tool axis", "shape"
 
 
-class Row(NamedTuple):
+class CuttingMove(NamedTuple):
     """A recorded cutting move: ends (6), arc."""
 
     start: list[float]
@@ -149,10 +149,10 @@ class Row(NamedTuple):
         return self.arc is None and moved < SHORTEST_UNITS * unit
 
 
-def cutting_rows(recorder: Recorder, first: int) -> list[Row]:
+def cutting_rows(recorder: Recorder, first: int) -> list[CuttingMove]:
     """Cutting moves recorded from `first` on."""
     rows = zip(recorder.start[first:], recorder.end[first:], recorder.arc[first:], recorder.motion[first:], strict=True)
-    return [Row(start, end, arc) for start, end, arc, motion in rows if motion != RAPID]
+    return [CuttingMove(start, end, arc) for start, end, arc, motion in rows if motion != RAPID]
 
 
 class Difference(NamedTuple):
@@ -162,7 +162,7 @@ class Difference(NamedTuple):
     words: str
 
 
-def differences(turn: Turn, wanted: list[Row], written: list[Row], unit: float) -> Difference | None:
+def differences(turn: Turn, wanted: list[CuttingMove], written: list[CuttingMove], unit: float) -> Difference | None:
     """The first difference of a block's written cutting moves from the placed ones beyond the rounding to `unit` mm.
 
     Straight moves of a few units may vanish by rounding, or come to be.
@@ -183,7 +183,7 @@ def differences(turn: Turn, wanted: list[Row], written: list[Row], unit: float) 
     return Difference(SHAPE, f"would be {len(written)} moves and not {len(wanted)}")
 
 
-def difference(turn: Turn, wanted: Row, written: Row, unit: float) -> Difference | None:
+def difference(turn: Turn, wanted: CuttingMove, written: CuttingMove, unit: float) -> Difference | None:
     """The difference of a written cutting move from the placed one beyond the rounding to `unit` mm.
 
     For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them.

@@ -81,7 +81,7 @@ def clamp_of(table: Mapping[str, Any]) -> IntArray:
 
 
 @dataclass(frozen=True)
-class Case:
+class DrawnCase:
     """A campaign and its truth.
 
     Attributes
@@ -124,7 +124,7 @@ def draw_case(
     plan: Mapping[str, Any] | None = None,
     size: float | Sequence[float] | None = None,
     nuisances: Nuisances | None = None,
-) -> Case:
+) -> DrawnCase:
     """A blind campaign on a machine that hides something; the same arguments give the same rows.
 
     Parameters
@@ -181,7 +181,7 @@ def draw_case(
         "kind": "outside" if outside else ("none", "one", "two", "three")[min(len(names), 3)],
         "effects": effects,
     }
-    return Case(measured, truth, nominal, true, nuisances)
+    return DrawnCase(measured, truth, nominal, true, nuisances)
 
 
 def measure(

@@ -28,7 +28,7 @@ from toolpath_stiff.errors import FileError, InputError, InputErrors
 from toolpath_stiff.files import Content, read_bytes, read_text, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table
-from toolpath_stiff.rig.case import Case, again, clamp_of, draw_case
+from toolpath_stiff.rig.case import DrawnCase, again, clamp_of, draw_case
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.hidden import LOOP_PATTERN, LOOP_WORDS, OUTSIDE, HiddenMachine, Nuisances, Oddity
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
@@ -84,7 +84,7 @@ MEASUREMENTS, MACHINE, SEALED = FILES = "measurements.csv", "machine.toml", "sea
 NO_OTHER = Rules(fresh=True)
 
 
-def seal(case: Case, seed: int, layout: str) -> bytes:
+def seal(case: DrawnCase, seed: int, layout: str) -> bytes:
     """Content of `sealed.bin`; the same case gives the same bytes."""
     machine = {
         field.name: value.tolist() if isinstance(value := getattr(case.machine, field.name), np.ndarray) else value
@@ -111,7 +111,7 @@ def seal(case: Case, seed: int, layout: str) -> bytes:
     return MAGIC + digest + _scrambled(body, digest)
 
 
-def unseal(file: str | Path) -> tuple[Case, dict[str, Any]]:
+def unseal(file: str | Path) -> tuple[DrawnCase, dict[str, Any]]:
     """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
     try:
         content = read_bytes(file, "the sealed truth")
@@ -133,7 +133,7 @@ def unseal(file: str | Path) -> tuple[Case, dict[str, Any]]:
     if sealed["machine"].get("unknown") is not None:
         machine["unknown"] = Unknown(**sealed["machine"]["unknown"])
     nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
-    case = Case({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"]))
+    case = DrawnCase({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"]))
     return case, sealed
 
 

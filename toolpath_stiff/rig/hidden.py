@@ -24,7 +24,7 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.nominal import Nominal, commanded_lengths, platform_points, rotations, true_poses
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import Geometry, Links, secant_compliance
-from toolpath_stiff.rig.unknown import State, Unknown
+from toolpath_stiff.rig.unknown import CommandedRows, Unknown
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.units import n_per_m_from_n_per_mm, n_per_mm_from_n_per_m
 
@@ -269,7 +269,7 @@ def assembled(
         setup=np.where((rows.setup == hidden.setup)[:, None] & bool(hidden.setup), hidden.setup_compliance, 0.0),
     )
     if hidden.unknown is not None and (act := UNKNOWNS[hidden.unknown.kind].act) is not None:
-        links = act(links, State(nominal, rows, lengths, place), hidden.unknown)
+        links = act(links, CommandedRows(nominal, rows, lengths, place), hidden.unknown)
     return place, links
 
 

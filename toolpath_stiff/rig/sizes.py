@@ -37,7 +37,7 @@ class Scale:
         self.vertices = int(nominal.vertices.max()) + 1
         self.setups = sorted(set(rows.setup.tolist()))
         self.base = np.log(readings(nominal, HiddenMachine(), rows))
-        self.covariance = Covariance(clamps, _spread(self, nuisances), nuisances)
+        self.covariance = NuisanceCovariance(clamps, _spread(self, nuisances), nuisances)
 
     def change(self, machine: HiddenMachine) -> FloatArray:
         """(n,) change of ln stiffness; infinite beyond `LARGEST_SINGLE`, or where an indicator would run backwards."""
@@ -109,7 +109,7 @@ def _rms(change: FloatArray) -> float:
     return float(np.sqrt(np.mean(change**2)))
 
 
-class Covariance:
+class NuisanceCovariance:
     """Covariance of ln readings: repeat noise, clamping, strut spread, a free strut law.
 
     The first two are a multiple of the identity and one block of ones a clamp, whose inverse is known; the rest has

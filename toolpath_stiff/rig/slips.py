@@ -18,7 +18,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import POSE, Table
-from toolpath_stiff.rig.case import Case, clamp_of, rows_of
+from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import Nominal, reachable
 from toolpath_stiff.rig.sizes import scale_of
@@ -119,7 +119,9 @@ def with_slip(
     return slipped, _plain(truth)
 
 
-def slipped_case(case: Case, seed: int, kind: str | None = None, count: int = 1) -> tuple[Table, list[dict[str, Any]]]:
+def slipped_case(
+    case: DrawnCase, seed: int, kind: str | None = None, count: int = 1
+) -> tuple[Table, list[dict[str, Any]]]:
     """The rows of a case with `count` slips in different rows, and their truths."""
     rng = np.random.default_rng([seed, 5])  # beyond the streams of `draw_case`
     table = case.rows

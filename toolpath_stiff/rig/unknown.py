@@ -68,7 +68,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class State:
+class CommandedRows:
     """n rows as the machine meets them: commanded strut lengths (n, 6) m and true places."""
 
     nominal: Nominal
@@ -124,7 +124,7 @@ class Kind:
     links: frozenset[str]
     variables: frozenset[str]
     limit: float
-    act: Callable[[Links, State, Unknown], Links] | None = None
+    act: Callable[[Links, CommandedRows, Unknown], Links] | None = None
     read: Callable[[Rows, Unknown], FloatArray] | None = None
     move: Callable[[Unknown], FloatArray] | None = None
     shape: Callable[[Generator], dict[str, Any]] = no_shape

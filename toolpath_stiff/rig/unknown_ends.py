@@ -14,7 +14,7 @@ from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import REACH, SOFT, _with_ends, beyond, kind, opened, signed
 
 if TYPE_CHECKING:
-    from toolpath_stiff.rig.unknown import Kind, State, Unknown
+    from toolpath_stiff.rig.unknown import CommandedRows, Kind, Unknown
 
 
 HALF_SPAN = 0.4  # m, half the distance of a bed's feet (assumed)
@@ -38,38 +38,38 @@ HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
 X, Y, Z = np.eye(3)
 
 
-def _fixed(lever: FloatArray, state: State) -> FloatArray:
+def _fixed(lever: FloatArray, state: CommandedRows) -> FloatArray:
     """(n, 3) the same lever in every row."""
     return np.broadcast_to(lever, (len(state.rows.force), 3))
 
 
-def _constant(size: float, state: State) -> FloatArray:
+def _constant(size: float, state: CommandedRows) -> FloatArray:
     return np.full(len(state.rows.force), size)
 
 
-def _tip(state: State) -> FloatArray:
+def _tip(state: CommandedRows) -> FloatArray:
     return state.place.work_point
 
 
-def bed_sag(links: Links, state: State, u: Unknown) -> Links:
+def bed_sag(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A bed on two feet sags under the work: c = c0 (1 - (x / a)^2)^2 (simply supported beam, load at x: a^2 b^2)."""
     across = np.clip(_tip(state)[:, 0] / HALF_SPAN, -1.0, 1.0)
     return _with_ends(links, (_fixed(Z, state), u.size * (1.0 - across**2) ** 2))
 
 
-def pallet_overhang(links: Links, state: State, u: Unknown) -> Links:
+def pallet_overhang(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A pallet held in its middle bends like a cantilever: c = c0 (r / R)^3 vertically."""
     radius = np.linalg.norm(_tip(state)[:, :2], axis=1)
     return _with_ends(links, (_fixed(Z, state), u.size * (radius / REACH) ** 3))
 
 
-def floor_rocking(links: Links, state: State, u: Unknown) -> Links:
+def floor_rocking(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The floor lets the bed rock about one horizontal axis far below the table."""
     axis = np.array([np.cos(u.shape["azimuth"]), np.sin(u.shape["azimuth"]), 0.0])
     return _with_ends(links, (np.cross(axis, _tip(state) - FLOOR * Z), _constant(u.size, state)))
 
 
-def worn_table_bearing(links: Links, state: State, u: Unknown) -> Links:
+def worn_table_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One of the three bearings under the table is worn: it gives by its share of load and tilting moment.
 
     A load d at r puts on the bearing at angle p: -d_z (1/3 + 2 e.r / 3R) + (e.d) 2 z / 3R, with e towards the bearing.
@@ -81,37 +81,37 @@ def worn_table_bearing(links: Links, state: State, u: Unknown) -> Links:
     return _with_ends(links, (lever, _constant(u.size, state)))
 
 
-def fixture_slip(links: Links, state: State, u: Unknown) -> Links:
+def fixture_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The fixture of one set-up holds by friction: beyond it the work gives sideways."""
     sideways = state.rows.force * np.linalg.norm(state.rows.direction[:, :2], axis=1)
     give = u.size * beyond(sideways, u.shape["holds"]) * (state.rows.setup == u.shape["setup"])
     return _with_ends(links, (_fixed(X, state), give), (_fixed(Y, state), give))
 
 
-def damping_plate(links: Links, state: State, u: Unknown) -> Links:
+def damping_plate(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A polymer plate under the table softens in shear as the shop warms up."""
     give = u.size * np.maximum(state.rows.warmth, 0.0) / SOFTENING
     return _with_ends(links, (_fixed(X, state), give), (_fixed(Y, state), give))
 
 
-def clamp_loosened(links: Links, state: State, u: Unknown) -> Links:
+def clamp_loosened(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A clamp of the table came loose in the middle of the campaign: from then on it gives sideways."""
     give = np.where(state.rows.elapsed > u.shape["after"], u.size, 0.0)
     return _with_ends(links, (_fixed(X, state), give), (_fixed(Y, state), give))
 
 
-def portal_bending(links: Links, state: State, u: Unknown) -> Links:
+def portal_bending(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The portal that carries the frame bends about a horizontal axis at its knee: the lower the tip, the more."""
     arm = _tip(state) - KNEE * Z
     return _with_ends(links, (np.cross(np.eye(3)[u.shape["axis"]], arm), _constant(u.size, state)))
 
 
-def frame_twist(links: Links, state: State, u: Unknown) -> Links:
+def frame_twist(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The frame twists about the machine's axis: a load along the tangent at radius r gives c r^2."""
     return _with_ends(links, (np.cross(Z, _tip(state)), _constant(u.size, state)))
 
 
-def spindle_thrust(links: Links, state: State, u: Unknown) -> Links:
+def spindle_thrust(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The spindle's bearings lose their preload when the tool is pulled, or pushed: it then gives, radially first."""
     tool = state.place.rotation[:, :, 2]
     thrust = state.rows.force * np.einsum("ni,ni->n", state.rows.direction, tool) * u.shape["side"]
@@ -121,7 +121,7 @@ def spindle_thrust(links: Links, state: State, u: Unknown) -> Links:
     )
 
 
-def spindle_flange(links: Links, state: State, u: Unknown) -> Links:
+def spindle_flange(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A screw of the spindle's flange is loose: the spindle rocks in the platform about one oblique axis of it."""
     across = np.cos(u.shape["azimuth"]) * state.place.rotation[:, :, 0]
     across = across + np.sin(u.shape["azimuth"]) * state.place.rotation[:, :, 1]
@@ -129,7 +129,7 @@ def spindle_flange(links: Links, state: State, u: Unknown) -> Links:
     return _with_ends(links, (longer[:, None] * across, _constant(u.size, state)))
 
 
-def taper_opening(links: Links, state: State, u: Unknown) -> Links:
+def taper_opening(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The tool holder's taper opens beyond a bending moment, with a longer tool sooner; then the tool tilts in it."""
     tool = state.place.rotation[:, :, 2]
     across = np.linalg.norm(np.cross(state.rows.direction, tool), axis=1)

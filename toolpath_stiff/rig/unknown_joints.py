@@ -13,13 +13,13 @@ from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import ALL, SOFT, _with_joints, kind
 
 if TYPE_CHECKING:
-    from toolpath_stiff.rig.unknown import Kind, State, Unknown
+    from toolpath_stiff.rig.unknown import CommandedRows, Kind, Unknown
 
 SWING = np.sin(np.radians(20.0)) ** 2  # squared sine of the swing at which compliances are quoted
 SLIP_LOAD = 300.0  # N, load at which a sticking joint carries half of what it does at rest (assumed)
 
 
-def _swing(state: State) -> FloatArray:
+def _swing(state: CommandedRows) -> FloatArray:
     """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
     pose = state.nominal.neutral_pose
     rest = strut_directions(state.nominal, pose[None, :3], rotations(pose[None, 3:]), np.zeros(1))[1]
@@ -27,13 +27,13 @@ def _swing(state: State) -> FloatArray:
     return np.asarray(1.0 - np.minimum(np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now) ** 2, 1.0))
 
 
-def joint_swing(links: Links, state: State, u: Unknown) -> Links:
+def joint_swing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The forks of the platform joints bend the more, the further they swing out: c = c0 sin^2."""
     compliance = u.size * _swing(state) / SWING
     return _with_joints(links, lambda forces: compliance)
 
 
-def cardan_fork(links: Links, state: State, u: Unknown) -> Links:
+def cardan_fork(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A cross whose inner pin, radial on the platform, is worn: c = c0 (share of the strut's force along the pin)^2."""
     joints = state.place.platform_joints - state.place.work_point[:, None, :]
     axis = state.place.rotation[:, :, 2]
@@ -43,12 +43,12 @@ def cardan_fork(links: Links, state: State, u: Unknown) -> Links:
     return _with_joints(links, lambda forces: compliance)
 
 
-def joint_binding(links: Links, state: State, u: Unknown) -> Links:
+def joint_binding(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Joints that bind near the end of their swing: rotational stiffness m0 sin^2."""
     return dataclasses.replace(links, moment=links.moment + u.size * _swing(state) / SWING)
 
 
-def joint_slip(links: Links, state: State, u: Unknown) -> Links:
+def joint_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Sticking joints that slip: rotational secant stiffness m0 F0 / (F0 + F), Masing's element smeared out."""
     held = SLIP_LOAD / (SLIP_LOAD + state.rows.force)
     return dataclasses.replace(links, moment=links.moment + u.size * held[:, None] * np.ones(6))

@@ -13,7 +13,7 @@ from toolpath_stiff.rig.structure import BARS, Links
 from toolpath_stiff.rig.unknown import ALL, ONE, SOFT, _with_joints, beyond, kind, one_strut, opened, signed
 
 if TYPE_CHECKING:
-    from toolpath_stiff.rig.unknown import Kind, State, Unknown
+    from toolpath_stiff.rig.unknown import CommandedRows, Kind, Unknown
 
 
 LEAST_FORCE = 0.1  # N, below which a secant compliance is held
@@ -35,79 +35,79 @@ def _only(strut: int) -> FloatArray:
     return np.where(np.arange(6) == strut, 1.0, 0.0)
 
 
-def strut_backlash(links: Links, state: State, u: Unknown) -> Links:
+def strut_backlash(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Lost motion in one strut alone: c = g / |f|."""
     return _with_joints(links, lambda f: u.size / np.maximum(np.abs(f), LEAST_FORCE) * _only(u.shape["strut"]))
 
 
-def nut_preload(links: Links, state: State, u: Unknown) -> Links:
+def nut_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Double nuts with too little preload: beyond it one of the two lets go and the struts are softer by c0."""
     return _with_joints(links, lambda f: u.size * beyond(f, u.shape["preload"]))
 
 
-def thrust_bearing(links: Links, state: State, u: Unknown) -> Links:
+def thrust_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The thrust bearing of one screw is worn on one side: softer in tension, or in compression."""
     return _with_joints(links, lambda f: u.size * opened(f * u.shape["side"]) * _only(u.shape["strut"]))
 
 
-def strut_bowing(links: Links, state: State, u: Unknown) -> Links:
+def strut_bowing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Struts not quite straight bow under compression: c grows as length^4 (Timoshenko, an initially bent column)."""
     compliance = u.size * (state.lengths / state.nominal.strut_range[1]) ** 4
     return _with_joints(links, lambda f: compliance * opened(-f))
 
 
-def drive_spring(links: Links, state: State, u: Unknown) -> Links:
+def drive_spring(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One drive loses stiffness in proportion to how far its strut is out, as a column of oil does."""
     compliance = u.size * np.maximum(state.stretched, 0.0) * _only(u.shape["strut"])
     return _with_joints(links, lambda forces: compliance)
 
 
-def other_screw(links: Links, state: State, u: Unknown) -> Links:
+def other_screw(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One strut was replaced: its stiffness has another slope over the length, k exp(a (s - 1/2))."""
     factor = np.where(np.arange(6) == u.shape["strut"], np.exp(u.size * (state.stretched - 0.5)), 1.0)
     root = np.sqrt(factor)
     return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])
 
 
-def screw_lead(links: Links, state: State, u: Unknown) -> Links:
+def screw_lead(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One screw was ground with a wavy lead: its nut's stiffness varies periodically with the length."""
     wave = 1.0 + u.size * np.sin(2.0 * np.pi * state.lengths / u.shape["wavelength"] + u.shape["phase"])
     root = np.sqrt(np.where(np.arange(6) == u.shape["strut"], wave, 1.0))
     return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])
 
 
-def motor_mount(links: Links, state: State, u: Unknown) -> Links:
+def motor_mount(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Two neighbouring struts of different vertices hang on one soft bracket, which both load: c (f1 + f2)^2."""
     return _coupled(links, np.broadcast_to(_pair(state, u), state.lengths.shape), u.size)
 
 
-def _pair(state: State, u: Unknown) -> FloatArray:
+def _pair(state: CommandedRows, u: Unknown) -> FloatArray:
     first = u.shape["strut"]
     vertices = state.nominal.vertices
     other = next(s % 6 for s in range(first + 1, first + 6) if vertices[s % 6] != vertices[first])
     return _only(first) + _only(other)
 
 
-def strut_heating(links: Links, state: State, u: Unknown) -> Links:
+def strut_heating(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The motor of one strut holds it and heats its nut while the readings of a clamping are taken."""
     compliance = u.size * (state.rows.time / 300.0)[:, None] * _only(u.shape["strut"])
     return _with_joints(links, lambda forces: compliance)
 
 
-def warm_up_preload(links: Links, state: State, u: Unknown) -> Links:
+def warm_up_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Joints gain their preload as the machine warms up: c = c0 exp(-t / tau) over the campaign."""
     compliance = u.size * np.exp(-state.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6)
     return _with_joints(links, lambda forces: compliance)
 
 
-def cracked_bar(links: Links, state: State, u: Unknown) -> Links:
+def cracked_bar(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The bar from one joint of the platform to the spindle nose is cracked; the others are stiff, but not rigid."""
     stiffness = np.minimum(np.full(BARS, SOUND_BAR), links.bars)
     stiffness[12 + u.shape["strut"]] *= 1.0 - u.size  # after the rim and the spokes, six each
     return dataclasses.replace(links, bars=stiffness)
 
 
-def frame_oval(links: Links, state: State, u: Unknown) -> Links:
+def frame_oval(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The frame's ring goes oval: the radial loads of two posts act against each other, c (R1 - R2)^2."""
     vertices = state.nominal.vertices
     side = np.where(vertices == u.shape["vertex"], 1.0, np.where(vertices == (u.shape["vertex"] + 1) % 3, -1.0, 0.0))
@@ -116,7 +116,7 @@ def frame_oval(links: Links, state: State, u: Unknown) -> Links:
     return _coupled(links, np.einsum("nki,nki->nk", state.units, outward) * side, u.size)
 
 
-def loose_vertex_bolt(links: Links, state: State, u: Unknown) -> Links:
+def loose_vertex_bolt(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A bolt of one post is loose: pulled down the post gives, a third as much outwards; pressed it sits."""
     vertex = u.shape["vertex"]
     mine = state.nominal.vertices == vertex

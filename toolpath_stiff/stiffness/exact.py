@@ -204,7 +204,7 @@ def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Links:
+class AssembledLinks:
     """What the load path is made of at n poses.
 
     Attributes
@@ -222,7 +222,7 @@ class Links:
     parallel: FloatArray | None
 
 
-def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
+def assemble_links(model: StiffnessModel, path: LoadPath) -> AssembledLinks:
     """Add up what the strut law and the effects contribute at n poses.
 
     Raises
@@ -246,7 +246,7 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
         loads = form if loads is None else loads if form is None else loads + form
         parallel = beside if parallel is None else parallel if beside is None else parallel + beside
     refuse_struts_without_stiffness(_acting(model), path, strut)
-    return Links(strut, loads, parallel)
+    return AssembledLinks(strut, loads, parallel)
 
 
 def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
@@ -265,7 +265,7 @@ def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
     )
 
 
-def respond(path: LoadPath, links: Links, wrenches: FloatArray) -> tuple[FloatArray, FloatArray]:
+def respond(path: LoadPath, links: AssembledLinks, wrenches: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Tip twists and strut forces under wrenches at the tip.
 
     Parameters
@@ -355,7 +355,7 @@ class Loaded:
     """
 
     path: LoadPath
-    links: Links
+    links: AssembledLinks
     twists: FloatArray
     forces: FloatArray
 

@@ -47,7 +47,7 @@ UNITS |= BASE | {"percent": 1e-2, "min": 60.0, "h": 3600.0}
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrialOutcome:
     """One check: its name, whether it passed (None: for information), what was found."""
 
     name: str
@@ -60,7 +60,7 @@ class Trial:
     """All checks of an effect."""
 
     effect: Effect
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[TrialOutcome, ...]
 
     @property
     def passed(self) -> bool:
@@ -129,18 +129,18 @@ def try_effect(effect: Effect, machine: Machine, seed: int = 0, timed: bool = Tr
                 acted[words] = _answer(_with(bare, effect, values), poses)
             except InputError as error:  # at its bounds an effect may ask more than a machine can give
                 if "bound" not in words:
-                    return Trial(effect, (*outcomes, Outcome("stiffness", False, f"{words}: {error}")))
+                    return Trial(effect, (*outcomes, TrialOutcome("stiffness", False, f"{words}: {error}")))
         count = f"{len(acted)} sets of parameters, {len(poses)} poses"
-        outcomes.append(Outcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}"))
+        outcomes.append(TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}"))
         high = _with(bare, effect, sets["typical, high"])
         outcomes += [_neutral(acted, plain), _acts(effect, acted, plain), _one_by_one(high, poses)]
         outcomes += _sign(high, effect, poses)
         if timed:
             many = np.resize(poses, (TIMED, poses.shape[1]))
             ratio = _seconds(high, many) / _seconds(bare, many)
-            outcomes.append(Outcome("speed", None, f"{ratio:.1f} times the plain model's time for {TIMED} poses"))
+            outcomes.append(TrialOutcome("speed", None, f"{ratio:.1f} times the plain model's time for {TIMED} poses"))
     except EffectFault as fault:
-        outcomes.append(Outcome("shapes", False, str(fault)))
+        outcomes.append(TrialOutcome("shapes", False, str(fault)))
     return Trial(effect, tuple(outcomes))
 
 
@@ -212,39 +212,41 @@ def _along(model: StiffnessModel, path: LoadPath) -> FloatArray:
     return np.asarray(stiffness)
 
 
-def _neutral(acted: Mapping[str, FloatArray], plain: FloatArray) -> Outcome:
+def _neutral(acted: Mapping[str, FloatArray], plain: FloatArray) -> TrialOutcome:
     if "neutral" not in acted:
-        return Outcome("neutral value", False, "no result at the neutral value")
+        return TrialOutcome("neutral value", False, "no result at the neutral value")
     gap = float(np.abs(acted["neutral"] / plain - 1.0).max())
     if gap <= SAME:
-        return Outcome("neutral value", True, "there the effect vanishes")
-    return Outcome("neutral value", False, f"there it changes the stiffness by up to {100.0 * gap:.3g} %; it must not")
+        return TrialOutcome("neutral value", True, "there the effect vanishes")
+    return TrialOutcome(
+        "neutral value", False, f"there it changes the stiffness by up to {100.0 * gap:.3g} %; it must not"
+    )
 
 
-def _acts(effect: Effect, acted: Mapping[str, FloatArray], plain: FloatArray) -> Outcome:
+def _acts(effect: Effect, acted: Mapping[str, FloatArray], plain: FloatArray) -> TrialOutcome:
     changes = 100.0 * (acted["typical, high"] / plain - 1.0)
     if np.abs(changes).max() <= 100.0 * SAME:
         if (
             effect.described_from
         ):  # its constants are those of readings: a set-up, a load, a corner not among these poses
             drawn = "at these poses it changes nothing; `diagnose` judges it where it was drawn from"
-            return Outcome("size", None, drawn)
-        return Outcome("size", False, "at its upper typical value it changes nothing")
+            return TrialOutcome("size", None, drawn)
+        return TrialOutcome("size", False, "at its upper typical value it changes nothing")
     span = f"{changes.min():+.3g} to {changes.max():+.3g} % (median {np.median(changes):+.3g} %)"
-    return Outcome("size", None, f"at its upper typical value the stiffness changes by {span}")
+    return TrialOutcome("size", None, f"at its upper typical value the stiffness changes by {span}")
 
 
-def _one_by_one(model: StiffnessModel, poses: FloatArray) -> Outcome:
+def _one_by_one(model: StiffnessModel, poses: FloatArray) -> TrialOutcome:
     """A pose's result must not hang on the poses beside it."""
     path = _path(model, poses)
     alone = np.array([_along(model, path.take(np.array([i])))[0] for i in range(len(path))])
     gap = float(np.abs(alone / _along(model, path) - 1.0).max())
     if gap <= SAME:
-        return Outcome("poses", True, "each alone gives what all together give")
-    return Outcome("poses", False, f"alone and together differ by up to {100.0 * gap:.3g} %: the poses mix")
+        return TrialOutcome("poses", True, "each alone gives what all together give")
+    return TrialOutcome("poses", False, f"alone and together differ by up to {100.0 * gap:.3g} %: the poses mix")
 
 
-def _sign(model: StiffnessModel, effect: Effect, poses: FloatArray) -> list[Outcome]:
+def _sign(model: StiffnessModel, effect: Effect, poses: FloatArray) -> list[TrialOutcome]:
     """A part that gives way can only add compliance, one beside the struts only stiffness.
 
     Parameters whose neutral value lies between their bounds, and constants drawn from readings, go both ways.
@@ -261,7 +263,7 @@ def _sign(model: StiffnessModel, effect: Effect, poses: FloatArray) -> list[Outc
             lowest = added if added.ndim == 2 else np.linalg.eigvalsh(added)
             if lowest.min() < -SAME * np.abs(lowest).max():
                 negative = f"{hook} is negative, down to {lowest.min():.3g}"
-                return [Outcome("sign", False, f"{negative}; if both signs are meant, bound the parameter so")]
+                return [TrialOutcome("sign", False, f"{negative}; if both signs are meant, bound the parameter so")]
     return []
 
 
@@ -275,15 +277,15 @@ def _seconds(model: StiffnessModel, poses: FloatArray) -> float:
     return max(best, 1e-6)
 
 
-def _unit(parameter: Parameter) -> Outcome:
+def _unit(parameter: Parameter) -> TrialOutcome:
     """Whether `si` is what the unit says."""
     meant, name = unit_in_si(parameter.unit), f"unit of {parameter.name}"
     if meant is None:
-        return Outcome(name, None, f"{parameter.unit!r} is not known here; si = {parameter.si:g} is not checked")
+        return TrialOutcome(name, None, f"{parameter.unit!r} is not known here; si = {parameter.si:g} is not checked")
     value = f"one {parameter.unit or 'unit'} is {meant:g} in SI"
     if abs(parameter.si / meant - 1.0) > SAME:
-        return Outcome(name, False, f"{value}, but si = {parameter.si:g}")
-    return Outcome(name, True, value)
+        return TrialOutcome(name, False, f"{value}, but si = {parameter.si:g}")
+    return TrialOutcome(name, True, value)
 
 
 def unit_in_si(unit: str) -> float | None:

@@ -255,12 +255,12 @@ def page_data(analysis: Analysis) -> dict[str, Any]:
     their own ranges, NONE where there is none.
     """
     rows = page_rows(analysis)
-    samples, at = analysis.samples.take(rows), analysis.at
+    samples, evaluation = analysis.samples.take(rows), analysis.at
     points = mm_from_m(samples.position)
     frame = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
-    stiffness, stiffness_range = _fractions(n_per_mm_from_n_per_m(at.stiffness[rows]))
-    margin, margin_range = _fractions(at.margin[rows])
-    kind = samples.motion + OUT_OF_REACH * ~at.reachable[rows] + PLUNGE * analysis.set_aside[rows]
+    stiffness, stiffness_range = _fractions(n_per_mm_from_n_per_m(evaluation.stiffness[rows]))
+    margin, margin_range = _fractions(evaluation.margin[rows])
+    kind = samples.motion + OUT_OF_REACH * ~evaluation.reachable[rows] + PLUNGE * analysis.set_aside[rows]
     tool_starts = np.flatnonzero(np.diff(samples.tool, prepend=-1) != 0)
     return {
         "machine": plain(analysis.machine.name),

@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.files import Content
-from toolpath_stiff.report.batch.outcomes import Outcome, good_and_failed, summary_csv
+from toolpath_stiff.report.batch.outcomes import ProgramOutcome, good_and_failed, summary_csv
 from toolpath_stiff.report.batch.programs import RESERVED
 from toolpath_stiff.report.figure_words import ONLY_PLUNGES
 from toolpath_stiff.report.pages import markup, render
@@ -39,7 +39,7 @@ HOW_TO_READ = (
 )
 
 
-def batch_page(outcomes: Sequence[Outcome]) -> str:
+def batch_page(outcomes: Sequence[ProgramOutcome]) -> str:
     """The page's text, in the order of `outcomes`; links are relative to the folder of all reports."""
     good, failed = good_and_failed(outcomes)
     every = counted(len(outcomes), "program")
@@ -62,7 +62,7 @@ def batch_page(outcomes: Sequence[Outcome]) -> str:
     )
 
 
-def _headline(good: Sequence[Outcome]) -> str:
+def _headline(good: Sequence[ProgramOutcome]) -> str:
     known = [outcome for outcome in good if outcome.figure("min_N_per_mm") is not None]
     if not known:
         return "No stiffness to compare"
@@ -71,7 +71,7 @@ def _headline(good: Sequence[Outcome]) -> str:
     return f"Weakest: {lowest} N/mm in line {line} of {weakest.name}"
 
 
-def _about(good: Sequence[Outcome]) -> list[str]:
+def _about(good: Sequence[ProgramOutcome]) -> list[str]:
     """What all programs have in common."""
     if not good:
         return []
@@ -84,7 +84,7 @@ def _about(good: Sequence[Outcome]) -> list[str]:
     return parts
 
 
-def _totals(good: Sequence[Outcome], failed: Sequence[Outcome]) -> list[tuple[str, str]]:
+def _totals(good: Sequence[ProgramOutcome], failed: Sequence[ProgramOutcome]) -> list[tuple[str, str]]:
     length, time = (sum(outcome.figures[name] for outcome in good) for name in ("cutting_length_mm", "time_s"))
     partial = sum(outcome.status == "partial" for outcome in good)
     below = sum(bool(outcome.figure("lines_below_required")) for outcome in good)
@@ -100,7 +100,7 @@ def _totals(good: Sequence[Outcome], failed: Sequence[Outcome]) -> list[tuple[st
 
 
 @dataclass(frozen=True)
-class Scale:
+class StiffnessScale:
     """One scale of stiffness for all bars, N/mm: its ends, which are ticks, and the ticks."""
 
     low: float
@@ -124,7 +124,7 @@ class Scale:
         return f'<rect class="{kind}" x="{left}" width="{width}" y="6" height="10" rx="2"/>'
 
 
-def _scale(good: Sequence[Outcome], with_plunges: bool = False) -> Scale | None:
+def _scale(good: Sequence[ProgramOutcome], with_plunges: bool = False) -> StiffnessScale | None:
     """A scale that holds the bars and the required level; None where there is no bar.
 
     Programs that only plunge set it if there are no others, or `with_plunges`, as the plunges of all then do.
@@ -144,16 +144,16 @@ def _scale(good: Sequence[Outcome], with_plunges: bool = False) -> Scale | None:
     step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least * (1.0 - 1e-9))
     first, last = math.floor(low / step), math.ceil(high / step)
     ticks = tuple(i * step for i in range(first, last + 1))
-    return Scale(first * step, last * step, ticks, good[0].figure("required_N_per_mm"))
+    return StiffnessScale(first * step, last * step, ticks, good[0].figure("required_N_per_mm"))
 
 
-def _axis(scale: Scale) -> Markup:
+def _axis(scale: StiffnessScale) -> Markup:
     shown = scale.ticks[:: 1 if len(scale.ticks) <= MOST_LABELS else 2]
     texts = "".join(f'<text x="{scale.at(tick)}" y="14">{number(tick)}</text>' for tick in shown)
     return Markup(f'<svg height="18" aria-hidden="true">{texts}</svg>')  # numbers and words of our own
 
 
-def _bar(outcome: Outcome, scale: Scale, with_plunges: bool = False) -> Markup:
+def _bar(outcome: ProgramOutcome, scale: StiffnessScale, with_plunges: bool = False) -> Markup:
     low, mean, high = (outcome.figure(f"{name}_N_per_mm") for name in ("min", "mean", "max"))
     lines = "".join(scale.line(tick, "tick") for tick in scale.ticks)
     if low is not None and (low > scale.high or high < scale.low):  # only plunges, and these are not on the scale
@@ -185,14 +185,14 @@ class Column:
 
     title: str
     kind: str
-    cell: Callable[[Outcome], Cell]
+    cell: Callable[[ProgramOutcome], Cell]
     hint: str = ""
 
 
 def _figure(title: str, name: str, hint: str = "", digits: int = 0, flag: bool = False) -> Column:
     """A column of a figure; of a count that had better be zero, with a flag where it is not."""
 
-    def cell(outcome: Outcome) -> Cell:
+    def cell(outcome: ProgramOutcome) -> Cell:
         shown = outcome.number(name, digits)
         flagged = flag and outcome.figure(name)
         return _sorted_by(outcome, name), markup('<span class="flag">{}</span>', shown) if flagged else shown
@@ -200,13 +200,13 @@ def _figure(title: str, name: str, hint: str = "", digits: int = 0, flag: bool =
     return Column(title, "num", cell, hint)
 
 
-def _sorted_by(outcome: Outcome, name: str) -> str:
+def _sorted_by(outcome: ProgramOutcome, name: str) -> str:
     """The figure to sort by; "" where there is none."""
     figure = outcome.figure(name)
     return "" if figure is None else repr(figure)
 
 
-def _table(good: Sequence[Outcome]) -> dict[str, Any] | None:
+def _table(good: Sequence[ProgramOutcome]) -> dict[str, Any] | None:
     """What the template makes the table of; None where there is nothing to draw."""
     scale = _scale(good)
     if scale is None:
@@ -244,7 +244,7 @@ def _table(good: Sequence[Outcome]) -> dict[str, Any] | None:
     }
 
 
-def _key(scale: Scale, other: str | None, plunging: bool) -> list[tuple[str, str]]:
+def _key(scale: StiffnessScale, other: str | None, plunging: bool) -> list[tuple[str, str]]:
     """Kind of drawing and what it stands for."""
     return [
         ("span", "lowest to highest, N/mm"),
@@ -255,19 +255,19 @@ def _key(scale: Scale, other: str | None, plunging: bool) -> list[tuple[str, str
     ]
 
 
-def _link(outcome: Outcome) -> Cell:
+def _link(outcome: ProgramOutcome) -> Cell:
     """The name; it opens the report. Names need not be UTF-8, nor free of what addresses take otherwise."""
     address = quote(os.fsencode(outcome.opens))
     return outcome.name, markup('<a href="{}" title="{}">{}</a>', address, outcome.file, outcome.name)
 
 
-def _plunges(outcome: Outcome) -> Cell:
+def _plunges(outcome: ProgramOutcome) -> Cell:
     """Their mean; of a program that only plunges all other figures are theirs already."""
     shown = ONLY_PLUNGES if outcome.plunges_only else outcome.number("plunge_mean_N_per_mm")
     return _sorted_by(outcome, "plunge_mean_N_per_mm"), shown
 
 
-def _place(outcome: Outcome) -> Cell:
+def _place(outcome: ProgramOutcome) -> Cell:
     """Number and text of the weakest line."""
     line = outcome.figure("weakest_line")
     if line is None:
@@ -281,6 +281,6 @@ def names() -> tuple[str, ...]:
     return INDEX, SUMMARY
 
 
-def files(outcomes: Sequence[Outcome]) -> dict[str, Content]:
+def files(outcomes: Sequence[ProgramOutcome]) -> dict[str, Content]:
     """The overview of many programs: page and table."""
     return {INDEX: batch_page(outcomes), SUMMARY: summary_csv(outcomes)}

@@ -59,7 +59,7 @@ COLUMNS: Mapping[str, int | None] = {
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ProgramOutcome:
     """What became of a program.
 
     Attributes
@@ -103,7 +103,7 @@ class Outcome:
         return number(self.figure(name), digits)
 
 
-def good_and_failed(outcomes: Sequence[Outcome]) -> tuple[list[Outcome], list[Outcome]]:
+def good_and_failed(outcomes: Sequence[ProgramOutcome]) -> tuple[list[ProgramOutcome], list[ProgramOutcome]]:
     """The programs that have figures, and those that failed."""
     good, failed = (
         [outcome for outcome in outcomes if bool(outcome.figures) is analyzed] for analyzed in (True, False)
@@ -128,7 +128,7 @@ def figures_of(summary: Document) -> Document:
     return {name: flat[name] for name in COLUMNS if name in flat}
 
 
-def summary_csv(outcomes: Sequence[Outcome]) -> str:
+def summary_csv(outcomes: Sequence[ProgramOutcome]) -> str:
     """`summary.csv`: one row a program, failures too; a figure that does not exist is an empty cell."""
 
     def cell(value: Any, digits: int | None) -> str:
@@ -141,13 +141,13 @@ def summary_csv(outcomes: Sequence[Outcome]) -> str:
     return csv_text([*kinds], rows)
 
 
-def columns_of(outcomes: Sequence[Outcome]) -> dict[str, list[Any]]:
+def columns_of(outcomes: Sequence[ProgramOutcome]) -> dict[str, list[Any]]:
     """The same as values, column by column; None for a figure that does not exist."""
     columns = {name: [getattr(outcome, of) for outcome in outcomes] for name, of in TOLD.items()}
     return columns | {name: [outcome.figure(name) for outcome in outcomes] for name in COLUMNS}
 
 
-def terminal_summary(outcomes: Sequence[Outcome]) -> str:
+def terminal_summary(outcomes: Sequence[ProgramOutcome]) -> str:
     """One line a program that was analyzed, then the failures with their reasons; at most 100 columns but for these."""
     good, failed = good_and_failed(outcomes)
     lines = _program_table(good) if good else []
@@ -168,7 +168,7 @@ def terminal_summary(outcomes: Sequence[Outcome]) -> str:
     return "\n".join(lines)
 
 
-def _program_table(good: Sequence[Outcome]) -> list[str]:
+def _program_table(good: Sequence[ProgramOutcome]) -> list[str]:
     """Names and program text to the left, figures to the right."""
     compared = good[0].figure("compare_machine") is not None
     heads = ["program", "cutting mm", "time", "mean N/mm", "min N/mm"]

@@ -42,12 +42,12 @@ EFFECT = SECOND_ORANGE
 
 
 @drawn
-def load_path_png(found: Comparison) -> Figure:
+def load_path_png(comparison: Comparison) -> Figure:
     """PNG: compliance of the tip along X, Y, Z, link by link, and what the measurements add or take."""
-    shares = found.shares
+    shares = comparison.shares
     compliance = shares.compliance * NM_PER_N
-    along = directions(found.data)
-    ratio = np.array([_measured_over_modelled(found, along == axis) for axis in "XYZ"])
+    along = directions(comparison.data)
+    ratio = np.array([_measured_over_modelled(comparison, along == axis) for axis in "XYZ"])
     with house_style():
         longest = max(len(name) for name in shares.links)
         below = 0.95 if longest <= LONG_NAME else 1.45
@@ -73,11 +73,11 @@ def load_path_png(found: Comparison) -> Figure:
         return figure
 
 
-def _measured_over_modelled(found: Comparison, rows: NDArray[np.bool_]) -> float:
+def _measured_over_modelled(comparison: Comparison, rows: NDArray[np.bool_]) -> float:
     """Mean measured compliance over the modelled one; nan without readings along it."""
     if not rows.any():
         return float("nan")
-    return float(np.mean(1.0 / found.data.stiffness[rows]) / np.mean(np.exp(-found.log_model[rows])))
+    return float(np.mean(1.0 / comparison.data.stiffness[rows]) / np.mean(np.exp(-comparison.log_model[rows])))
 
 
 def stiffness_deviation_percent(compliance_ratio: float) -> float:
@@ -94,14 +94,14 @@ def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: flo
         axes.bar(i, size, 0.8, bottom=below[i], color=colour)
         axes.plot([i + 0.4, i + 1.4], [below[i + 1]] * 2, color=MUTED, lw=0.7)
         axes.text(i, below[i + 1] + 0.012 * total, f"{100 * size / total:.0f} %", ha="center", va="bottom", fontsize=8)
-    at = len(parts)
-    axes.bar(at, total, 0.8, color=INK)
+    place = len(parts)
+    axes.bar(place, total, 0.8, color=INK)
     names.append("model")
     if np.isfinite(ratio):
-        axes.bar(at + 1, total * ratio, 0.8, color="white", edgecolor=INK, hatch="////", linewidth=1.0)
+        axes.bar(place + 1, total * ratio, 0.8, color="white", edgecolor=INK, hatch="////", linewidth=1.0)
         off = f"stiffness\n{stiffness_deviation_percent(ratio):+.0f} %"
         axes.text(
-            at + 1, total * (ratio + 0.012), off, ha="center", va="bottom", fontsize=8.5,
+            place + 1, total * (ratio + 0.012), off, ha="center", va="bottom", fontsize=8.5,
             weight="bold", zorder=4, bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
         )  # fmt: skip
         names.append("measured")

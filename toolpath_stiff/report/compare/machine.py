@@ -50,14 +50,14 @@ LEFT, PANEL, WIDEST, NARROWEST = 0.8, 3.65, 15.0, 8.6  # inches: margin, a squar
 
 
 @drawn
-def machine_png(found: Comparison) -> Figure:
+def machine_png(comparison: Comparison) -> Figure:
     """PNG: glyphs on the machine from above, plane by plane, and from the front and the right."""
-    data = found.data
+    data = comparison.data
     where = planes(data)
-    order = [*reversed(found.summary.by_plane)]
+    order = [*reversed(comparison.summary.by_plane)]
     along = directions(data)
     axes_shown = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
-    largest = _largest(found)
+    largest = _largest(comparison)
     with house_style():
         pitch = min(PANEL, WIDEST / (len(order) + 1))
         width = max(LEFT + pitch * (len(order) + 1), NARROWEST)
@@ -67,15 +67,15 @@ def machine_png(found: Comparison) -> Figure:
         for i, plane in enumerate(order):
             place = (LEFT + i * pitch, 4.75, pitch - 0.45, pitch - 0.45)
             axes = figure.add_axes(_relative(place, width, height))
-            _from_above(axes, found)
-            z = found.summary.by_plane[plane].z_mm
+            _from_above(axes, comparison)
+            z = comparison.summary.by_plane[plane].z_mm
             axes.set_title("from above" if len(order) == 1 else _plane_title(plane, z), fontsize=10)
             axes.set_xlabel("X mm", fontsize=9)
             if i == 0:
                 axes.set_ylabel("Y mm", fontsize=9)
-            _glyphs(axes, found, mm_from_m(data.position[:, :2]), where == plane, axes_shown, largest)
+            _glyphs(axes, comparison, mm_from_m(data.position[:, :2]), where == plane, axes_shown, largest)
         place = (LEFT + len(order) * pitch, 4.75, pitch - 0.45, pitch - 0.45)
-        _whole_machine(figure.add_axes(_relative(place, width, height)), found)
+        _whole_machine(figure.add_axes(_relative(place, width, height)), comparison)
         half = (width - LEFT) / 2.0
         for i, across in enumerate((0, 1)):
             axes = figure.add_axes(_relative((LEFT + i * half, 0.55, half - 0.45, 3.3), width, height))
@@ -87,7 +87,7 @@ def machine_png(found: Comparison) -> Figure:
             if i == 0:
                 axes.set_ylabel("Z mm", fontsize=9)
             flat = mm_from_m(data.position[:, [across, 2]])
-            _glyphs(axes, found, flat, np.ones(len(data), dtype=bool), axes_shown, largest)
+            _glyphs(axes, comparison, flat, np.ones(len(data), dtype=bool), axes_shown, largest)
         heading(
             figure,
             "Where does the model fail? Alike all around, or on one side?",
@@ -121,25 +121,25 @@ def _key(figure: Any, axes_shown: list[str], width: float, height: float) -> Non
         figure.text(x, y, "\u25ae " + axis, color=DIRECTION_COLOURS[axis], size=11, weight="bold")
 
 
-def _largest(found: Comparison) -> float:
+def _largest(comparison: Comparison) -> float:
     """Residual of the tallest bar, %: few extreme readings do not take the contrast."""
-    size = np.abs(deviation_percent(found.residual))
-    near = near_rows(found)
+    size = np.abs(deviation_percent(comparison.residual))
+    near = near_rows(comparison)
     return max(float(np.quantile(size[near] if near.any() else size, 0.98)), 0.5)
 
 
-def _from_above(axes: Axes, found: Comparison) -> None:
+def _from_above(axes: Axes, comparison: Comparison) -> None:
     """The machine's axis in the middle, the directions of the frame's joints, numbered, and circles of distance."""
     from matplotlib.patches import Circle
 
-    half = 1.36 * max(float(np.abs(found.data.position[:, :2]).max()), 0.1)
+    half = 1.36 * max(float(np.abs(comparison.data.position[:, :2]).max()), 0.1)
     axes.set_xlim(*mm_from_m(np.array([-half, half])))
     axes.set_ylim(*mm_from_m(np.array([-half, half])))
     axes.set_aspect("equal")
     axes.grid(visible=False)
     for share in (0.37, 0.74):
         axes.add_patch(Circle((0.0, 0.0), mm_from_m(share * half), fc="none", ec=GRID, lw=1.0, zorder=0))
-    frame = found.predictor.base.machine.frame_joints[:, :2]
+    frame = comparison.predictor.base.machine.frame_joints[:, :2]
     azimuths = np.round(np.degrees(np.arctan2(frame[:, 1], frame[:, 0])), 1)
     for azimuth in np.unique(azimuths):
         direction = np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))])
@@ -151,11 +151,11 @@ def _from_above(axes: Axes, found: Comparison) -> None:
     axes.tick_params(labelsize=8)
 
 
-def _whole_machine(axes: Axes, found: Comparison) -> None:
+def _whole_machine(axes: Axes, comparison: Comparison) -> None:
     """Struts and platform with the tool at the middle of the measured poses, which are boxed, from the front."""
     from matplotlib.patches import Rectangle
 
-    machine, position = found.predictor.base.machine, found.data.position
+    machine, position = comparison.predictor.base.machine, comparison.data.position
     low, high = position.min(axis=0), position.max(axis=0)
     tip = ((low + high) / 2.0)[None]
     joints = tip[0] + solve_struts(machine, tip).arms[0]
@@ -177,13 +177,13 @@ def _whole_machine(axes: Axes, found: Comparison) -> None:
 
 
 def _glyphs(
-    axes: Axes, found: Comparison, flat: FloatArray, rows: NDArray[np.bool_], axes_shown: list[str], largest: float
+    axes: Axes, comparison: Comparison, flat: FloatArray, rows: NDArray[np.bool_], axes_shown: list[str], largest: float
 ) -> None:
     """One glyph a place in the view (n, 2) mm."""
     from matplotlib.offsetbox import AnnotationBbox, DrawingArea
     from matplotlib.patches import Rectangle
 
-    along = directions(found.data)
+    along = directions(comparison.data)
     span = abs(axes.get_xlim()[1] - axes.get_xlim()[0])
     cells = np.round(flat / (MERGED * span)).astype(int)
     wide = (BAR + GAP) * len(axes_shown)
@@ -196,7 +196,7 @@ def _glyphs(
             chosen = here & (along == axis)
             if not chosen.any():
                 continue
-            size = float(deviation_percent(found.residual[chosen].mean()))
+            size = float(deviation_percent(comparison.residual[chosen].mean()))
             tall = float(np.clip(size / largest, -1.15, 1.15)) * TALLEST
             area.add_artist(
                 Rectangle((j * (BAR + GAP), middle), BAR, tall, fc=DIRECTION_COLOURS[axis], ec="none", alpha=0.9)

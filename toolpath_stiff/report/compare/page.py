@@ -73,9 +73,9 @@ PICTURES = {
 }
 
 
-def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
+def compare_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
     """The page's text, the pictures within."""
-    summary = found.summary
+    summary = comparison.summary
     base, refit = summary.baseline, summary.baseline.strut_law_refitted
     findings = summary.findings
     sections = [
@@ -105,7 +105,7 @@ def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
         (f"{_by_noise(base.explained_by_scatter_percent, '.0f')} %", "of the mean square is scatter"),
     ]
     question = "Where does the model fail?"
-    return readings_page("Comparison", "compare", found.document, question, headline, figures, sections)
+    return readings_page("Comparison", "compare", comparison.document, question, headline, figures, sections)
 
 
 def _by_noise(figures: Mapping[str, float], form: str) -> str:
@@ -236,9 +236,9 @@ def _noise(summary: ComparisonSummary) -> Markup:
 MOST_NAMED = 5  # readings far off, on the terminal
 
 
-def text(found: Comparison) -> str:
+def text(comparison: Comparison) -> str:
     """Errors, findings, checks, in lines, and the commands that go on from here."""
-    summary = found.summary
+    summary = comparison.summary
     lines = [summary.text, "", *_table(summary), *_refitted(summary), "", "findings"]
     lines += [f"  {plain(hint.text)} (p = {hint.p_adjusted:.2g})" for hint in summary.findings]
     if not summary.findings:
@@ -302,10 +302,10 @@ def _with_unit(variable: Variable) -> str:
     return variable.name if variable.name.endswith(suffix) else f"{variable.name}_{suffix}"
 
 
-def residuals_csv(found: Comparison) -> str:
+def residuals_csv(comparison: Comparison) -> str:
     """One row a reading: measured, modelled, deviation, scatter, every variable that residuals were held against."""
-    data = found.data
-    further = [variable for variable in found.numbers if variable.name not in ("x", "y", "height", "order")]
+    data = comparison.data
+    further = [variable for variable in comparison.numbers if variable.name not in ("x", "y", "height", "order")]
     head = [
         "file", "line", "point", "setup", "clamp", "plane", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg",
         "c_deg", "dx", "dy", "dz", "measured_N_per_mm", "modelled_N_per_mm", "deviation_percent", "scatter_percent",
@@ -316,13 +316,13 @@ def residuals_csv(found: Comparison) -> str:
     for i in range(len(data)):
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
-        modelled = float(n_per_mm_from_n_per_m(np.exp(found.log_model[i])))
+        modelled = float(n_per_mm_from_n_per_m(np.exp(comparison.log_model[i])))
         rows.append(
             [
                 data.file[i], data.line[i], data.point[i], data.setup[i], data.clamp[i], where[i], along[i],
                 *(f"{value + 0.0:.6g}" for value in pose),
-                f"{measured:.1f}", f"{modelled:.1f}", f"{float(deviation_percent(found.residual[i])):.3f}",
-                f"{100.0 * found.scatter[i]:.3f}",
+                f"{measured:.1f}", f"{modelled:.1f}", f"{float(deviation_percent(comparison.residual[i])):.3f}",
+                f"{100.0 * comparison.scatter[i]:.3f}",
                 *("" if np.isnan(variable.values[i]) else f"{variable.values[i]:.6g}" for variable in further),
             ]
         )  # fmt: skip
@@ -335,13 +335,13 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return (*data, "report.html", *PICTURES) if plots else data
 
 
-def files(found: Comparison, *, plots: bool = True) -> dict[str, Content]:
+def files(comparison: Comparison, *, plots: bool = True) -> dict[str, Content]:
     """Everything as JSON, one row a reading, and with `plots` pictures and page."""
     contents: dict[str, Content] = {
-        "compare.json": found.to_json(),
-        "residuals.csv": residuals_csv(found),
+        "compare.json": comparison.to_json(),
+        "residuals.csv": residuals_csv(comparison),
     }
     if plots:
-        pictures = {name: draw(found) for name, draw in PICTURES.items()}
-        contents |= {**pictures, "report.html": compare_html(found, pictures)}
+        pictures = {name: draw(comparison) for name, draw in PICTURES.items()}
+        contents |= {**pictures, "report.html": compare_html(comparison, pictures)}
     return contents

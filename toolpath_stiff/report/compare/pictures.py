@@ -48,10 +48,10 @@ def heading(figure: Figure, question: str, remark: str) -> None:
     figure.text(0.3 / width, 1.0 - 0.66 / height, remark, size=9.5, color=MUTED)
 
 
-def near_rows(found: Comparison) -> NDArray[np.bool_]:
+def near_rows(comparison: Comparison) -> NDArray[np.bool_]:
     """(n,) readings that are not far off."""
-    near = np.ones(len(found.residual), dtype=bool)
-    near[[reading.reading - 1 for reading in found.summary.outliers]] = False
+    near = np.ones(len(comparison.residual), dtype=bool)
+    near[[reading.reading - 1 for reading in comparison.summary.outliers]] = False
     return near
 
 
@@ -66,13 +66,13 @@ def markers(setup: NDArray[np.str_]) -> dict[str, str]:
 
 
 @drawn
-def measured_modelled_png(found: Comparison) -> Figure:
+def measured_modelled_png(comparison: Comparison) -> Figure:
     """PNG: measured against modelled stiffness, log-log, colour a direction, marker a set-up, with the 10 % band."""
-    data = found.data
+    data = comparison.data
     along, shapes = directions(data), markers(data.setup)
-    modelled = n_per_mm_from_n_per_m(np.exp(found.log_model))
+    modelled = n_per_mm_from_n_per_m(np.exp(comparison.log_model))
     measured = n_per_mm_from_n_per_m(data.stiffness)
-    spread = SIDES * found.scatter
+    spread = SIDES * comparison.scatter
     bars = np.stack([measured * -np.expm1(-spread), measured * np.expm1(spread)])
     low = 0.9 * float(min(modelled.min(), (measured - bars[0]).min()))
     high = 1.1 * float(max(modelled.max(), (measured + bars[1]).max()))
@@ -96,9 +96,9 @@ def measured_modelled_png(found: Comparison) -> Figure:
                         mew=0.5, zorder=3,
                     )  # fmt: skip
         _log_axes(axes, low, high)
-        _legend(axes, found, along, shapes)
-        _residuals(beside, found, modelled, along, shapes)
-        name = found.noises[-1].name
+        _legend(axes, comparison, along, shapes)
+        _residuals(beside, comparison, modelled, along, shapes)
+        name = comparison.noises[-1].name
         heading(
             figure,
             "How wrong is the model, biased or scattered?",
@@ -134,10 +134,10 @@ def _log_axis(axis: Axis, low: float, high: float) -> None:
 
 
 def _residuals(
-    axes: Axes, found: Comparison, modelled: FloatArray, along: NDArray[np.str_], shapes: dict[str, str]
+    axes: Axes, comparison: Comparison, modelled: FloatArray, along: NDArray[np.str_], shapes: dict[str, str]
 ) -> None:
     """The same readings as residuals: what is within the line's width beside this."""
-    residual = deviation_percent(found.residual)
+    residual = deviation_percent(comparison.residual)
     axes.axhspan(-100.0 * BAND, 100.0 * BAND, color=WITHIN, lw=0, zorder=0)
     axes.axhline(0.0, color=MUTED, lw=1.0, zorder=1)
     for axis, colour in DIRECTION_COLOURS.items():
@@ -145,7 +145,7 @@ def _residuals(
         if not rows.any():
             continue
         for setup, marker in shapes.items():
-            chosen = rows & (found.data.setup == setup)
+            chosen = rows & (comparison.data.setup == setup)
             axes.plot(
                 modelled[chosen], residual[chosen], marker, color=colour, ms=4.0 if len(residual) > 100 else 6.5,
                 mec="white", mew=0.5, zorder=3,
@@ -159,7 +159,7 @@ def _residuals(
     axes.set_title("the difference; dashed: mean of a direction", fontsize=10)
 
 
-def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict[str, str]) -> None:
+def _legend(axes: Axes, comparison: Comparison, along: NDArray[np.str_], shapes: dict[str, str]) -> None:
     """Directions with their mean error; set-ups if there are several."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -167,7 +167,7 @@ def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict
     keys: list[Line2D | Patch] = []
     for axis, colour in DIRECTION_COLOURS.items():
         if (along == axis).any():
-            errors = found.summary.by_direction[axis]
+            errors = comparison.summary.by_direction[axis]
             mean, bias = errors.mean_abs_error_percent, errors.bias_percent
             text = (
                 f"{axis}: mean error {mean:.1f} %, {abs(bias):.1f} % {'softer' if bias < 0 else 'stiffer'} on balance"
@@ -182,14 +182,14 @@ def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict
 
 
 @drawn
-def strips_png(found: Comparison) -> Figure:
+def strips_png(comparison: Comparison) -> Figure:
     """PNG: residuals in measuring order, one strip a direction, changes of set-up and file marked."""
-    data, residual = found.data, deviation_percent(found.residual)
+    data, residual = comparison.data, deviation_percent(comparison.residual)
     along, shapes = directions(data), markers(data.setup)
     present = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     order = np.arange(1, len(data) + 1)
     edges = np.concatenate(
-        [residual, deviation_percent(-SIDES * found.scatter), deviation_percent(SIDES * found.scatter)]
+        [residual, deviation_percent(-SIDES * comparison.scatter), deviation_percent(SIDES * comparison.scatter)]
     )
     margin = 0.12 * float(np.ptp(edges))
     with house_style():
@@ -198,7 +198,7 @@ def strips_png(found: Comparison) -> Figure:
         for i, axis in enumerate(present):
             axes = figure.add_axes((0.065, (0.55 + 1.9 * (len(present) - 1 - i)) / height, 0.92, 1.65 / height))
             rows = along == axis
-            spread = SIDES * found.scatter[rows]
+            spread = SIDES * comparison.scatter[rows]
             axes.fill_between(
                 order[rows],
                 deviation_percent(-spread),
@@ -220,7 +220,7 @@ def strips_png(found: Comparison) -> Figure:
             axes.set_xlim(0.0, len(data) + 1.0)
             axes.set_ylim(edges.min() - margin, edges.max() + margin)
             axes.set_ylabel(f"{axis}, %", weight="bold", color=DIRECTION_COLOURS[axis])
-            _name_far_off(axes, found, axis, residual)
+            _name_far_off(axes, comparison, axis, residual)
             if i < len(present) - 1:
                 axes.set_xticklabels([])
             else:
@@ -249,9 +249,9 @@ def _changes(axes: Axes, setup: NDArray[np.str_], file: NDArray[np.str_], named:
             )  # fmt: skip
 
 
-def _name_far_off(axes: Axes, found: Comparison, axis: str, residual: FloatArray) -> None:
+def _name_far_off(axes: Axes, comparison: Comparison, axis: str, residual: FloatArray) -> None:
     """File lines of the readings that are far off."""
-    for far in found.summary.outliers[:12]:
+    for far in comparison.summary.outliers[:12]:
         if far.direction != axis:
             continue
         i = far.reading - 1
@@ -263,23 +263,23 @@ def _name_far_off(axes: Axes, found: Comparison, axis: str, residual: FloatArray
 
 
 @drawn
-def planes_png(found: Comparison) -> Figure:
+def planes_png(comparison: Comparison) -> Figure:
     """PNG: mean residual by plane and direction, a signed percentage a cell with its standard error."""
-    data = found.data
+    data = comparison.data
     along, where = directions(data), planes(data)
     columns = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     columns += ["all"] if len(columns) > 1 else []
-    rows = [*reversed(found.summary.by_plane)]
+    rows = [*reversed(comparison.summary.by_plane)]
     rows += ["all"] if len(rows) > 1 else []
-    near = near_rows(found)
+    near = near_rows(comparison)
     cells = np.full((len(rows), len(columns), 3), np.nan)
     for i, plane in enumerate(rows):
         for j, axis in enumerate(columns):
             chosen = near & ((where == plane) | (plane == "all")) & ((along == axis) | (axis == "all"))
             if chosen.any():
                 weights = chosen / chosen.sum()
-                error = 100.0 * float(np.sqrt(found.variance(weights)))
-                cells[i, j] = deviation_percent(weights @ found.residual), error, chosen.sum()
+                error = 100.0 * float(np.sqrt(comparison.variance(weights)))
+                cells[i, j] = deviation_percent(weights @ comparison.residual), error, chosen.sum()
     from matplotlib import colormaps
 
     limit = max(float(np.nanmax(np.abs(cells[..., 0]), initial=0.0, where=np.isfinite(cells[..., 0]))), 1.0)

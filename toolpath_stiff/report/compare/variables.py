@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.comparison.residuals import Label, Variable
+    from toolpath_stiff.comparison.residuals import ReadingNames, Variable
     from toolpath_stiff.comparison.summary import PatternTest
 
 
@@ -43,26 +43,26 @@ WIDE = 7.5  # median deviations, some 5 standard deviations: readings further of
 
 
 @drawn
-def variables_png(found: Comparison) -> Figure:
+def variables_png(comparison: Comparison) -> Figure:
     """PNG: residual against each variable, the strongest first; readings far off stand at the edge."""
-    limits = _limits(found)
-    panels: list[tuple[float, str, Variable | Label]] = []
-    held_against: list[Variable | Label] = [*found.numbers, *found.names]
-    for one in held_against:
-        tests = [t for t in found.summary.tests if _about(t, one.name)]
+    limits = _limits(comparison)
+    panels: list[tuple[float, str, Variable | ReadingNames]] = []
+    held_against: list[Variable | ReadingNames] = [*comparison.numbers, *comparison.names]
+    for variable in held_against:
+        tests = [t for t in comparison.summary.tests if _about(t, variable.name)]
         p = min((t.p_adjusted for t in tests), default=1.0)
         strongest = max((abs(t.statistic) for t in tests), default=0.0)
-        panels.append((-strongest, f"p = {p:.2g}" + ("" if p >= SIGNIFICANT else " *"), one))
+        panels.append((-strongest, f"p = {p:.2g}" + ("" if p >= SIGNIFICANT else " *"), variable))
     panels.sort(key=lambda panel: panel[0])
     rows = -(-len(panels) // ACROSS)
     with house_style():
         width, height = 15.0, 1.0 + PITCH * max(rows, 1)
         figure = new_figure(width, height)
-        for k, (_, shown, one) in enumerate(panels):
+        for k, (_, shown, variable) in enumerate(panels):
             i, j = divmod(k, ACROSS)
             x, y = 0.6 + 2.88 * j, height - 1.0 - PITCH * (i + 1) + 0.42
             axes = figure.add_axes((x / width, y / height, 2.62 / width, 1.45 / height))
-            _panel(axes, found, one, limits)
+            _panel(axes, comparison, variable, limits)
             axes.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
             axes.set_ylim(*limits)
             axes.tick_params(labelsize=7.5, pad=2)
@@ -70,14 +70,14 @@ def variables_png(found: Comparison) -> Figure:
                 axis.set_label_coords(0.5, 0.0)  # without a name: none is to be kept clear of the figures
             if j:
                 axes.set_yticklabels([])
-            unit = str(getattr(one, "unit", ""))
-            name = plain(one.name.removesuffix(f"_{unit}").replace("_", " ")) + (f", {unit}" if unit else "")
+            unit = str(getattr(variable, "unit", ""))
+            name = plain(variable.name.removesuffix(f"_{unit}").replace("_", " ")) + (f", {unit}" if unit else "")
             axes.set_title(shortened(name, 30), fontsize=9, pad=3)
             axes.set_title(
                 shown, fontsize=8.5, pad=3, loc="right", weight="bold" if shown.endswith("*") else "normal",
                 color=UNREACHABLE_RED if shown.endswith("*") else MUTED,
             )  # fmt: skip
-        _key(figure, found)
+        _key(figure, comparison)
         heading(
             figure,
             "Which variable is missing?",
@@ -93,9 +93,9 @@ def _about(test: PatternTest, name: str) -> bool:
     return any(variable == name or variable.startswith(f"{name} ") for variable in about)
 
 
-def _limits(found: Comparison) -> tuple[float, float]:
+def _limits(comparison: Comparison) -> tuple[float, float]:
     """Range shown: all, but a few wild readings do not squeeze the others."""
-    values = deviation_percent(found.residual)
+    values = deviation_percent(comparison.residual)
     middle = float(np.median(values))
     reach = WIDE * float(np.median(np.abs(values - middle)))
     kept = values[np.abs(values - middle) <= reach] if reach > 0.0 else values
@@ -103,12 +103,12 @@ def _limits(found: Comparison) -> tuple[float, float]:
     return float(kept.min()) - margin, float(kept.max()) + margin
 
 
-def _key(figure: object, found: Comparison) -> None:
+def _key(figure: object, comparison: Comparison) -> None:
     from matplotlib.figure import Figure
 
     assert isinstance(figure, Figure)
     width, height = figure.get_size_inches()
-    present = [axis for axis in DIRECTION_COLOURS if (directions(found.data) == axis).any()]
+    present = [axis for axis in DIRECTION_COLOURS if (directions(comparison.data) == axis).any()]
     for i, axis in enumerate(reversed(present)):
         figure.text(
             1.0 - (0.4 + 0.5 * i) / width, 1.0 - 0.4 / height, "\u25cf " + axis, color=DIRECTION_COLOURS[axis], size=11,
@@ -116,10 +116,10 @@ def _key(figure: object, found: Comparison) -> None:
         )  # fmt: skip
 
 
-def _panel(axes: Axes, found: Comparison, one: Variable | Label, limits: tuple[float, float]) -> None:
+def _panel(axes: Axes, comparison: Comparison, variable: Variable | ReadingNames, limits: tuple[float, float]) -> None:
     """Points by direction; a trend line a direction, or the means of levels."""
-    residual, along = deviation_percent(found.residual), directions(found.data)
-    x, names = _places(one)
+    residual, along = deviation_percent(comparison.residual), directions(comparison.data)
+    x, names = _places(variable)
     present = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     for k, axis in enumerate(present):
         rows = (along == axis) & np.isfinite(x)
@@ -135,12 +135,12 @@ def _panel(axes: Axes, found: Comparison, one: Variable | Label, limits: tuple[f
     _name_levels(axes, names)
 
 
-def _places(one: Variable | Label) -> tuple[FloatArray, list[str]]:
+def _places(variable: Variable | ReadingNames) -> tuple[FloatArray, list[str]]:
     """Where the readings stand across a panel, and the names of the levels there, if it has any."""
-    if one.values.dtype.kind == "f":
-        return np.asarray(one.values, dtype=float), []
-    names = sorted(set(one.values.tolist()), key=_rank)
-    return np.array([names.index(level) for level in one.values.tolist()], dtype=float), names
+    if variable.values.dtype.kind == "f":
+        return np.asarray(variable.values, dtype=float), []
+    names = sorted(set(variable.values.tolist()), key=_rank)
+    return np.array([names.index(level) for level in variable.values.tolist()], dtype=float), names
 
 
 def _points(
@@ -162,8 +162,8 @@ def _points(
 def _level_means(axes: Axes, x: FloatArray, held: FloatArray, shift: float, colour: str) -> None:
     """A short bar at the mean of each level."""
     for level in np.unique(x):
-        mean, at = float(held[x == level].mean()), float(level) + shift
-        axes.plot([at - 0.09, at + 0.09], [mean, mean], color=colour, lw=2.4, zorder=4)
+        mean, middle = float(held[x == level].mean()), float(level) + shift
+        axes.plot([middle - 0.09, middle + 0.09], [mean, mean], color=colour, lw=2.4, zorder=4)
 
 
 def _trend(axes: Axes, x: FloatArray, held: FloatArray, colour: str) -> None:

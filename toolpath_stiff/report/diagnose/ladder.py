@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.diagnosis.rows import Row
+from toolpath_stiff.diagnosis.rows import HypothesisRow
 from toolpath_stiff.inference.errors import AS_GIVEN
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.report.diagnose.pictures import titled_figure
@@ -77,7 +77,7 @@ def ladder_png(diagnosis: Diagnosis) -> Figure:
         return figure
 
 
-def _labels(axes: Axes, rows: Sequence[Row]) -> None:
+def _labels(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
     for y, row in enumerate(rows):
         small = ", ".join(size_texts(row, intervals=False)) or plain(row.title)
         weight = "bold" if row.standing else "normal"
@@ -86,7 +86,7 @@ def _labels(axes: Axes, rows: Sequence[Row]) -> None:
         axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=small_colour, size=8)
 
 
-def _errors(axes: Axes, rows: Sequence[Row], diagnosis: Diagnosis) -> None:
+def _errors(axes: Axes, rows: Sequence[HypothesisRow], diagnosis: Diagnosis) -> None:
     base, floor = diagnosis.rows.refitted.held_out_error_percent, json_number(diagnosis.noise.floor_percent) or 0.0
     errors = [error for row in rows for error in (row.held_out_error_percent, row.mean_abs_error_percent)]
     end = 1.08 * max(error for error in errors if error is not None)
@@ -124,7 +124,7 @@ def _errors(axes: Axes, rows: Sequence[Row], diagnosis: Diagnosis) -> None:
     axes.set_xlabel("mean |modelled - measured| / measured, %; dot: left out, tick: in sample", size=9)
 
 
-def _chances(axes: Axes, rows: Sequence[Row]) -> None:
+def _chances(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
     axes.set_xlim(0.0, 1.0)
     for y, row in enumerate(rows):
         value = row.probability or 0.0

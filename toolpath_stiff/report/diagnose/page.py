@@ -117,8 +117,8 @@ def _figures(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         figures.append((percent(rows.best.mean_abs_error_percent, 2), f"mean error with {plain(rows.best.label)}"))
         figures.append((percent(rows.best.held_out_error_percent, 2), "the same at points left out"))
     figures.append((words.floor_text(diagnosis), "would be left by scatter alone"))
-    one = "describes it" if diagnosis.verdict == "described" else "is the explanation"
-    remark = "are left standing" if len(standing) > 1 else one
+    alone = "describes it" if diagnosis.verdict == "described" else "is the explanation"
+    remark = "are left standing" if len(standing) > 1 else alone
     none = ("no effect", "of the catalogue is left standing")
     return [*figures, (words.plausible_text(standing), remark) if standing else none]
 

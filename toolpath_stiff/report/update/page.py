@@ -11,7 +11,7 @@ from markupsafe import Markup
 from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.outcome import FORCED, NOTHING, REFUSED, UPDATED
 from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.steps import LawEnd, Step
+from toolpath_stiff.correction.steps import LadderStep, LawEnd
 from toolpath_stiff.correction.strut_law import bar_curve_csv
 from toolpath_stiff.diagnosis.rows import FittedSize, percent_of
 from toolpath_stiff.files import Content
@@ -100,7 +100,7 @@ def _figures(update: Update) -> list[tuple[str, str]]:
     return figures
 
 
-def _result(update: Update) -> Step:
+def _result(update: Update) -> LadderStep:
     """The model that comes out: the last step, the machine file as given where nothing is added."""
     return update.steps[0 if update.verdict == NOTHING else -1]
 
