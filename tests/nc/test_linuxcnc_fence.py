@@ -12,7 +12,7 @@ import pytest
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL
 from toolpath_stiff.nc.linuxcnc import reader, runner
-from toolpath_stiff.nc.linuxcnc.runner import Limits
+from toolpath_stiff.nc.linuxcnc.runner import RunLimits
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.request import ZERO, Request
@@ -256,7 +256,7 @@ def test_a_program_is_not_changed_and_a_run_leaves_no_trace_in_the_next(tmp_path
     assert file.read_bytes() == before and list(tmp_path.iterdir()) == [file]
 
 
-def read_limited(text: str, limits: Limits, unconfined: bool = False) -> ReadProgram:
+def read_limited(text: str, limits: RunLimits, unconfined: bool = False) -> ReadProgram:
     program = (tuple(text.split("\n")), "part.nc", "", None, ZERO, Offsets(), None, False, "linuxcnc", None, unconfined)
     return reader.read(Request(*program, UNKNOWN_CONTROL), limits)
 
@@ -267,7 +267,7 @@ def test_an_endless_loop_ends(confined, monkeypatch):
     if not confined:
         monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
     with pytest.raises(InputError, match=r"part\.nc.*after 1 s of processor time.*endless loop"):
-        read_limited("G1 X1 F100\no100 while [1]\n#1 = 1\no100 endwhile\nM2", Limits(seconds=1), not confined)
+        read_limited("G1 X1 F100\no100 while [1]\n#1 = 1\no100 endwhile\nM2", RunLimits(seconds=1), not confined)
 
 
 @needs_rs274
@@ -275,7 +275,7 @@ def test_an_endless_loop_is_named():
     """Where it last moved, and the loops of the program."""
     text = "\n".join(["G1 X1 F100", "X2"] * 2000 + ["o100 while [1]", "#1 = 1", "o100 endwhile", "M2"])
     with pytest.raises(InputError, match=r"Loops begin in the lines 4001") as error:
-        read_limited(text, Limits(seconds=1))
+        read_limited(text, RunLimits(seconds=1))
     assert 3000 < (error.value.line or 0) <= 4000  # what rs274 had in its buffer is lost
 
 
@@ -309,13 +309,13 @@ def test_a_user_without_the_filter_starts_no_process_either(tmp_path):
 @needs_rs274
 def test_an_endless_path_ends():
     with pytest.raises(InputError, match=r"part\.nc:3: .*after 1 MB of output"):
-        read_limited("G91\no100 while [1]\nG1 X1 F100\no100 endwhile\nM2", Limits(file_bytes=1_000_000))
+        read_limited("G91\no100 while [1]\nG1 X1 F100\no100 endwhile\nM2", RunLimits(file_bytes=1_000_000))
 
 
 @needs_rs274
 def test_endless_recursion_ends():
     with pytest.raises(InputError, match=r"part\.nc"):
-        read_limited("o100 sub\no100 call\no100 endsub\nG1 X1 F100\no100 call\nM2", Limits(seconds=5))
+        read_limited("o100 sub\no100 call\no100 endsub\nG1 X1 F100\no100 call\nM2", RunLimits(seconds=5))
 
 
 @pytest.mark.skipif(runner._bubblewrap() is None, reason="bubblewrap is not installed, or may not work here")

@@ -16,7 +16,7 @@ from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
-from toolpath_stiff.nc.cutter_location.state import State as CutterLocationState
+from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
 from toolpath_stiff.nc.findings import (
     ERROR,

@@ -105,7 +105,7 @@ class Cutter:
 
 
 @dataclass(frozen=True)
-class Step:
+class CenterMove:
     """What a programmed move makes of the path: the new end of those before it, an arc about a corner, its own end."""
 
     end: Point2
@@ -116,7 +116,7 @@ class Step:
     way: tuple[Point2, ...] = ()
 
 
-def enter(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> tuple[Step, Point2]:
+def enter(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> tuple[CenterMove, Point2]:
     """The first move, and its direction (Fanuc's and LinuxCNC's arcs have none). Raises `ArcError`."""
     if cutter.straight:
         return enter_fanuc(cutter, target, arc), (0.0, 0.0)
@@ -125,14 +125,14 @@ def enter(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) 
     return enter_straight(cutter, start, target)
 
 
-def go_on(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> Step:
+def go_on(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> CenterMove:
     """A further move. Raises `ArcError`."""
     if cutter.straight:
         return go_on_fanuc(cutter, start, target, arc)
     return _go(cutter, start, target, arc, CORNER)
 
 
-def _go(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None, least: float) -> Step:
+def _go(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None, least: float) -> CenterMove:
     if arc is None:
         return go_straight(cutter, start, target, least)
     return go_round(cutter, start, target, arc.center, arc.turn, least)
@@ -146,7 +146,7 @@ def _angle(tail: Point2, head: Point2) -> float:
     return math.atan2(head[1] - tail[1], head[0] - tail[0])
 
 
-def enter_straight(cutter: Cutter, start: Point2, target: Point2) -> tuple[Step, Point2]:
+def enter_straight(cutter: Cutter, start: Point2, target: Point2) -> tuple[CenterMove, Point2]:
     """The first move, straight: it ends beside its end point. Returns it and the direction across it.
 
     Raises `ArcError` where it is not longer than the tool's radius.
@@ -159,10 +159,10 @@ def enter_straight(cutter: Cutter, start: Point2, target: Point2) -> tuple[Step,
     """
     _check_length(cutter, start, target)
     across = _angle(start, target) + cutter.side * math.pi / 2.0
-    return Step(_beside(target, cutter.radius, across)), (math.cos(across), math.sin(across))
+    return CenterMove(_beside(target, cutter.radius, across)), (math.cos(across), math.sin(across))
 
 
-def enter_arc(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn: int) -> Step:
+def enter_arc(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn: int) -> CenterMove:
     """The first move, an arc: from the present point, tangent at its end to the programmed one. Raises `ArcError`."""
     _check_length(cutter, start, target)
     inside = cutter.side * turn > 0
@@ -173,7 +173,7 @@ def enter_arc(cutter: Cutter, start: Point2, target: Point2, center: Point2, tur
     cosine = math.cos(_angle(end, start) - inward)
     if abs(cosine) < FLAT:
         raise ArcError("an entry arc that the tool's radius makes straight", SMALLER)
-    return Step(end, center=_beside(end, math.dist(start, end) / 2.0 / cosine, inward))
+    return CenterMove(end, center=_beside(end, math.dist(start, end) / 2.0 / cosine, inward))
 
 
 def _check_length(cutter: Cutter, start: Point2, target: Point2) -> None:
@@ -190,7 +190,7 @@ def check_fits(cutter: Cutter, radius: float) -> None:
         raise ArcError(f"an inside arc of radius {radius:.4f} mm", f"more than the tool's radius, {cutter.radius:g} mm")
 
 
-def go_straight(cutter: Cutter, start: Point2, target: Point2, least: float = CORNER) -> Step:
+def go_straight(cutter: Cutter, start: Point2, target: Point2, least: float = CORNER) -> CenterMove:
     """A straight move from one programmed point to another, after others; `least`: rad that make a corner.
 
     Raises `ArcError`.
@@ -205,15 +205,17 @@ def go_straight(cutter: Cutter, start: Point2, target: Point2, least: float = CO
     over = corner > math.pi - CORNER and arc is not None and cutter.side * arc.turn < 0
     if corner < -least or corner > math.pi + least or over:
         if arc is not None:
-            return Step(end, trim=_arc_meets_line(cutter, arc, start, along))
+            return CenterMove(end, trim=_arc_meets_line(cutter, arc, start, along))
         retreat = cutter.radius / math.tan((corner + math.pi) / 2.0)
-        return Step(end, trim=_beside(cutter.center, retreat, before + cutter.side * math.pi / 2.0))
+        return CenterMove(end, trim=_beside(cutter.center, retreat, before + cutter.side * math.pi / 2.0))
     if corner > least:
-        return Step(end, trim=cutter.center, corner=_beside(start, cutter.radius, across))
-    return Step(end)
+        return CenterMove(end, trim=cutter.center, corner=_beside(start, cutter.radius, across))
+    return CenterMove(end)
 
 
-def go_round(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn: int, least: float = CORNER) -> Step:
+def go_round(
+    cutter: Cutter, start: Point2, target: Point2, center: Point2, turn: int, least: float = CORNER
+) -> CenterMove:
     """An arc from one programmed point to another, after other moves; `least`: rad that make a corner.
 
     Raises `ArcError`.
@@ -234,11 +236,11 @@ def go_round(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn
     if corner < -least or corner > math.pi + least or straight_back:
         arc = cutter.pending[0].arc
         if arc is not None:
-            return Step(end, trim=_arc_meets_arc(cutter, arc, center, turn, radius))
-        return Step(end, trim=_line_meets_arc(cutter, heading, corner, center, turn, radius))
+            return CenterMove(end, trim=_arc_meets_arc(cutter, arc, center, turn, radius))
+        return CenterMove(end, trim=_line_meets_arc(cutter, heading, corner, center, turn, radius))
     if corner > least:
-        return Step(end, corner=_beside(start, cutter.radius, inward if inside else inward + math.pi))
-    return Step(end)
+        return CenterMove(end, corner=_beside(start, cutter.radius, inward if inside else inward + math.pi))
+    return CenterMove(end)
 
 
 def _within(value: float) -> float:
@@ -282,15 +284,15 @@ def _arc_meets_arc(cutter: Cutter, arc: OffsetArc, center: Point2, turn: int, ra
     return _beside(arc.center, old, _angle(arc.center, center) + (turn if inside else -turn) * back)
 
 
-def enter_fanuc(cutter: Cutter, target: Point2, arc: OffsetArc | None) -> Step:
+def enter_fanuc(cutter: Cutter, target: Point2, arc: OffsetArc | None) -> CenterMove:
     """The first move: where it ends, the next one says. Raises `ArcError` for an arc."""
     if arc is not None:
         raise ArcError("an arc as the first move of cutter compensation", "G0 or G1")
     cutter.entering = True
-    return Step(target)
+    return CenterMove(target)
 
 
-def go_on_fanuc(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> Step:
+def go_on_fanuc(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> CenterMove:
     """A further move, straight or an arc. Raises `ArcError` where the tool cannot follow it, or controls differ."""
     along = _heading(start, start, target, arc)
     beside = _beside_contour(start, cutter, along)
@@ -298,11 +300,11 @@ def go_on_fanuc(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | 
         if len(cutter.pending) > 1:
             raise ArcError("a move along the tool right after the first move of cutter compensation", "it before G41")
         cutter.entering = False
-        return Step(_end(cutter, start, target, arc), trim=beside)
+        return CenterMove(_end(cutter, start, target, arc), trim=beside)
     before = _angle(start, cutter.center) - cutter.side * math.pi / 2.0
     turn = math.remainder(along - before, math.tau)
     if abs(turn) <= TURNED:
-        return Step(_end(cutter, start, target, arc))
+        return CenterMove(_end(cutter, start, target, arc))
     if len(cutter.pending) > 1:
         raise ArcError("a move along the tool in a corner of cutter compensation", "it where the contour is smooth")
     if abs(turn) > math.pi - TURNED:
@@ -331,7 +333,9 @@ def _beside_contour(point: Point2, cutter: Cutter, heading: float) -> Point2:
     return _beside(point, cutter.radius, heading + cutter.side * math.pi / 2.0)
 
 
-def _outside(cutter: Cutter, end: Point2, headings: tuple[float, float], beside: Point2, arc: OffsetArc | None) -> Step:
+def _outside(
+    cutter: Cutter, end: Point2, headings: tuple[float, float], beside: Point2, arc: OffsetArc | None
+) -> CenterMove:
     """Straight moves round an outside corner: heading before it, and turn; a straight move before it is made longer."""
     before, turn = headings
     acute = abs(turn) > math.pi / 2.0 + SHARP
@@ -342,4 +346,4 @@ def _outside(cutter: Cutter, end: Point2, headings: tuple[float, float], beside:
     if arc is not None:
         way.append(beside)
     longer = way.pop(0) if cutter.pending[0].arc is None else None
-    return Step(end, trim=longer, outside=True, way=tuple(way))
+    return CenterMove(end, trim=longer, outside=True, way=tuple(way))

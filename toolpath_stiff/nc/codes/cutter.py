@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from toolpath_stiff.nc import compensation, geometry
 from toolpath_stiff.nc.codes.code import Code, g_codes
-from toolpath_stiff.nc.compensation import Cutter, OffsetArc, Pending, Step
+from toolpath_stiff.nc.compensation import CenterMove, Cutter, OffsetArc, Pending
 from toolpath_stiff.nc.geometry import Point2
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -193,7 +193,7 @@ class CenterPath:
         point[self.cutter.axes[0]], point[self.cutter.axes[1]] = to
         return point
 
-    def go_round_corner(self, step: Step, start: Point2, there: list[float]) -> None:
+    def go_round_corner(self, step: CenterMove, start: Point2, there: list[float]) -> None:
         """End the moves before the corner, and go round it if it is convex; rotary axes turn on the way round.
 
         Straight moves round it are at the feed of the block; rotary axes have turned at the first one's end.

@@ -10,8 +10,8 @@ go to planes that are not in the file.
 from __future__ import annotations
 
 from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
-from toolpath_stiff.nc.cutter_location.state import State
-from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number
+from toolpath_stiff.nc.cutter_location.state import CutterLocationState
+from toolpath_stiff.nc.cutter_location.statements import MajorStatement, MinorWord, is_number
 from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling
 from toolpath_stiff.units import SECONDS_PER_DAY
 
@@ -23,7 +23,7 @@ ALIASES = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}
 EXPAND = "have the CAM system write the moves of the cycle"
 
 
-def cycle(state: State, statement: Statement) -> None:
+def cycle(state: CutterLocationState, statement: MajorStatement) -> None:
     """The cycle that the next points drill; CYCLE/OFF ends it."""
     state.no_circle("CYCLE/")
     state.hole, arguments = None, list(statement.arguments)
@@ -62,7 +62,7 @@ def cycle(state: State, statement: Statement) -> None:
     )
 
 
-def _name_in_cycle(state: State, key: Argument) -> str:
+def _name_in_cycle(state: CutterLocationState, key: MinorWord) -> str:
     """The quantity that a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
     name = ALIASES.get(key.text.upper(), key.text.upper())
     if name in FEED_UNITS:
@@ -76,7 +76,7 @@ def _name_in_cycle(state: State, key: Argument) -> str:
     return name
 
 
-def _check_cycle(state: State, code: str, values: dict[str, float]) -> None:
+def _check_cycle(state: CutterLocationState, code: str, values: dict[str, float]) -> None:
     """Refuse a hole that cannot be, or of which systems mean different things; lengths in the file's unit."""
     shown, pecks = state.statement.shown, code in ("G73", "G83")
     depth, clear, step, dwell = (values.get(name, 0.0) for name in ("DEPTH", "CLEAR", "STEP", "DWELL"))

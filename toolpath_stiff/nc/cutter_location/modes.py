@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL
-from toolpath_stiff.nc.cutter_location.state import State
-from toolpath_stiff.nc.cutter_location.statements import Statement, is_number
+from toolpath_stiff.nc.cutter_location.state import CutterLocationState
+from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number
 from toolpath_stiff.nc.cutter_location.tool_axes import unit_axis
 from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY, SECONDS_PER_MINUTE
@@ -35,7 +35,7 @@ _ZERO = "the work offset of the posted program; here it is program zero"
 FRAMES = {"MSYS": _FRAME, "MCS": _FRAME, "CSYS": _FRAME, "ZERO": _ZERO}
 
 
-def units(state: State, statement: Statement) -> None:
+def units(state: CutterLocationState, statement: MajorStatement) -> None:
     """The length unit; before the first points, which are mm without it."""
     scale = LENGTH_UNITS.get(",".join(statement.words))
     if scale is None:
@@ -47,7 +47,7 @@ def units(state: State, statement: Statement) -> None:
     state.scale, state.units_given = scale, True
 
 
-def fedrat(state: State, statement: Statement) -> None:
+def fedrat(state: CutterLocationState, statement: MajorStatement) -> None:
     """The feed: a number, and its unit before or after it."""
     words = statement.words
     if state.rapid:
@@ -78,7 +78,7 @@ def fedrat(state: State, statement: Statement) -> None:
     state.feed = value * (factor or state.scale) or None
 
 
-def spindl(state: State, statement: Statement) -> None:
+def spindl(state: CutterLocationState, statement: MajorStatement) -> None:
     """Revolutions per minute, and whether the spindle turns; surface speeds are listed."""
     words = statement.words
     if "OFF" in words or "STOP" in words:
@@ -94,7 +94,7 @@ def spindl(state: State, statement: Statement) -> None:
     state.speed = state.revolutions
 
 
-def delay(state: State, statement: Statement) -> None:
+def delay(state: CutterLocationState, statement: MajorStatement) -> None:
     """A pause in seconds, or in revolutions and REV."""
     words = statement.words
     if words[1:] not in ([], ["REV"]):
@@ -109,7 +109,7 @@ def delay(state: State, statement: Statement) -> None:
     state.recorder.add_dwell(time)
 
 
-def multax(state: State, statement: Statement) -> None:
+def multax(state: CutterLocationState, statement: MajorStatement) -> None:
     """Points carry a tool axis; after MULTAX/OFF a tilted tool must be given again."""
     words = statement.words
     if words not in ([], ["ON"], ["OFF"]):
@@ -119,19 +119,19 @@ def multax(state: State, statement: Statement) -> None:
         state.axis_known = False
 
 
-def tlaxis(state: State, statement: Statement) -> None:
+def tlaxis(state: CutterLocationState, statement: MajorStatement) -> None:
     """The tool axis of points that give none."""
     state.next_axis, state.axis_known = unit_axis(state.numbers(statement, 3)), True
 
 
-def frame_word(state: State, statement: Statement) -> None:
+def frame_word(state: CutterLocationState, statement: MajorStatement) -> None:
     """A second, different one is refused."""
     numbers = tuple(state.number(argument) for argument in statement.arguments if is_number(argument.text))
     one_frame(state, statement.word, numbers, statement.shown)
     state.note(FRAMES[statement.word])
 
 
-def one_frame(state: State, kind: str, numbers: tuple[float, ...], shown: str) -> None:
+def one_frame(state: CutterLocationState, kind: str, numbers: tuple[float, ...], shown: str) -> None:
     """Points of one coordinate system only; `kind` says who names it, the numbers where it lies."""
     before = state.frames.get(kind, numbers)
     same = len(before) == len(numbers) and all(abs(a - b) < 1e-6 for a, b in zip(before, numbers, strict=True))
@@ -144,7 +144,7 @@ def one_frame(state: State, kind: str, numbers: tuple[float, ...], shown: str) -
     state.frames[kind] = numbers
 
 
-def mode(state: State, statement: Statement) -> None:
+def mode(state: CutterLocationState, statement: MajorStatement) -> None:
     """Milling; turning is doubted: its points are read all the same."""
     if statement.words not in (["MILL"], ["TURN"]):
         raise state.fail(statement.shown, "MODE/MILL or MODE/TURN")
@@ -152,7 +152,7 @@ def mode(state: State, statement: Statement) -> None:
     state.note(TURNING if turns else "milling", doubtful=turns)
 
 
-def loadtl(state: State, statement: Statement) -> None:
+def loadtl(state: CutterLocationState, statement: MajorStatement) -> None:
     """Another tool: its number (after TOOL in NX' LOAD/), and perhaps LENGTH and the length."""
     words, given = statement.words, statement.arguments
     if statement.word == "LOAD":
@@ -173,7 +173,7 @@ def loadtl(state: State, statement: Statement) -> None:
     state.tool, state.tool_length = int(number), _length_of(state, int(number), length if length > 0.0 else math.nan)
 
 
-def _length_of(state: State, number: int, given: float) -> float:
+def _length_of(state: CutterLocationState, number: int, given: float) -> float:
     """The tool table's length, or the one that the file gives; nan: the machine's reference tool."""
     entry = (state.tools or {}).get(number)
     if entry is None or math.isnan(entry.length):
@@ -185,13 +185,13 @@ def _length_of(state: State, number: int, given: float) -> float:
     return entry.length
 
 
-def toolno(state: State, statement: Statement) -> None:
+def toolno(state: CutterLocationState, statement: MajorStatement) -> None:
     """Listed; a turning tool is doubted."""
     turns = "TURN" in statement.words
     state.note(TURNING if turns else TOOL, doubtful=turns)
 
 
-def cutter(state: State, statement: Statement) -> None:
+def cutter(state: CutterLocationState, statement: MajorStatement) -> None:
     """The diameter: the first number, in all of APT's forms of CUTTER/; of TLDATA/ after the kind of tool."""
     given = statement.arguments[:1] if statement.word == "CUTTER" else statement.arguments
     first = next((argument for argument in given if is_number(argument.text)), None)
@@ -201,7 +201,7 @@ def cutter(state: State, statement: Statement) -> None:
         state.moves_before_cutter = len(state.recorder)
 
 
-def heading(state: State, statement: Statement) -> None:
+def heading(state: CutterLocationState, statement: MajorStatement) -> None:
     """The name of an operation; after TOOL PATH/ perhaps of its tool."""
     if statement.arguments:
         state.marks.append((statement.line, statement.arguments[0].text))
@@ -216,7 +216,7 @@ def heading(state: State, statement: Statement) -> None:
     state.note(HEADING)
 
 
-def fini(state: State, statement: Statement) -> None:
+def fini(state: CutterLocationState, statement: MajorStatement) -> None:
     """The end: what follows is not read."""
     state.no_circle("FINI")
     state.ended = True

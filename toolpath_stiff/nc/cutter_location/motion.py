@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from toolpath_stiff.nc.cutter_location import circles
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle
-from toolpath_stiff.nc.cutter_location.state import State, drill, move, stand
-from toolpath_stiff.nc.cutter_location.statements import Statement, is_number, number
+from toolpath_stiff.nc.cutter_location.state import CutterLocationState, drill, move, stand
+from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angle_of, unit_axis
 from toolpath_stiff.nc.geometry import Vector
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID
@@ -22,7 +22,7 @@ PLANE = re.compile(r"\(\s*PLANE\s*/\s*PERPTO\s*,.*\)", re.IGNORECASE)
 POINT = re.compile(r"\(\s*POINT\s*/([^()]*)\)", re.IGNORECASE)
 
 
-def goto(state: State, statement: Statement) -> None:
+def goto(state: CutterLocationState, statement: MajorStatement) -> None:
     """A point; on a circle several points, too."""
     named = next((given for given in statement.arguments if given.text[:1].isalpha() or given.text[:1] == "("), None)
     if named is not None:
@@ -38,7 +38,7 @@ def goto(state: State, statement: Statement) -> None:
         raise state.fail(f"GOTO/ with {len(numbers)} numbers", "x,y,z or x,y,z,i,j,k")
 
 
-def more_points(state: State, statement: Statement) -> None:
+def more_points(state: CutterLocationState, statement: MajorStatement) -> None:
     """A line of numbers alone after GOTO: the next point (Creo writes arcs so)."""
     if state.last_word != "GOTO":
         raise state.fail(f"{statement.text[:30]!r} is not a statement", "a word, / and its arguments")
@@ -46,7 +46,7 @@ def more_points(state: State, statement: Statement) -> None:
     to_point(state, state.numbers(statement, 3, 6))
 
 
-def to_point(state: State, numbers: list[float]) -> None:
+def to_point(state: CutterLocationState, numbers: list[float]) -> None:
     """A point, with its tool axis or the one in force: the end of a move or an arc, or a hole."""
     axis = _axis_of(state, numbers)
     target = state.scaled(numbers[:3])
@@ -59,7 +59,7 @@ def to_point(state: State, numbers: list[float]) -> None:
         _go(state, target, axis)
 
 
-def _axis_of(state: State, numbers: list[float]) -> Vector:
+def _axis_of(state: CutterLocationState, numbers: list[float]) -> Vector:
     if len(numbers) == 6:
         axis = unit_axis(numbers[3:])
         if state.multax is False and axis != VERTICAL:
@@ -71,13 +71,13 @@ def _axis_of(state: State, numbers: list[float]) -> Vector:
     return state.next_axis
 
 
-def _go(state: State, target: Vector, axis: Vector) -> None:
+def _go(state: CutterLocationState, target: Vector, axis: Vector) -> None:
     motion = RAPID if state.rapid else FEED
     state.rapid, state.followed, state.direction = 0, None, None
     move(state, motion, target, axis)
 
 
-def godlta(state: State, statement: Statement) -> None:
+def godlta(state: CutterLocationState, statement: MajorStatement) -> None:
     """A point by its distance from the last one."""
     if state.point is None:
         raise state.fail("GODLTA/ before any point", "FROM/ or GOTO/ before it")
@@ -89,7 +89,7 @@ def godlta(state: State, statement: Statement) -> None:
     _go(state, (x, y, z), axis)
 
 
-def from_(state: State, statement: Statement) -> None:
+def from_(state: CutterLocationState, statement: MajorStatement) -> None:
     """The point at which the tool stands."""
     numbers = state.numbers(statement, 3, 6)
     axis = _axis_of(state, numbers)
@@ -102,7 +102,7 @@ def from_(state: State, statement: Statement) -> None:
     stand(state, state.scaled(numbers[:3]), axis)
 
 
-def gohome(state: State, statement: Statement) -> None:
+def gohome(state: CutterLocationState, statement: MajorStatement) -> None:
     """NX gives the point of home; without one it is the control's."""
     if statement.arguments:
         to_point(state, state.numbers(statement, 3, 6))
@@ -112,7 +112,7 @@ def gohome(state: State, statement: Statement) -> None:
     state.note(HOME, doubtful=True)
 
 
-def rapid(state: State, statement: Statement) -> None:
+def rapid(state: CutterLocationState, statement: MajorStatement) -> None:
     """The next motion, and no other, is rapid."""
     if statement.arguments:
         raise state.fail(statement.shown, "RAPID alone")
@@ -123,7 +123,7 @@ def rapid(state: State, statement: Statement) -> None:
     state.rapid = statement.line
 
 
-def circle(state: State, statement: Statement) -> None:
+def circle(state: CutterLocationState, statement: MajorStatement) -> None:
     """A circle in the forms of PTC, NX and APT."""
     times = 1
     arguments = statement.arguments
@@ -149,7 +149,7 @@ def circle(state: State, statement: Statement) -> None:
     _await_circle(state, Circle(center, axis, radius * state.scale, times))
 
 
-def movarc(state: State, statement: Statement) -> None:
+def movarc(state: CutterLocationState, statement: MajorStatement) -> None:
     """A circle by the right hand, and the angle that is cut."""
     if len(statement.words) != 9 or statement.words[7] != "ANGLE":
         raise state.fail(statement.shown, "MOVARC/x,y,z,i,j,k,r,ANGLE,a")
@@ -161,13 +161,13 @@ def movarc(state: State, statement: Statement) -> None:
     _await_circle(state, Circle(state.scaled(numbers[:3]), axis, numbers[6] * state.scale, sweep=angle))
 
 
-def indirv(state: State, statement: Statement) -> None:
+def indirv(state: CutterLocationState, statement: MajorStatement) -> None:
     """The direction at the start, which says which way round."""
     x, y, z = state.numbers(statement, 3)
     state.direction = (x, y, z)
 
 
-def _await_circle(state: State, circle: Circle) -> Circle:
+def _await_circle(state: CutterLocationState, circle: Circle) -> Circle:
     """The circle that the next point ends, turned as INDIRV says."""
     if state.rapid:
         raise state.fail(f"an arc after the RAPID of line {state.rapid}", "a rapid to a point, or an arc at a feed")
@@ -191,7 +191,7 @@ def _await_circle(state: State, circle: Circle) -> Circle:
     return circle
 
 
-def _arc_through(state: State, targets: list[Vector], axis: Vector) -> None:
+def _arc_through(state: CutterLocationState, targets: list[Vector], axis: Vector) -> None:
     """Follow the circle that waits through points; the last one ends the arc."""
     circle = state.circle
     assert circle is not None
@@ -209,7 +209,7 @@ def _arc_through(state: State, targets: list[Vector], axis: Vector) -> None:
             )
 
 
-def tlon(state: State, statement: Statement) -> None:
+def tlon(state: CutterLocationState, statement: MajorStatement) -> None:
     """CATIA's and Creo's arcs in APT's own words."""
     if state.direction is None:
         raise state.fail("TLON,GOFWD/ without its direction", "INDIRV/ before it")
@@ -225,7 +225,7 @@ def tlon(state: State, statement: Statement) -> None:
     state.followed = None
 
 
-def _circle(state: State, text: str) -> Circle:
+def _circle(state: CutterLocationState, text: str) -> Circle:
     """The circle of (CIRCLE/...) or (CYLNDR/...)."""
     word, numbers = _geometry(text)
     if word == "CIRCLE" and len(numbers) == 4:
@@ -236,7 +236,7 @@ def _circle(state: State, text: str) -> Circle:
     raise state.fail(f"TLON,GOFWD/ along {_shortened(text)}", "(CIRCLE/x,y,z,r) or (CYLNDR/x,y,z,i,j,k,r)")
 
 
-def _line(state: State, text: str) -> tuple[Vector, Vector]:
+def _line(state: CutterLocationState, text: str) -> tuple[Vector, Vector]:
     """The line up to which the tool goes: two points, of CATIA's plane the two that it goes through."""
     word, numbers = _geometry(text)
     if PLANE.fullmatch(text):

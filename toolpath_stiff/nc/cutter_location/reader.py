@@ -16,8 +16,8 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.controller import Controller, Switches
 from toolpath_stiff.nc.cutter_location.modes import one_frame
 from toolpath_stiff.nc.cutter_location.motion import to_point
-from toolpath_stiff.nc.cutter_location.state import State
-from toolpath_stiff.nc.cutter_location.statements import Statement, frame_in_comment, plain_point, read_statement
+from toolpath_stiff.nc.cutter_location.state import CutterLocationState
+from toolpath_stiff.nc.cutter_location.statements import MajorStatement, frame_in_comment, plain_point, read_statement
 from toolpath_stiff.nc.cutter_location.vocabulary import execute
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Unsupported
@@ -60,7 +60,7 @@ def read(request: Request) -> ReadProgram:
     >>> parse_program("UNITS/MM\nFEDRAT/600,MMPM\nFROM/0,0,50\nGOTO/0,0,0\nGOTO/40,0,0\nFINI\n", "part.apt")
     <ReadProgram part.apt: 2 moves, read as cutter-location file>
     """
-    state = State(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
+    state = CutterLocationState(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
     for error in run(state, request.lines):
         raise error
     warnings = not_for(request.controller, request.work_offsets, request.block_delete)
@@ -80,14 +80,14 @@ def read(request: Request) -> ReadProgram:
     )
 
 
-def run(state: State, lines: tuple[str, ...], most_errors: int = 1) -> list[InputError]:
+def run(state: CutterLocationState, lines: tuple[str, ...], most_errors: int = 1) -> list[InputError]:
     """Execute all lines in order, from what is in force in `state`, up to so many errors, which are returned."""
     index, errors = 0, list[InputError]()
     while index < len(lines) and not state.ended and len(errors) < most_errors:
         if len(state.recorder.line) > PACKED_AT:
             state.recorder.pack()
         here = index
-        statement: Statement | None = Statement(here + 1, 1, "GOTO")
+        statement: MajorStatement | None = MajorStatement(here + 1, 1, "GOTO")
         point, index = plain_point(lines[here]), here + 1
         try:
             if point is None:
@@ -115,17 +115,17 @@ def run(state: State, lines: tuple[str, ...], most_errors: int = 1) -> list[Inpu
     return errors
 
 
-def _take_comment(state: State, lines: tuple[str, ...], index: int) -> None:
+def _take_comment(state: CutterLocationState, lines: tuple[str, ...], index: int) -> None:
     """Take what CAM systems tell in comments: CATIA's operations, CATIA's and Creo's coordinate systems."""
     operation, frame = OPERATION.match(lines[index]), frame_in_comment(lines, index)
     if operation:
         state.marks.append((index + 1, operation[1]))
     elif frame is not None:
-        state.statement = Statement(index + 1, 1, frame[0])
+        state.statement = MajorStatement(index + 1, 1, frame[0])
         one_frame(state, *frame, lines[index].strip()[:40])
 
 
-def _execute(state: State, statement: Statement, point: list[float] | None) -> None:
+def _execute(state: CutterLocationState, statement: MajorStatement, point: list[float] | None) -> None:
     """Execute a statement, whose numbers are known if it is a plain GOTO; geometry's errors get its place."""
     state.statement = statement
     if statement.word:
@@ -140,7 +140,7 @@ def _execute(state: State, statement: Statement, point: list[float] | None) -> N
     state.last_word = statement.word or state.last_word
 
 
-def _conclude(state: State) -> None:
+def _conclude(state: CutterLocationState) -> None:
     """Warnings about the file as a whole."""
     if not state.units_given and len(state.recorder):
         state.assume(NO_UNITS)
@@ -154,7 +154,7 @@ def _conclude(state: State) -> None:
         )
 
 
-def unsupported(state: State) -> tuple[Unsupported, ...]:
+def unsupported(state: CutterLocationState) -> tuple[Unsupported, ...]:
     """Words that were not acted upon, in the order of the file, each once."""
     noted = sorted(state.noted.values(), key=lambda word: word.statement.line)
     return tuple(
@@ -162,7 +162,7 @@ def unsupported(state: State) -> tuple[Unsupported, ...]:
     )
 
 
-def in_force(state: State) -> dict[str, str]:
+def in_force(state: CutterLocationState) -> dict[str, str]:
     """The modes in force, names to words."""
     i, j, k = state.next_axis
     feed = "none" if state.feed is None else f"{state.feed:g} mm/{'rev' if state.per_revolution else 'min'}"

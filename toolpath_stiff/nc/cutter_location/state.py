@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, dot, minus
-from toolpath_stiff.nc.cutter_location.statements import NUMBERS, Argument, Statement, number
+from toolpath_stiff.nc.cutter_location.statements import NUMBERS, MajorStatement, MinorWord, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
 from toolpath_stiff.nc.geometry import Drilling, Vector, point_on_arc, strokes
 from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Recorder, ToolUse
@@ -31,7 +31,7 @@ NOT_MOVED = (False, False)
 class Noted:
     """A word that was not acted upon: where it stands first, why, whether that is a warning, how often."""
 
-    statement: Statement
+    statement: MajorStatement
     reason: str
     doubtful: bool
     count: int = 1
@@ -43,13 +43,13 @@ class Noted:
 
 
 @dataclass
-class State:
+class CutterLocationState:
     """The modes in force and all that was made so far; every word is a function of this and its statement."""
 
     name: str  # of the file, for messages
     tools: dict[int, ToolEntry] | None
     feed: float | None = None  # mm/min, or mm per revolution
-    statement: Statement = field(default_factory=lambda: Statement(1, 1, ""))  # being executed
+    statement: MajorStatement = field(default_factory=lambda: MajorStatement(1, 1, ""))  # being executed
     last_word: str = ""  # of the statement before
     ended: bool = False
 
@@ -100,7 +100,7 @@ class State:
     unsmooth: int = 0
     first_unsmooth: int = 0
 
-    def fail(self, problem: str, expected: str = "", hint: str = "", place: Argument | None = None) -> ProgramError:
+    def fail(self, problem: str, expected: str = "", hint: str = "", place: MinorWord | None = None) -> ProgramError:
         """The error for the statement being executed."""
         line, column = (place or self.statement).line, (place or self.statement).column
         return Place(self.name, line, max(column, 1)).fail(problem, expected, hint)
@@ -119,14 +119,14 @@ class State:
         if text not in self.assumptions:
             self.assumptions.append(text)
 
-    def number(self, argument: Argument, expected: str = "a number") -> float:
+    def number(self, argument: MinorWord, expected: str = "a number") -> float:
         """The number of an argument. Raises `InputError`."""
         value = number(argument.text) if NUMBERS.fullmatch(argument.text) else math.nan
         if not abs(value) <= LARGEST_MM * 100.0:
             raise Place(self.name, argument.line, argument.column).fail(f"{argument.text[:30]!r}", expected)
         return value
 
-    def numbers(self, statement: Statement, *counts: int) -> list[float]:
+    def numbers(self, statement: MajorStatement, *counts: int) -> list[float]:
         """All arguments as numbers; there must be one of `counts` of them."""
         numbers = [self.number(argument) for argument in statement.arguments]
         if len(numbers) not in counts:
@@ -156,7 +156,7 @@ class State:
         return feed * self.speed
 
 
-def stand(state: State, point: Vector, axis: Vector) -> None:
+def stand(state: CutterLocationState, point: Vector, axis: Vector) -> None:
     """The tool stands somewhere; how it got there is not part of the path."""
     state.point, state.axis, state.heading = point, axis, None
     state.angles = angles_near(axis, state.angles)
@@ -164,7 +164,7 @@ def stand(state: State, point: Vector, axis: Vector) -> None:
         state.assume(FREE_YAW)
 
 
-def move(state: State, motion: int, target: Vector, axis: Vector, arc: Arc | None = None) -> None:
+def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, arc: Arc | None = None) -> None:
     """A move of the tip to a point, straight or along an arc, where the tool has an axis.
 
     Where the axis turns, in as many parts as keep it near its great circle.
@@ -209,7 +209,7 @@ def move(state: State, motion: int, target: Vector, axis: Vector, arc: Arc | Non
     state.heading = None if arc is not None else state.heading if still else whole
 
 
-def drill(state: State, target: Vector, axis: Vector, hole: Drilling) -> None:
+def drill(state: CutterLocationState, target: Vector, axis: Vector, hole: Drilling) -> None:
     """The hole of the cycle in force at a point, along the tool axis."""
     if state.point is not None and axis != state.axis:
         raise state.fail(
@@ -241,7 +241,12 @@ def drill(state: State, target: Vector, axis: Vector, hole: Drilling) -> None:
 
 
 def _add(
-    state: State, motion: int, end: Vector, angles: tuple[float, float], feed: float, arc: Arc | None = None
+    state: CutterLocationState,
+    motion: int,
+    end: Vector,
+    angles: tuple[float, float],
+    feed: float,
+    arc: Arc | None = None,
 ) -> None:
     assert state.point is not None
     start = [*state.point, *state.angles, 0.0]

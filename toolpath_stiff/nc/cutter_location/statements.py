@@ -55,7 +55,7 @@ _POINT = re.compile(rf"\s*GOTO\s*/{_FIRST}{_NEXT * 2}(?:{_NEXT * 3})?\s*$", re.I
 
 
 @dataclass(frozen=True)
-class Argument:
+class MinorWord:
     """A text between two commas, and where it begins."""
 
     text: str
@@ -64,13 +64,13 @@ class Argument:
 
 
 @dataclass(frozen=True)
-class Statement:
+class MajorStatement:
     """A statement. `word` is upper case, "" for a line of numbers alone; `text` is free text after a text word."""
 
     line: int
     column: int
     word: str
-    arguments: tuple[Argument, ...] = ()
+    arguments: tuple[MinorWord, ...] = ()
     text: str = ""
 
     @property
@@ -102,7 +102,7 @@ def number(text: str) -> float:
     return float(text.upper().replace("D", "E"))
 
 
-def read_statement(lines: tuple[str, ...], index: int, name: str) -> tuple[Statement | None, int]:
+def read_statement(lines: tuple[str, ...], index: int, name: str) -> tuple[MajorStatement | None, int]:
     """The statement that begins with line `index` (from 0), None if there is none, and the line after it.
 
     Raises `InputError` with line and column.
@@ -115,7 +115,7 @@ def read_statement(lines: tuple[str, ...], index: int, name: str) -> tuple[State
     text_word = _TEXT_WORD.match(line, begin)
     if text_word:
         text = line[text_word.end() :].strip().removeprefix("/").strip()
-        return Statement(index + 1, text_word.start(1) + 1, text_word[1].upper(), (), text), index + 1
+        return MajorStatement(index + 1, text_word.start(1) + 1, text_word[1].upper(), (), text), index + 1
     joined, starts = "", list[tuple[int, int, int]]()  # where in the joined text a line begins, and its first column
     while True:
         code, continues, rest = lines[index].partition("$$")[0].partition("$")
@@ -165,7 +165,7 @@ def frame_in_comment(lines: tuple[str, ...], index: int) -> tuple[str, tuple[flo
     return (frame[0].strip(), numbers) if len(numbers) == FRAME_NUMBERS else None
 
 
-def _parse(joined: str, starts: list[tuple[int, int, int]], name: str) -> Statement | None:
+def _parse(joined: str, starts: list[tuple[int, int, int]], name: str) -> MajorStatement | None:
     """The statement of a text; of each line in it where it begins, and its line and column in the file."""
 
     def place(index: int) -> tuple[int, int]:
@@ -177,7 +177,7 @@ def _parse(joined: str, starts: list[tuple[int, int, int]], name: str) -> Statem
         return None
     line, column = place(len(joined) - len(joined.lstrip()))
     if _ONLY_NUMBERS.fullmatch(joined):
-        return Statement(line, column, "", _arguments(joined, 0, place), text)
+        return MajorStatement(line, column, "", _arguments(joined, 0, place), text)
     head = _WORD.match(joined)
     if head is None:
         raise Place(name, line, column).fail(
@@ -189,13 +189,13 @@ def _parse(joined: str, starts: list[tuple[int, int, int]], name: str) -> Statem
         )
     word = re.sub(r"\s*,\s*", ",", re.sub(r"\s+", " ", head[1].strip().upper()))
     if head[2]:
-        return Statement(line, column, word, _arguments(joined, head.end(), place))
+        return MajorStatement(line, column, word, _arguments(joined, head.end(), place))
     # Without a slash, words after a comma are arguments: CHANNEL,1 or MULTAX,ON.
     word, _, rest = word.partition(",")
-    return Statement(line, column, word, (Argument(rest, line, column),) if rest else ())
+    return MajorStatement(line, column, word, (MinorWord(rest, line, column),) if rest else ())
 
 
-def _arguments(joined: str, begin: int, place: Callable[[int], tuple[int, int]]) -> tuple[Argument, ...]:
+def _arguments(joined: str, begin: int, place: Callable[[int], tuple[int, int]]) -> tuple[MinorWord, ...]:
     """The texts between the commas outside parentheses, from `begin` on."""
     if not joined[begin:].strip():
         return ()
@@ -205,6 +205,6 @@ def _arguments(joined: str, begin: int, place: Callable[[int], tuple[int, int]])
         if character == "," and (depth <= 0 or index == len(joined)):
             text = joined[start:index]
             lead = len(text) - len(text.lstrip())
-            arguments.append(Argument(text.strip(), *place(min(start + lead, len(joined) - 1))))
+            arguments.append(MinorWord(text.strip(), *place(min(start + lead, len(joined) - 1))))
             start = index + 1
     return tuple(arguments)

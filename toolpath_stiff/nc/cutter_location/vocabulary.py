@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from toolpath_stiff.nc.cutter_location import cycles, modes, motion
 from toolpath_stiff.nc.cutter_location.modes import FRAMES, HEADING, TOOL
-from toolpath_stiff.nc.cutter_location.state import State
-from toolpath_stiff.nc.cutter_location.statements import Statement, is_number, number
+from toolpath_stiff.nc.cutter_location.state import CutterLocationState
+from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 
 # What becomes of a word.
 READ, LISTED, DOUBTFUL, REFUSED = "read", "listed", "listed, with a warning", "refused"
@@ -31,11 +31,11 @@ NUMBERS_OF_A_POINT = 3
 LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
 GEOMETRY = "points, tool axes and feeds alone"
 UNKNOWN = "is not known"
-Act = Callable[[State, Statement], None]
+Act = Callable[[CutterLocationState, MajorStatement], None]
 
 
 @dataclass(frozen=True)
-class Word:
+class MajorWord:
     """A major word of a statement.
 
     Attributes
@@ -63,19 +63,19 @@ class Word:
     kind: str = READ
 
 
-def listed(meaning: str, written_by: str, source: str, names: str, kind: str = LISTED) -> list[Word]:
+def listed(meaning: str, written_by: str, source: str, names: str, kind: str = LISTED) -> list[MajorWord]:
     """Words that change nothing of the path, or (DOUBTFUL) what the machine makes of them."""
 
-    def act(state: State, statement: Statement) -> None:
+    def act(state: CutterLocationState, statement: MajorStatement) -> None:
         state.note(meaning, doubtful=kind == DOUBTFUL)
 
-    return [Word(name, act, meaning, written_by, source, kind=kind) for name in names.split()]
+    return [MajorWord(name, act, meaning, written_by, source, kind=kind) for name in names.split()]
 
 
 class Harmless(NamedTuple):
     """Statements of a refused word that change nothing: which they are, why, what is expected of the others."""
 
-    holds: Callable[[Statement], bool]
+    holds: Callable[[MajorStatement], bool]
     reason: str
     expected: str = GEOMETRY
 
@@ -87,24 +87,24 @@ def refused(
     names: str,
     form: str = "",
     harmless: Harmless | None = None,
-) -> list[Word]:
+) -> list[MajorWord]:
     """Words that change the path in a way that is not supported."""
 
-    def act(state: State, statement: Statement) -> None:
+    def act(state: CutterLocationState, statement: MajorStatement) -> None:
         if harmless is None or not harmless.holds(statement):
             expected = harmless.expected if harmless else GEOMETRY
             raise state.fail(f"{statement.shown} {meaning}, which is not supported", expected, hint)
         state.note(harmless.reason)
 
-    return [Word(name, act, meaning, "", source, form, REFUSED) for name in names.split()]
+    return [MajorWord(name, act, meaning, "", source, form, REFUSED) for name in names.split()]
 
 
-def no_shift(statement: Statement) -> bool:
+def no_shift(statement: MajorStatement) -> bool:
     """True for a statement that shifts by nothing."""
     return len(statement.words) == 3 and all(is_number(word) and not number(word) for word in statement.words)
 
 
-def no_turn(statement: Statement) -> bool:
+def no_turn(statement: MajorStatement) -> bool:
     """True for a rotary axis that turns by nothing, or goes to 0."""
     angles = [number(word) for word in statement.words if is_number(word)]
     return bool(angles) and not any(angles)
@@ -131,16 +131,16 @@ _DRIVE, _PROCESSOR = "is driven along surfaces", "give the file of points that A
 _POINT, _POINTS = "have the CAM system write the point", "have the CAM system write points"
 
 
-def cutcom(state: State, statement: Statement) -> None:
+def cutcom(state: CutterLocationState, statement: MajorStatement) -> None:
     """Refused unless it is off."""
     if statement.words != ["OFF"]:
         raise state.fail(f"{statement.shown} is {_COMPENSATION}, which is not supported", "", _TOOL_CENTRE)
     state.note("cutter compensation is off")
 
 
-def table(words: Iterable[Word]) -> dict[str, Word]:
+def table(words: Iterable[MajorWord]) -> dict[str, MajorWord]:
     """Name to word. Raises `ValueError` for a name that is there twice."""
-    by_name: dict[str, Word] = {}
+    by_name: dict[str, MajorWord] = {}
     for word in words:
         if word.name in by_name:
             raise ValueError(f"{word.name} is in the table twice")
@@ -149,41 +149,41 @@ def table(words: Iterable[Word]) -> dict[str, Word]:
 
 
 _ACTING = (
-    Word("GOTO", motion.goto, "the tool moves to a point", ALL, ISO, _POINT_FORM),
-    Word("", motion.more_points, "further points of the GOTO before it", CREO, PTC, "x,y,z[,i,j,k]"),
-    Word("GODLTA", motion.godlta, "the tool moves by a distance", "", ISO, _POINT_FORM),
-    Word("FROM", motion.from_, "the tool stands at a point", ALL, ISO, _POINT_FORM),
-    Word("RAPID", motion.rapid, "the next motion is rapid", ALL, ISO),
-    Word("GOHOME", motion.gohome, motion.HOME, NX, SIEMENS, " without a point", DOUBTFUL),
-    Word(
+    MajorWord("GOTO", motion.goto, "the tool moves to a point", ALL, ISO, _POINT_FORM),
+    MajorWord("", motion.more_points, "further points of the GOTO before it", CREO, PTC, "x,y,z[,i,j,k]"),
+    MajorWord("GODLTA", motion.godlta, "the tool moves by a distance", "", ISO, _POINT_FORM),
+    MajorWord("FROM", motion.from_, "the tool stands at a point", ALL, ISO, _POINT_FORM),
+    MajorWord("RAPID", motion.rapid, "the next motion is rapid", ALL, ISO),
+    MajorWord("GOHOME", motion.gohome, motion.HOME, NX, SIEMENS, " without a point", DOUBTFUL),
+    MajorWord(
         "CIRCLE", motion.circle, _CIRCLE, f"{CREO}, {NX}, {AUTODESK}", f"{PTC}; {SIEMENS}", "/x,y,z,i,j,k[,r[,t,f,d,e]]"
     ),
-    Word("MOVARC", motion.movarc, _CIRCLE, AUTODESK, ISO, "/x,y,z,i,j,k,r,ANGLE,a"),
-    Word("INDIRV", motion.indirv, _DIRECTION, CATIA_CREO, APT, "/i,j,k"),
-    Word("TLON,GOFWD", motion.tlon, "the tool moves along a circle", CATIA_CREO, DASSAULT, "/(...),ON,(...)"),
-    Word("CYCLE", cycles.cycle, "drilling cycle", ALL, PTC, _CYCLE_FORM),
-    Word("FEDRAT", modes.fedrat, "feed", ALL, ISO, "/number[,unit] or unit,number"),
-    Word("SPINDL", modes.spindl, "spindle speed", ALL, ISO),
-    Word("UNITS", modes.units, "length unit", f"{CREO}, {AUTODESK}", ISO, "/MM or INCHES"),
-    Word("UNIT", modes.units, "length unit", "", ISO, "/MM or INCHES"),
-    Word("MULTAX", modes.multax, "whether points carry a tool axis", MOST, ISO, "[/ON or OFF]"),
-    Word("TLAXIS", modes.tlaxis, "tool axis", "", ISO, "/i,j,k"),
-    Word("LOADTL", modes.loadtl, "tool change", MOST, PTC, "/n[,LENGTH,l]"),
-    Word("LOAD", modes.loadtl, "tool change", NX, SIEMENS, "/TOOL,n"),
-    Word("CUTTER", modes.cutter, "tool diameter", MOST, ISO, "/d"),
-    Word("TLDATA", modes.cutter, "tool diameter", NX, SIEMENS, "/kind,d"),
-    Word("DELAY", modes.delay, "pause", ALL, ISO, _PAUSE_FORM),
-    Word("DWELL", modes.delay, "pause", "", ISO, _PAUSE_FORM),
-    Word("MODE", modes.mode, "milling; turning is read alike", AUTODESK, POSTS, "/MILL or TURN"),
-    Word("CUTCOM", cutcom, _COMPENSATION, CATIA_CREO, ISO, "/OFF"),
-    Word("FINI", modes.fini, "end of the file", MOST, ISO),
-    Word("TOOL PATH", modes.heading, HEADING, NX, SIEMENS, "/name,TOOL,tool", LISTED),
-    Word("CSI_TOOL_PATH", modes.heading, HEADING, CAMPLETE, POSTS, "/name", LISTED),
-    Word("TOOLNO", modes.toolno, TOOL, CATIA, ISO, kind=LISTED),
-    Word("MSYS", modes.frame_word, FRAMES["MSYS"], NX, SIEMENS, kind=LISTED),
-    Word("MCS", modes.frame_word, FRAMES["MCS"], AUTODESK, POSTS, kind=LISTED),
-    Word("CSYS", modes.frame_word, FRAMES["CSYS"], "", VERICUT, kind=LISTED),
-    Word("ZERO", modes.frame_word, FRAMES["ZERO"], AUTODESK, POSTS, kind=LISTED),
+    MajorWord("MOVARC", motion.movarc, _CIRCLE, AUTODESK, ISO, "/x,y,z,i,j,k,r,ANGLE,a"),
+    MajorWord("INDIRV", motion.indirv, _DIRECTION, CATIA_CREO, APT, "/i,j,k"),
+    MajorWord("TLON,GOFWD", motion.tlon, "the tool moves along a circle", CATIA_CREO, DASSAULT, "/(...),ON,(...)"),
+    MajorWord("CYCLE", cycles.cycle, "drilling cycle", ALL, PTC, _CYCLE_FORM),
+    MajorWord("FEDRAT", modes.fedrat, "feed", ALL, ISO, "/number[,unit] or unit,number"),
+    MajorWord("SPINDL", modes.spindl, "spindle speed", ALL, ISO),
+    MajorWord("UNITS", modes.units, "length unit", f"{CREO}, {AUTODESK}", ISO, "/MM or INCHES"),
+    MajorWord("UNIT", modes.units, "length unit", "", ISO, "/MM or INCHES"),
+    MajorWord("MULTAX", modes.multax, "whether points carry a tool axis", MOST, ISO, "[/ON or OFF]"),
+    MajorWord("TLAXIS", modes.tlaxis, "tool axis", "", ISO, "/i,j,k"),
+    MajorWord("LOADTL", modes.loadtl, "tool change", MOST, PTC, "/n[,LENGTH,l]"),
+    MajorWord("LOAD", modes.loadtl, "tool change", NX, SIEMENS, "/TOOL,n"),
+    MajorWord("CUTTER", modes.cutter, "tool diameter", MOST, ISO, "/d"),
+    MajorWord("TLDATA", modes.cutter, "tool diameter", NX, SIEMENS, "/kind,d"),
+    MajorWord("DELAY", modes.delay, "pause", ALL, ISO, _PAUSE_FORM),
+    MajorWord("DWELL", modes.delay, "pause", "", ISO, _PAUSE_FORM),
+    MajorWord("MODE", modes.mode, "milling; turning is read alike", AUTODESK, POSTS, "/MILL or TURN"),
+    MajorWord("CUTCOM", cutcom, _COMPENSATION, CATIA_CREO, ISO, "/OFF"),
+    MajorWord("FINI", modes.fini, "end of the file", MOST, ISO),
+    MajorWord("TOOL PATH", modes.heading, HEADING, NX, SIEMENS, "/name,TOOL,tool", LISTED),
+    MajorWord("CSI_TOOL_PATH", modes.heading, HEADING, CAMPLETE, POSTS, "/name", LISTED),
+    MajorWord("TOOLNO", modes.toolno, TOOL, CATIA, ISO, kind=LISTED),
+    MajorWord("MSYS", modes.frame_word, FRAMES["MSYS"], NX, SIEMENS, kind=LISTED),
+    MajorWord("MCS", modes.frame_word, FRAMES["MCS"], AUTODESK, POSTS, kind=LISTED),
+    MajorWord("CSYS", modes.frame_word, FRAMES["CSYS"], "", VERICUT, kind=LISTED),
+    MajorWord("ZERO", modes.frame_word, FRAMES["ZERO"], AUTODESK, POSTS, kind=LISTED),
 )
 _SHIFT = Harmless(no_shift, "a shift of zero", "0,0,0")
 _TURN = Harmless(no_turn, "a rotary axis that stays at 0")
@@ -237,7 +237,7 @@ WORDS = table(
 )
 
 
-def look_up(name: str) -> Word | None:
+def look_up(name: str) -> MajorWord | None:
     """The entry of a word; a refused one is refused with whatever follows its comma, as in `TLRGT,GORGT`."""
     head = WORDS.get(name.partition(",")[0])
     return WORDS.get(name) or (head if head is not None and head.kind == REFUSED else None)
@@ -251,7 +251,7 @@ def meaning_of(name: str) -> str:
     return f"{word.meaning}, not supported" if word.kind == REFUSED else word.meaning
 
 
-def execute(state: State, statement: Statement) -> None:
+def execute(state: CutterLocationState, statement: MajorStatement) -> None:
     """Execute a statement. Raises `InputError` and `ArcError`.
 
     A word that is not known is listed with a warning, and refused where it may move the tool or belong to another

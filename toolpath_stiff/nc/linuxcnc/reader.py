@@ -32,7 +32,7 @@ from toolpath_stiff.nc.tables import tool_of
 from toolpath_stiff.units import ShopPose, pose_in_si
 
 if TYPE_CHECKING:
-    from toolpath_stiff.nc.linuxcnc.runner import Limits, Run
+    from toolpath_stiff.nc.linuxcnc.runner import Run, RunLimits
 
 MACHINE_CODES = re.compile(r"G0*(?:53|28|30)(?!\d)")
 OFFSET_CODES = re.compile(r"G0*10(?!\d)")
@@ -46,7 +46,7 @@ MOST_NAMED = 5  # loops, in a message
 NO_SHIFT = (0.0, 0.0, 0.0)
 
 
-def read(request: Request, limits: Limits | None = None) -> ReadProgram:
+def read(request: Request, limits: RunLimits | None = None) -> ReadProgram:
     """A program as `rs274` reads it, within the limits of its run.
 
     Raises
@@ -81,7 +81,7 @@ class _Session:
     """A program being read, as often as it takes to know its zero."""
 
     def __init__(
-        self, request: Request, lines: list[Line], rs274: str, dropped: Sequence[Dropped], limits: Limits | None
+        self, request: Request, lines: list[Line], rs274: str, dropped: Sequence[Dropped], limits: RunLimits | None
     ) -> None:
         self.request, self.lines, self.rs274, self.dropped, self.limits = request, lines, rs274, dropped, limits
         self.offsets = copy.deepcopy(request.work_offsets)

@@ -33,7 +33,7 @@ LIMITER = Path(__file__).with_name("limiter.py").resolve()
 
 
 @dataclass(frozen=True)
-class Limits:
+class RunLimits:
     """Limits of a run: processor time, memory, and size of any file it writes."""
 
     seconds: int = 60
@@ -70,7 +70,7 @@ def find_rs274(path: str | None = None, unconfined: bool = False) -> str:
     return str(Path(program).resolve())
 
 
-def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: Limits | None = None) -> Run:
+def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: RunLimits | None = None) -> Run:
     """Run the interpreter on a program that has passed the fence.
 
     Raises
@@ -82,7 +82,7 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: 
     """
     if sys.platform == "win32":
         raise TpsError("LinuxCNC's interpreter runs on Linux only")
-    limits = limits or Limits()
+    limits = limits or RunLimits()
     with temporary_folder("tps-rs274-") as folder:
         (folder / PROGRAM).write_text(program, encoding="ascii")
         (folder / PARAMETERS).write_text(parameters, encoding="ascii")
@@ -102,7 +102,7 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: 
         return Run(_text(folder / CANON), message if code else "", _text(folder / PARAMETERS))
 
 
-def _execute(command: list[str], folder: Path, limits: Limits) -> int:
+def _execute(command: list[str], folder: Path, limits: RunLimits) -> int:
     """Exit code, -9 if it had to be stopped by the clock."""
     environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LC_ALL": "C", "TMPDIR": str(folder)}
     with (folder / ERRORS).open("wb") as errors:
@@ -121,7 +121,7 @@ def _execute(command: list[str], folder: Path, limits: Limits) -> int:
             process.wait()
 
 
-def _wait(process: subprocess.Popen[bytes], folder: Path, limits: Limits) -> int:
+def _wait(process: subprocess.Popen[bytes], folder: Path, limits: RunLimits) -> int:
     """Exit code, or the signal in its place: Python within rs274 ignores the one for large files."""
     # A process that sleeps uses no processor time: the clock ends it too.
     end = time.monotonic() + 2 * limits.seconds + 5
@@ -151,7 +151,7 @@ def _ended(process: subprocess.Popen[bytes], seconds: float) -> bool:
         os.close(handle)
 
 
-def _exceeded(code: int, limits: Limits) -> str:
+def _exceeded(code: int, limits: RunLimits) -> str:
     """The limit that an exit code stands for; a shell's or bubblewrap's 128 + n is signal n."""
     number = -code if code < 0 else code - 128
     limit: dict[int, str] = {signal.SIGXFSZ: f"{limits.file_bytes / 1e6:.0f} MB of output"}

@@ -26,7 +26,7 @@ from toolpath_stiff.nc.place import Place
 NGC, MACRO_B, EITHER = "RS274/NGC", "Macro B", "either family"
 
 
-class Variables(Protocol):
+class VariableValues(Protocol):
     """What expressions ask of the variables (`variables.Variables`)."""
 
     def get(self, which: str | int, place: Place) -> float | None:
@@ -39,7 +39,7 @@ class Variables(Protocol):
         """ATAN[y]/[x], degrees."""
 
 
-Value = Callable[[Variables], float | None]  # None: an empty variable of Macro B
+Value = Callable[[VariableValues], float | None]  # None: an empty variable of Macro B
 
 NUMBER = re.compile(r"\d+\.?\d*|\.\d+", re.ASCII)
 NAME = re.compile(r"<([^<>]*)>")
@@ -127,10 +127,10 @@ class Scanner:
     def _missing(self, what: str, expected: str) -> InputError:
         return self.fail("the block ends here" if self.done else f"{self.rest()} is not {what}", expected)
 
-    def _worked_out(self, name: str, column: int, work: Callable[[Variables], float]) -> Value:
+    def _worked_out(self, name: str, column: int, work: Callable[[VariableValues], float]) -> Value:
         """A value whose result is a finite real number, or an error at `column`."""
 
-        def value(variables: Variables) -> float:
+        def value(variables: VariableValues) -> float:
             try:
                 return finite(work(variables))
             except (ArithmeticError, ValueError) as error:
@@ -191,7 +191,7 @@ class Scanner:
         where, which = self.place._replace(column=self.column), self.which()
         return lambda variables: variables.get(which(variables), where)
 
-    def which(self) -> Callable[[Variables], str | int]:
+    def which(self) -> Callable[[VariableValues], str | int]:
         """Which variable a `#` means: a number, the number that another one holds, an expression, a name."""
         column = self.column
         named = self.match(NAME)
@@ -218,7 +218,7 @@ class Scanner:
             constant = float(literal[0])
             inner = lambda variables: constant  # noqa: E731
 
-        def numbered(variables: Variables) -> int:
+        def numbered(variables: VariableValues) -> int:
             variable_number = number(inner(variables))
             if not abs(variable_number) < LARGEST_PLACE or abs(variable_number - round(variable_number)) > EQUAL:
                 raise self.fail(f"#{variable_number:g}", "a whole number", column=column)
@@ -293,7 +293,7 @@ class Scanner:
         if name == "POW" and self.family == NGC:
             raise self.fail(f"POW is no function of {NGC}", column=column)
 
-        def work(variables: Variables) -> float:
+        def work(variables: VariableValues) -> float:
             left, right = number(first(variables)), number(second(variables))
             return left**right if name == "POW" else variables.angle(left, right)
 
