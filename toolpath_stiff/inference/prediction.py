@@ -111,11 +111,8 @@ class Predictor:
     def effects_that_act(self) -> list[str]:
         """Effects and instruments of the machine file that change these readings, for headings."""
         idle = idle_on(self.base, self.data)
-        return [
-            active.effect.name
-            for active in (*self.base.effects, *self.base.instruments)
-            if active.effect.name not in idle
-        ]
+        names = [active.effect.name for active in (*self.base.effects, *self.base.instruments)]
+        return [name for name in names if name not in idle]
 
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
         """(n,) ln(N/m) that the readings should show; nan where the model has no answer.

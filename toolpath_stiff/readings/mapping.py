@@ -208,11 +208,8 @@ def _unit(table: Table, name: str, heading: str, cells: Sequence[str]) -> str:
     """The unit that stands below or in a heading, else the column's own; of dates their form."""
     if name == DATE:
         return "" if all(is_date(cell) for cell in cells) else next(iter(_forms(cells)), "")
-    column_unit = unit_of(name)
-    return next(
-        (unit for unit in (table.units.get(heading, ""), unit_of(heading)) if same_quantity(unit, column_unit)),
-        column_unit,
-    )
+    default, units = unit_of(name), (table.units.get(heading, ""), unit_of(heading))
+    return next((unit for unit in units if same_quantity(unit, default)), default)
 
 
 def _forms(cells: Sequence[str]) -> list[str]:

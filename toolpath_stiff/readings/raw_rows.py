@@ -69,9 +69,8 @@ def measurement_csv(reduced: Sequence[LoopFigures], history: StrutHistory) -> st
             figures.append(replace(record, stiffness=record.tension, force=float(record.loop.force.max())))
             figures.append(replace(record, stiffness=record.compression, force=float(record.loop.force.min())))
         else:
-            figures.append(
-                replace(record, stiffness=record.stiffness if record.loop.strut in mixed else record.elastic)
-            )
+            stiffness = record.stiffness if record.loop.strut in mixed else record.elastic
+            figures.append(replace(record, stiffness=stiffness))
     loops = [record.loop for record in figures]
     # Of struts alone only columns with something in them.
     alone = all(loop.jog is None for loop in loops)

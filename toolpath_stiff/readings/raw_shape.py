@@ -202,12 +202,8 @@ def _averaged(
         if len(both[0]) > most:
             both = [np.array([run.mean() for run in np.array_split(values, most)]) for values in both]
         runs.append(both)
-    which = np.repeat(np.arange(len(ways)), [len(forces) for forces, _ in runs])
-    return (
-        np.concatenate([forces for forces, _ in runs]),
-        np.concatenate([deflections for _, deflections in runs]),
-        which,
-    )
+    which = np.repeat(np.arange(len(ways)), [len(f) for f, _ in runs])
+    return np.concatenate([f for f, _ in runs]), np.concatenate([y for _, y in runs]), which
 
 
 Tried = tuple[str, float, FloatArray, FloatArray]
