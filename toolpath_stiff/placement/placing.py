@@ -59,7 +59,7 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     >>> present = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
     >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc", origin=present)
     >>> here = np.array([0.0, 0.1, 0.8, 0.0, 0.0, 0.0])  # a search of some seconds has bounds apart
-    >>> task = Task(
+    >>> task = PlacementTask(
     ...     build_model(load_machine("nist")), slot, present, lambda zero: slot, Bounds(here, here),
     ...     SearchRules(objective="mean", points=5), Load(), step=0.01, force=1000.0,
     ... )
