@@ -197,7 +197,6 @@ NO_EXAMPLE = {
     "Effect": {"hooks"},
     "Reduction": {"loops"},
     "Diagnosis": {
-        "document",
         "likeliest",
         "rows",
         "noise",
@@ -206,8 +205,6 @@ NO_EXAMPLE = {
         "explanations",
         "before",
         "after",
-        "law",
-        "ranking",
     },
     "NextVisit": {"rows", "sentences"},
     "Plan": {"rows", "sentences", "notes", "visits"},

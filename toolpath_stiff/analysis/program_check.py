@@ -27,13 +27,7 @@ from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.path import BLOCK, Samples, move_durations, place, sample_moves
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import (
-    Pose,
-    deg_from_rad,
-    m_from_mm,
-    mm_from_m,
-    mm_per_min_from_m_per_s,
-)
+from toolpath_stiff.units import Pose, deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
 
 if TYPE_CHECKING:
     import pandas as pd

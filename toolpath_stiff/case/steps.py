@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from toolpath_stiff.case.files import (
-    ENTRY,
-)
+from toolpath_stiff.case.files import ENTRY
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.writer import toml_text

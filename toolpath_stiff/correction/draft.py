@@ -126,8 +126,8 @@ def _nothing_to_describe(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "unexplained" and (diagnosis.portrait is None or not diagnosis.portrait.terms):
         return "Something is missing, but no simple form of it stands out from chance: there is nothing to write down."
     if diagnosis.portrait is None:
-        word = "explains" if diagnosis.verdict == "identified" else "may explain"
-        return f"{names} {word} these readings and leaves nothing that stands out: there is nothing to describe."
+        word, rest = ("explains", "leaves") if diagnosis.verdict == "identified" else ("may explain", "leave")
+        return f"{names} {word} these readings and {rest} nothing that stands out: there is nothing to describe."
     terms = [sized.term for sized in diagnosis.portrait.terms]
     if not any(term.acts for term in terms):
         with_what = joined(list(dict.fromkeys(name for term in terms for name in term.unseen)))

@@ -16,11 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from toolpath_stiff.nc.codes.drilling import CYCLES
-from toolpath_stiff.nc.codes.points import (
-    assume_increments,
-    warn_of_points,
-    watches_points,
-)
+from toolpath_stiff.nc.codes.points import assume_increments, warn_of_points, watches_points
 from toolpath_stiff.nc.plain_holes import drill, rows_of_hole, suits
 from toolpath_stiff.nc.plain_moves import MODES, Lines
 from toolpath_stiff.nc.plain_words import (

@@ -15,25 +15,11 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.modes import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
 from toolpath_stiff.nc.codes.motion import ARCS, STILL, note_tool, sweep_about
-from toolpath_stiff.nc.codes.points import (
-    ANGLES,
-    LINEAR,
-    assume_increments,
-    coordinate,
-    increment,
-)
+from toolpath_stiff.nc.codes.points import ANGLES, LINEAR, assume_increments, coordinate, increment
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arcs, MovesInMm
 from toolpath_stiff.nc.plain_holes import LEAST
-from toolpath_stiff.nc.plain_words import (
-    BARE,
-    FIRST_F,
-    LAST_F,
-    LETTERS,
-    NO_CODE,
-    NONE,
-    PlainWords,
-)
+from toolpath_stiff.nc.plain_words import BARE, FIRST_F, LAST_F, LETTERS, NO_CODE, NONE, PlainWords
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES

@@ -12,9 +12,7 @@ from pathlib import Path
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.parametric.endless import LoopGuard
 from toolpath_stiff.nc.parametric.expressions import EQUAL, NGC, number
-from toolpath_stiff.nc.parametric.statements import (
-    Steering,
-)
+from toolpath_stiff.nc.parametric.statements import Steering
 from toolpath_stiff.nc.parametric.structure import Structure, loops_of, structure_of
 from toolpath_stiff.nc.parametric.values import SHOWN, ValuesRun
 from toolpath_stiff.nc.program_run import HEAD, Subprogram, Tally, beyond_the_end

@@ -12,13 +12,7 @@ from toolpath_stiff.comparison.residuals import directions
 from toolpath_stiff.comparison.structure import SIGNIFICANT
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.compare.pictures import RESIDUAL_AXIS, heading
-from toolpath_stiff.report.figure import (
-    MUTED,
-    UNREACHABLE_RED,
-    drawn,
-    house_style,
-    new_figure,
-)
+from toolpath_stiff.report.figure import MUTED, UNREACHABLE_RED, drawn, house_style, new_figure
 from toolpath_stiff.report.residuals import DIRECTION_COLOURS
 from toolpath_stiff.report.words import plain, shortened
 
