@@ -18,7 +18,7 @@ from toolpath_stiff.diagnosis.diagnose import Diagnosis, diagnose
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.rivals import rivals_of
@@ -90,7 +90,7 @@ def run(job: Job) -> dict[str, Any]:
 
 
 @cache
-def machine() -> Machine:
+def machine() -> Hexapod:
     """The machine as the model has it."""
     return load_machine("nist")
 

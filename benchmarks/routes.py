@@ -12,7 +12,7 @@ import numpy as np
 
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness import truss as reference
@@ -35,7 +35,7 @@ def poses(n: int, tilted: bool) -> tuple[np.ndarray, np.ndarray | None]:
     return position, rotation_matrices(np.deg2rad(rng.uniform(-20, 20, (n, 3)))) if tilted else None
 
 
-def opensees_compliance(machine: Machine, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+def opensees_compliance(machine: Hexapod, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """The same 25-bar truss built and solved in OpenSees, three load cases."""
     ops: Any = importlib.import_module("openseespy.opensees")  # its functions are unknown to a type checker
     nodes = position + platform_nodes(machine.platform_joints) @ rotation.T

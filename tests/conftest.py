@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.inference.judgement import Judgement
     from toolpath_stiff.inference.noise import Noise
     from toolpath_stiff.inference.prediction import Predictor
-    from toolpath_stiff.machine.model import Machine
+    from toolpath_stiff.machine.model import Hexapod
     from toolpath_stiff.readings.measurements import Readings
     from toolpath_stiff.stiffness.contract import Effect
     from toolpath_stiff.stiffness.model import StiffnessModel
@@ -136,7 +136,7 @@ def predictors_are_shared() -> Iterator[None]:
 
     plain = machine_toml(nist())
 
-    def shared(machine: Machine, data: Readings, effect_files: Sequence[str | Path] = ()) -> Predictor:
+    def shared(machine: Hexapod, data: Readings, effect_files: Sequence[str | Path] = ()) -> Predictor:
         """`Predictor(...)`; of the nist machine without effects of a user's own, that of the design."""
         known = not effect_files and machine_toml(machine) == plain
         return predictor_for(data) if known else Predictor(machine, data, effect_files)

@@ -17,7 +17,7 @@ from toolpath_stiff.correction.strut_law import minimise_mean_error
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor, at_both_ends, scaled_law
 from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.readings.measurements import Readings, read_measurements
@@ -44,7 +44,7 @@ def text_with(law: str) -> str:
     return NIST.replace(LAW, law)
 
 
-def machine_with(law: str) -> Machine:
+def machine_with(law: str) -> Hexapod:
     return parse_machine(text_with(law), "mine.toml")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.stiffness.cases import nist, table_1_positions
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
@@ -59,7 +59,7 @@ def neutral_values(effect: Effect) -> dict[str, Any]:
     return {p.name: "riser" if p.kind == "text" else p.neutral * p.si for p in effect.parameters}
 
 
-def model_with(name: str = "", machine: Machine | None = None, **values: Any) -> StiffnessModel:
+def model_with(name: str = "", machine: Hexapod | None = None, **values: Any) -> StiffnessModel:
     """The NIST machine, or another, with one effect; values that are not given are neutral."""
     extra = []
     if name:

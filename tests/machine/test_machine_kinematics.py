@@ -17,7 +17,7 @@ from toolpath_stiff.machine.kinematics import (
     solve_struts_at,
 )
 from toolpath_stiff.machine.limits import Extremes, machine_limits, reach
-from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, Limits, StrutLaw
 from toolpath_stiff.rotations import rotation_about_z, rotation_matrices
 
 NIST = load_machine("nist")
@@ -25,11 +25,11 @@ small = st.floats(-0.35, 0.35)
 poses = st.tuples(small, small, st.floats(0.35, 1.25), st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(-0.3, 0.3))
 
 
-def simple_machine() -> Machine:
+def simple_machine() -> Hexapod:
     """Three pairs of struts at right angles: lengths and angles can be read off."""
     frame = np.array([[0, 0, 2.0], [0, 1, 2.0], [-2.0, 0, 0], [-2.0, 0, 1], [0, 2.0, 0], [1, 2.0, 0]])
     platform = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 1], [0, 0, 0], [1, 0, 0.0]])
-    return Machine("simple", "", "", frame, platform, 0.1, StrutLaw(1, 1e7, 3, 1e7), limits=Limits())
+    return Hexapod("simple", "", "", frame, platform, 0.1, StrutLaw(1, 1e7, 3, 1e7), limits=Limits())
 
 
 def test_lengths_and_directions_by_hand():

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.truss import TIP, platform_nodes, structure_stiffness
 
@@ -36,7 +36,7 @@ def table_1_stiffness(which: str) -> FloatArray:
     return np.stack([table[f"{which}_{axis}_N_per_mm"] for axis in AXES], axis=1)
 
 
-def nist(bars: float = np.inf) -> Machine:
+def nist(bars: float = np.inf) -> Hexapod:
     """The packaged machine with platform bars of that stiffness (N/m)."""
     return load_machine("nist").with_changes(platform_bar_stiffness=bars)
 
@@ -48,7 +48,7 @@ def random_poses(n: int, seed: int, tilt_deg: float = 25.0) -> tuple[FloatArray,
     return position, rotation_matrices(np.radians(rng.uniform(-tilt_deg, tilt_deg, (n, 3))))
 
 
-def orthogonal_hexapod(offset: float = 0.0) -> Machine:
+def orthogonal_hexapod(offset: float = 0.0) -> Hexapod:
     """Two struts along each axis, h = 0.2 m either side, so that every stiffness can be had by hand.
 
     Struts 1, 2 run along x at y = +-h, 3, 4 along y at z = +-h, 5, 6 along z at x = +-h, 1, 2 and 3 m long, 10, 20
@@ -58,7 +58,7 @@ def orthogonal_hexapod(offset: float = 0.0) -> Machine:
     arms = h * np.array([[0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0]], dtype=float)
     axes = np.repeat(np.eye(3), 2, axis=0)
     joints = arms + np.array([0.0, 0.0, offset])
-    return Machine(
+    return Hexapod(
         name="orthogonal",
         title="orthogonal hexapod",
         source="made for the tests",
@@ -69,7 +69,7 @@ def orthogonal_hexapod(offset: float = 0.0) -> Machine:
     )
 
 
-def wrench_compliance(machine: Machine, position: FloatArray, rotation: FloatArray) -> FloatArray:
+def wrench_compliance(machine: Hexapod, position: FloatArray, rotation: FloatArray) -> FloatArray:
     """(6, 6) compliance of the reference truss at the tip: m/N, m/(N m), rad/N, rad/(N m) blocks.
 
     A truss node has no rotation, so a moment acts through the smallest forces on the six platform joints that

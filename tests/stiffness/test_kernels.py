@@ -14,7 +14,7 @@ import pytest
 
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.kinematics import singularity_index, solve_struts, solve_struts_at
-from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, Limits, StrutLaw
 from toolpath_stiff.rotations import rotation_about_z, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import build_model
@@ -30,7 +30,7 @@ def poses(n: int, seed: int = 0, tilt: float = 0.35):
     return position, rotation_matrices(rng.uniform(-tilt, tilt, (n, 3)))
 
 
-def by_equilibrium(machine: Machine, position, rotation) -> np.ndarray:
+def by_equilibrium(machine: Hexapod, position, rotation) -> np.ndarray:
     """Tip compliance from J^T f = w with a pivoted 6 x 6 solve, written out here again."""
     arms = machine.platform_joints @ np.swapaxes(rotation, 1, 2)
     strut = position[:, None] + arms - machine.frame_joints
@@ -91,15 +91,15 @@ def test_symmetry_of_120_degrees(route):
     assert worst(third.T @ turned @ third, plain) < 1e-12
 
 
-def random_machine(rng) -> Machine:
+def random_machine(rng) -> Hexapod:
     """Joints anywhere: no symmetry, no plane; often close to singular."""
     frame = rng.uniform([-1, -1, 1.0], [1, 1, 2.0], (6, 3))
     platform = rng.uniform([-0.4, -0.4, 0.0], [0.4, 0.4, 0.3], (6, 3))
     law = StrutLaw(0.5, 4e7, 3.0, 2e7)
-    return Machine("random", "random", "", frame, platform, 0.1, law, limits=Limits())
+    return Hexapod("random", "random", "", frame, platform, 0.1, law, limits=Limits())
 
 
-def rounding(machine: Machine, position, rotation) -> tuple[np.ndarray, np.ndarray]:
+def rounding(machine: Hexapod, position, rotation) -> tuple[np.ndarray, np.ndarray]:
     """(n,) by how much the elimination, and a pivoted solve, make rounding larger.
 
     Determinant and cofactors of U_A are right to eps, so U_A^-1 to eps |U_A^-1| / det U_A; that is the error of

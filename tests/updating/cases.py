@@ -26,7 +26,7 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.judgement import Judgement, judge
 from toolpath_stiff.inference.noise import Noise, noise_models
 from toolpath_stiff.inference.prediction import Predictor, idle_on
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.readings.measurements import Readings, read_measurements
 from toolpath_stiff.rig import case, exercise
@@ -51,7 +51,7 @@ OPTIONAL_COLUMNS = (
 )  # fmt: skip
 
 
-def read_text(text: str, machine: Machine | None = None) -> Readings:
+def read_text(text: str, machine: Hexapod | None = None) -> Readings:
     """Measurements from the text of a file."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "measurements.csv"
@@ -186,7 +186,7 @@ READ_OFF = ("stiffness", "sd", "file", "line", "notes", "warnings")  # what read
 
 def joint_columns_once(
     which: str,
-    machine: Machine,
+    machine: Hexapod,
     data: Readings,
     columns: Callable[[], FloatArray],
     files: Sequence[str | Path] = (),
@@ -243,7 +243,7 @@ def judged(seed: int, layout: str = "tilted", hidden: str = "none", size: float 
     return judge(problem, noise, testable_effects(problem.predictor)[0], seed=0)
 
 
-def make_problem(machine: Machine, data: Readings, noise: Noise) -> tuple[Problem, FloatArray]:
+def make_problem(machine: Hexapod, data: Readings, noise: Noise) -> tuple[Problem, FloatArray]:
     """Data, model and scatter, ready for fits; and the covariance (n, n) of ln readings."""
     problem = Problem.of(Predictor(machine, data), noise)
     return problem, problem.scatter.covariance.dense()
@@ -255,7 +255,7 @@ def correlated_covariance(own: ArrayLike, shared: ArrayLike) -> Covariance:
     return Covariance(own, Groups.by(np.arange(len(own))), 0.0, np.asarray(shared, dtype=float).T)
 
 
-def examined(machine: Machine, data: Readings, **options: Any) -> Diagnosis:
+def examined(machine: Hexapod, data: Readings, **options: Any) -> Diagnosis:
     """A diagnosis without the plan of what to measure next."""
     return diagnose(machine, data, plan_next=False, **options)
 

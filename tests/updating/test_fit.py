@@ -18,7 +18,7 @@ from toolpath_stiff.inference.candidates import Candidate, candidates_of
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 
@@ -31,7 +31,7 @@ NOMINAL, COVARIANCE = make_problem(nist(), DATA, NOISE)
 JOINT = "joint_compliance"
 
 
-def problem_of(logs: FloatArray, machine: Machine | None = None) -> Problem:
+def problem_of(logs: FloatArray, machine: Hexapod | None = None) -> Problem:
     """Readings (42,) of ln k at the paper's poses."""
     if machine is not None:
         return make_problem(machine, replace(DATA, stiffness=np.exp(logs)), NOISE)[0]

@@ -14,7 +14,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import PoseError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Extremes, Limit, Reach, machine_limits, reach
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -278,7 +278,7 @@ def _evaluate_rows(task: _Task, rows: slice | IntArray) -> None:
     task.result.put(rows, stiffness, struts.lengths, extrapolated, stand)
 
 
-def refuse_no_number(machine: Machine, tip: FloatArray, bad: BoolArray) -> None:
+def refuse_no_number(machine: Hexapod, tip: FloatArray, bad: BoolArray) -> None:
     """Raise `PoseError` where the limits let poses pass (n,) that have no stiffness."""
     if bad.any():
         x, y, z = (mm_from_m(float(v)) + 0.0 for v in tip[int(np.argmax(bad))])

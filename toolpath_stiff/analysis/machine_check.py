@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate_poses
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
 from toolpath_stiff.results import Result
@@ -143,7 +143,7 @@ def _at(model: StiffnessModel, pose: Pose) -> PoseStiffness:
     return evaluate_poses(model, values[:, :3], values[:, 3:])
 
 
-def _struts(machine: Machine) -> list[str]:
+def _struts(machine: Hexapod) -> list[str]:
     """Stiffnesses of a strut that no strut has, at the lengths that the file gives, else at the ends of the travel."""
     law = machine.strut_law
     ends = [(x, float(law.stiffness(np.array(x)))) for x in machine.limits.strut_length if np.isfinite(x)]

@@ -16,7 +16,7 @@ from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.documents import without_nan
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, reach
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
@@ -207,7 +207,7 @@ def evaluate_poses(
 RAY_STEP, RAY_END, RAY_EXACT = 0.05, 5.0, 1e-4  # m: marching out, at most so far, and how exact the end is
 
 
-def reach_along(machine: Machine, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
+def reach_along(machine: Hexapod, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
     """(n,) m that the tool tip can go from a place (3,) along unit vectors (n, 3) before the first limit.
 
     `turn` (3, 3) is the orientation, which is kept. 0 where the place itself is out of reach.

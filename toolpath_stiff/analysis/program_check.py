@@ -16,7 +16,7 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import check_by
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches
 from toolpath_stiff.nc.findings import ERROR, WARNING, Checked, Finding
@@ -110,7 +110,7 @@ def radii_findings(moves: Moves) -> list[Finding]:
 
 
 def machine_findings(
-    checked: Checked, machine: Machine, origin: Pose, step: float, speed_limit: float | None
+    checked: Checked, machine: Hexapod, origin: Pose, step: float, speed_limit: float | None
 ) -> tuple[list[Finding], dict[str, float]]:
     """Moves beyond reach, and the struts' speeds (m/s) at the programmed feeds.
 
@@ -160,7 +160,7 @@ def machine_findings(
     return findings, {"mm_per_min": mm_per_min_from_m_per_s(float(fastest[top])), "line": int(lines[top])}
 
 
-def _struts_and_reach(machine: Machine, samples: Samples) -> tuple[FloatArray, Reach]:
+def _struts_and_reach(machine: Hexapod, samples: Samples) -> tuple[FloatArray, Reach]:
     """(n, 6) m strut lengths of n samples, and their reach; block by block, as work arrays of a long path are large."""
     other = other_poses(samples.position, samples.abc, samples.tool_length)
     poses, of_sample = np.flatnonzero(other), np.cumsum(other) - 1
@@ -248,7 +248,7 @@ def check_program(
     lines: tuple[str, ...],
     name: str,
     *,
-    machine: Machine | None,
+    machine: Hexapod | None,
     origin: Pose | None = None,
     step: float = defaults.STEP,
     strut_speed: float | None = None,

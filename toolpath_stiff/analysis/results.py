@@ -25,7 +25,7 @@ from toolpath_stiff.documents import without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.path import Samples, place, sample_moves
 from toolpath_stiff.results import FolderResult
@@ -170,7 +170,7 @@ class Analysis(EvaluatedPath, FolderResult):
 
 
 def analyze(
-    machine: Machine | StiffnessModel,
+    machine: Hexapod | StiffnessModel,
     program: ReadProgram,
     *,
     origin: Pose | None = None,
@@ -233,7 +233,7 @@ def analyze(
     return analysis
 
 
-def _effective_origin(machine: Machine, program: ReadProgram, origin: Pose | None) -> tuple[Pose, str]:
+def _effective_origin(machine: Hexapod, program: ReadProgram, origin: Pose | None) -> tuple[Pose, str]:
     """The option, else the program's own word, else the machine's default."""
     chosen, source = program.origin, program.origin_source
     if origin is not None:

@@ -15,7 +15,7 @@ from toolpath_stiff.analysis.loads import Load, along_tool_axis, follows_motion,
 from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.operations import Operation, Operations, operations
 from toolpath_stiff.path import PATH_COLUMNS, Samples, path_columns
@@ -74,7 +74,7 @@ class EvaluatedPath:
     warnings: list[str]
 
     @property
-    def machine(self) -> Machine:
+    def machine(self) -> Hexapod:
         """The machine, geometry effects included."""
         return self.model.machine
 

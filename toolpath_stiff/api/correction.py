@@ -19,7 +19,7 @@ from toolpath_stiff.units import m_from_mm, rad_from_deg
 if TYPE_CHECKING:
     from toolpath_stiff.correction.result import Update
     from toolpath_stiff.diagnosis.result import Diagnosis
-    from toolpath_stiff.machine.model import Machine as MachineModel
+    from toolpath_stiff.machine.model import Hexapod
     from toolpath_stiff.planning.result import Plan
 
 COSTS = ("reading", "pose", "tool", "setup", "indicator")
@@ -89,7 +89,7 @@ def update(
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     on = question.on
 
-    def opened(corrected: MachineModel) -> Machine:
+    def opened(corrected: Hexapod) -> Machine:
         model = replace(build_model(corrected, on.effect_files), unchecked=on.model.unchecked)
         return Machine(model, on.asked, on.effect_files, allow_unchecked_effects=on.allow_unchecked_effects)
 

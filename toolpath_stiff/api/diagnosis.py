@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.comparison.compare import Comparison
     from toolpath_stiff.diagnosis.result import Diagnosis
-    from toolpath_stiff.machine.model import Machine as MachineModel
+    from toolpath_stiff.machine.model import Hexapod
     from toolpath_stiff.readings.measurements import Readings
 
 
@@ -53,7 +53,7 @@ class Measurements:
 
     def __init__(self, files: Sequence[str], columns: Mapped = None) -> None:
         self.files, self.columns = tuple(files), columns_text(columns)
-        self._last: tuple[MachineModel, Readings] | None = None
+        self._last: tuple[Hexapod, Readings] | None = None
 
     @classmethod
     def read(cls, *files: str | Path, columns: Mapped = None) -> Measurements:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.arrays import FloatArray
     from toolpath_stiff.machine.kinematics import Struts
     from toolpath_stiff.machine.limits import Reach
-    from toolpath_stiff.machine.model import Machine as MachineData
+    from toolpath_stiff.machine.model import Hexapod
     from toolpath_stiff.nc.program import Program
     from toolpath_stiff.stiffness.contract import Conditions
     from toolpath_stiff.stiffness.model import StiffnessModel
@@ -421,7 +421,7 @@ class Machine(Result):
 
 
 def _machine_again(
-    given: MachineData, conditions: Conditions, unchecked: tuple[str, ...], fields: tuple[Any, ...]
+    given: Hexapod, conditions: Conditions, unchecked: tuple[str, ...], fields: tuple[Any, ...]
 ) -> Machine:
     """A machine in another process."""
     from toolpath_stiff.stiffness.model import build_model

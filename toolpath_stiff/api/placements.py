@@ -17,7 +17,7 @@ from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
 if TYPE_CHECKING:
-    from toolpath_stiff.machine.model import Machine as MachineModel
+    from toolpath_stiff.machine.model import Hexapod
     from toolpath_stiff.nc.moves import ReadProgram
     from toolpath_stiff.placement.evaluator import Evaluator
     from toolpath_stiff.placement.goals import Bounds
@@ -174,7 +174,7 @@ def _keep_out(text: str) -> KeepOut:
 
 
 def _bounds(
-    machine: MachineModel, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
+    machine: Hexapod, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
 ) -> Bounds:
     """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     import numpy as np

@@ -33,7 +33,7 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import base_fit
 from toolpath_stiff.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
@@ -148,7 +148,7 @@ class Comparison(FolderResult):
 
 
 def compare(
-    machine: Machine,
+    machine: Hexapod,
     data: Readings,
     *,
     noise: float | tuple[float, float] | None = None,
@@ -243,7 +243,7 @@ def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int,
 
 
 def _beside_tip(
-    machine: Machine, data: Readings, effect_files: Sequence[str | Path], noise: Noise, seed: int
+    machine: Hexapod, data: Readings, effect_files: Sequence[str | Path], noise: Noise, seed: int
 ) -> tuple[BesideTip, StrutHistory]:
     """Readings of loops beside the tip against the machine as its file has it; struts alone over their dates."""
     if data.beside is None:

@@ -24,7 +24,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions, radius
 from toolpath_stiff.inference.covariances import Covariance
 from toolpath_stiff.inference.repeats import repeat_groups
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import mm_from_m
 
@@ -83,7 +83,7 @@ class NotChecked:
     reason: str
 
 
-def symmetries(machine: Machine) -> list[FloatArray]:
+def symmetries(machine: Hexapod) -> list[FloatArray]:
     """(3, 3) turns by 120 and 240 degrees about Z and mirrors that leave the machine's joints as they are."""
     candidates = []
     for degrees, sign in [(120.0, 1.0), (240.0, 1.0), *((2.0 * half, -1.0) for half in range(0, 180, 30))]:
@@ -97,7 +97,7 @@ def symmetries(machine: Machine) -> list[FloatArray]:
     return [q for q in candidates if maps(q, machine.frame_joints) and maps(q, machine.platform_joints)]
 
 
-def model_free_checks(machine: Machine, data: Readings) -> tuple[list[Check], list[NotChecked]]:
+def model_free_checks(machine: Hexapod, data: Readings) -> tuple[list[Check], list[NotChecked]]:
     """The checks that n readings allow; for the others, why not."""
     cells, turns = _cells(data), symmetries(machine)
     threefold = sum(np.linalg.det(q) > 0 for q in turns) == 2

@@ -11,7 +11,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
@@ -58,7 +58,7 @@ def table_1() -> tuple[FloatArray, FloatArray]:
 
 def machine_of(
     lengths: FloatArray, hexagon_twist: float = 0.0, law: StrutLaw | None = None, scale: float = 1.0
-) -> Machine:
+) -> Hexapod:
     """The machine of six lengths (m, as `UNKNOWNS`).
 
     `hexagon_twist` (rad) turns the platform's joints alternately apart, `scale` blows the platform up about the tip
@@ -78,7 +78,7 @@ def machine_of(
     )
 
 
-def modelled_stiffness(machine: Machine, position: FloatArray) -> FloatArray:
+def modelled_stiffness(machine: Hexapod, position: FloatArray) -> FloatArray:
     """(n, 3) N/mm along X, Y, Z."""
     compliance = tip_compliance(build_model(machine), position)
     return np.asarray(n_per_mm_from_n_per_m(1.0 / np.einsum("nii->ni", compliance)))

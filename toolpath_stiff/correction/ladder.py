@@ -42,7 +42,7 @@ from toolpath_stiff.inference.left_out import error_falls, gain_in_standard_erro
 from toolpath_stiff.inference.noise import Noise, noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.question import question
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import Effect
 
@@ -57,7 +57,7 @@ MOST_EFFECTS = 4  # that `--auto` adds
 
 
 def build_ladder(
-    machine: Machine,
+    machine: Hexapod,
     data: Readings,
     additions: Sequence[Addition] = (),
     *,
@@ -124,7 +124,7 @@ def build_ladder(
 
 
 def _check(
-    machine: Machine, data: Readings, additions: Sequence[Addition], strut_law: bool, keep_law: bool, auto: bool
+    machine: Hexapod, data: Readings, additions: Sequence[Addition], strut_law: bool, keep_law: bool, auto: bool
 ) -> None:
     if strut_law and keep_law:
         raise InputError("--strut-law and --keep-strut-law", expected="one of them")

@@ -13,7 +13,7 @@ import numpy as np
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.prediction import scaled_law
-from toolpath_stiff.machine.model import EffectEntry, Machine, StrutLaw, Uncertainty
+from toolpath_stiff.machine.model import EffectEntry, Hexapod, StrutLaw, Uncertainty
 from toolpath_stiff.readings.measurements import NIST_TABLE_1
 from toolpath_stiff.stiffness.contract import SETUP
 from toolpath_stiff.units import n_per_um_from_n_per_m
@@ -35,8 +35,8 @@ def _bytes(file: str) -> bytes:
 
 
 def fitted_machine(
-    machine: Machine, fit: Fit, provenance: Mapping[str, Any], widened: float = 1.0, setups: Iterable[str] = ()
-) -> Machine:
+    machine: Hexapod, fit: Fit, provenance: Mapping[str, Any], widened: float = 1.0, setups: Iterable[str] = ()
+) -> Hexapod:
     """The machine with a fit's strut law and effects, their joint uncertainty, and where they come from.
 
     Parameters
@@ -80,12 +80,12 @@ def _certain(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def _law(machine: Machine, fit: Fit) -> StrutLaw:
+def _law(machine: Hexapod, fit: Fit) -> StrutLaw:
     """The fitted strut law, its factors to such digits."""
     return scaled_law(machine.strut_law, np.round(fit.law, 8))
 
 
-def _uncertainty(machine: Machine, fit: Fit, widened: float) -> Uncertainty | None:
+def _uncertainty(machine: Hexapod, fit: Fit, widened: float) -> Uncertainty | None:
     """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already."""
     law = _law(machine, fit)
     names, slopes, rows = [], [], []

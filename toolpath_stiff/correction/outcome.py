@@ -15,7 +15,7 @@ from toolpath_stiff.correction.strut_law import BarCurve, StrutLawSearch
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
 
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
@@ -56,7 +56,7 @@ class UpdateOutcome:
         Commands that go on from here.
     """
 
-    given: Machine
+    given: Hexapod
     data: Readings
     noise: Noise
     problem: Problem
@@ -128,10 +128,10 @@ class UpdateOutcome:
         return float(np.sqrt(dispersion(self.last.fit))) if self.objective == "likelihood" else 1.0
 
     @cached_property
-    def corrected(self) -> Machine | None:
+    def corrected(self) -> Hexapod | None:
         """The machine with the last model; None where nothing is to be written."""
         return self.fitted(self.provenance) if self.accepted else None
 
-    def fitted(self, provenance: Mapping[str, Any]) -> Machine:
+    def fitted(self, provenance: Mapping[str, Any]) -> Hexapod:
         """The machine with the last model, which comes from there."""
         return fitted_machine(self.given, self.last.fit, provenance, self.widening, self.data.setup.tolist())

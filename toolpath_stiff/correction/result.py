@@ -13,7 +13,7 @@ from toolpath_stiff.correction.document import document_of, rounded_step
 from toolpath_stiff.correction.outcome import UpdateOutcome
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.results import FolderResult
 
@@ -61,7 +61,7 @@ class Update(UpdateOutcome, FolderResult):
     shown_by: ClassVar[str] = "update.page"
 
     inputs: tuple[str, ...] = ()
-    opened: Callable[[Machine], Any] | None = None
+    opened: Callable[[Hexapod], Any] | None = None
 
     @property
     def machine(self) -> Any:
@@ -69,7 +69,7 @@ class Update(UpdateOutcome, FolderResult):
         machine = self._corrected()
         return machine if self.opened is None else self.opened(machine)
 
-    def _corrected(self) -> Machine:
+    def _corrected(self) -> Hexapod:
         if self.corrected is None:
             hint = "" if self.worse else "force=True keeps it all the same"
             raise InputError(f"the update was refused: {words.text(self)}", hint=hint)

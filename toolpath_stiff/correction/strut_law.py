@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import NO_CHANGE, Predictor, at_both_ends, scaled_law
-from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import n_per_um_from_n_per_m
 
@@ -211,7 +211,7 @@ class BarCurve:
 
 
 def bar_curve(
-    machine: Machine, data: Readings, bars: Sequence[float] = FIGURE_3_BARS, seed: int = 0, starts: int = 3
+    machine: Hexapod, data: Readings, bars: Sequence[float] = FIGURE_3_BARS, seed: int = 0, starts: int = 3
 ) -> BarCurve:
     """Mean error for platforms from soft to rigid, with the machine's strut law and with the best one.
 

@@ -31,7 +31,7 @@ from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.question import question
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
@@ -39,7 +39,7 @@ LIKELIHOOD, MEAN_ERROR = OBJECTIVES = ("likelihood", "mean-error")
 
 
 def update(
-    machine: Machine,
+    machine: Hexapod,
     data: Readings,
     add: Sequence[str] = (),
     *,
@@ -133,7 +133,7 @@ def update(
 
 
 def update_by_mean_error(
-    machine: Machine,
+    machine: Hexapod,
     data: Readings,
     *,
     force: bool = False,
@@ -203,7 +203,7 @@ def _provenance(update: Update, files: Sequence[str], command: str) -> dict[str,
     }
 
 
-def _next(updated: Machine, machine_file: str, request: Asked, effect_files: Sequence[str | Path]) -> list[str]:
+def _next(updated: Hexapod, machine_file: str, request: Asked, effect_files: Sequence[str | Path]) -> list[str]:
     """Commands that use the new machine; an effect that belongs to a set-up acts only where that is named."""
     model = build_model(updated, effect_files)
     setups = [name for active in model.effects if (name := setup_of(active))]
@@ -215,7 +215,7 @@ def _next(updated: Machine, machine_file: str, request: Asked, effect_files: Seq
     ]
 
 
-def _bars(machine: Machine, data: Readings, seed: int, progress: Callable[[str], None] | None) -> BarCurve | None:
+def _bars(machine: Hexapod, data: Readings, seed: int, progress: Callable[[str], None] | None) -> BarCurve | None:
     """The paper's Figure 3; None where the machine carries bars as an effect."""
     if any(entry.name == "platform_flexibility" for entry in machine.effects):
         return None

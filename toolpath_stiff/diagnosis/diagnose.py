@@ -28,7 +28,7 @@ from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, jud
 from toolpath_stiff.inference.left_out import held_out, of_readings
 from toolpath_stiff.inference.noise import JOINT_ERROR, noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import plan_measurements
 from toolpath_stiff.planning.rivals import rivals_of
@@ -48,7 +48,7 @@ FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect
 
 
 def diagnose(
-    machine: Machine,
+    machine: Hexapod,
     data: Readings,
     *,
     noise: float | tuple[float, float] | None = None,

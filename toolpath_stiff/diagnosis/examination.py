@@ -19,7 +19,7 @@ from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.slips import SlipSize, SuspectEntry
 from toolpath_stiff.inference.unexcluded import Unexcluded
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.readings.measurements import Readings
@@ -77,7 +77,7 @@ class Examination:
     judgements: dict[str, Judgement]
     main: Judgement
     data: Readings
-    machine: Machine
+    machine: Hexapod
     cannot_test: dict[str, tuple[str, ...]]
     as_given: Fit
     base: Fit

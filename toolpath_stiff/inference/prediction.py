@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.readings.measurements import Readings, measured_path, mechanical_stiffness, shown_by
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -87,7 +87,7 @@ class Predictor:
         What `candidates.table_of` has worked out for these readings: every noise model asks for the same.
     """
 
-    def __init__(self, machine: Machine, data: Readings, effect_files: Sequence[str | Path] = ()) -> None:
+    def __init__(self, machine: Hexapod, data: Readings, effect_files: Sequence[str | Path] = ()) -> None:
         self.machine = machine
         self.effect_files = tuple(effect_files)
         self.base = build_model(machine, self.effect_files)

@@ -1,4 +1,4 @@
-"""Machine files: TOML in shop units to `Machine` in SI, checked key by key (`schema`).
+"""Machine files: TOML in shop units to `Hexapod` in SI, checked key by key (`schema`).
 
 Each section names the origin of its figures ("published", "recovered", "assumed", "fitted"). A key that is not known is
 an error, so that a typing mistake cannot fall back to a default; the message has section, key, value and bound.
@@ -20,7 +20,7 @@ from toolpath_stiff.errors import InputError, MachineFileError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
-from toolpath_stiff.machine.model import EffectEntry, Limits, Machine, StrutLaw
+from toolpath_stiff.machine.model import EffectEntry, Hexapod, Limits, StrutLaw
 from toolpath_stiff.machine.schema import MachineToml, Sections, read_sections
 from toolpath_stiff.machine.symmetry import describe_stray, find_symmetry
 from toolpath_stiff.machine.uncertainty import read_uncertainty
@@ -46,7 +46,7 @@ def packaged_machines() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
+def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Hexapod:
     """Load a machine by the name of a packaged one or from a machine file.
 
     Parameters
@@ -87,12 +87,12 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
 
 
 @cache
-def _packaged(path: Path) -> Machine:
+def _packaged(path: Path) -> Hexapod:
     """A machine that ships with the package, read once."""
     return parse_machine(path.read_text(encoding="utf-8"), file=path.name)
 
 
-def parse_machine(text: str, file: str = "machine.toml") -> Machine:
+def parse_machine(text: str, file: str = "machine.toml") -> Hexapod:
     """Parse the text of a machine file; `file` is only used in messages. Raises `InputError`."""
     toml = MachineToml(text, file, kind=MachineFileError)
     values = read_sections(toml)
@@ -100,7 +100,7 @@ def parse_machine(text: str, file: str = "machine.toml") -> Machine:
     setup = values.get("setup", {})
     effects, instruments = (_entries(toml, kind) for kind in ("effect", "instrument"))
     law = _strut_law(toml, values["strut_law"], values["limits.strut_length"])
-    machine = Machine(
+    machine = Hexapod(
         name=top["name"],
         title=top["title"],
         source=top["source"],
@@ -126,7 +126,7 @@ def parse_machine(text: str, file: str = "machine.toml") -> Machine:
     return machine
 
 
-def _check_law(toml: MachineToml, machine: Machine) -> None:
+def _check_law(toml: MachineToml, machine: Hexapod) -> None:
     """The struts must keep some stiffness over their whole travel."""
     for key, length in zip(("min_mm", "max_mm"), machine.limits.strut_length, strict=True):
         intercept, slope = machine.strut_law.line_at(length)
@@ -136,7 +136,7 @@ def _check_law(toml: MachineToml, machine: Machine) -> None:
             raise toml.fault("limits.strut_length", key, mistake, expected)
 
 
-def _check_neutral_pose(toml: MachineToml, machine: Machine) -> None:
+def _check_neutral_pose(toml: MachineToml, machine: Hexapod) -> None:
     """Margins are counted from the neutral pose, so the machine must not be singular there."""
     struts = solve_struts_at(machine, machine.limits.neutral_pose)
     directions, arms = struts.directions[0], struts.arms[0] - struts.arms[0].mean(axis=0)

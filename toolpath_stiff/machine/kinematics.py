@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import PoseError
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
@@ -59,7 +59,7 @@ class Struts:
 
 
 def solve_struts(
-    machine: Machine, position: ArrayLike, rotation: ArrayLike | None = None, tool_length: ArrayLike = np.nan
+    machine: Hexapod, position: ArrayLike, rotation: ArrayLike | None = None, tool_length: ArrayLike = np.nan
 ) -> Struts:
     """Lengths, directions and arms of the six struts.
 
@@ -99,13 +99,13 @@ def solve_struts(
     return Struts(lengths=lengths, directions=struts / lengths[..., None], arms=arms)
 
 
-def solve_struts_at(machine: Machine, pose: ArrayLike) -> Struts:
+def solve_struts_at(machine: Hexapod, pose: ArrayLike) -> Struts:
     """Struts at poses (n, 6) or (6,): x, y, z in m, roll, pitch, yaw in rad."""
     values = np.atleast_2d(np.asarray(pose, dtype=float))
     return solve_struts(machine, values[:, :3], rotation_matrices(values[:, 3:]))
 
 
-def neutral_axes(machine: Machine) -> tuple[FloatArray, FloatArray]:
+def neutral_axes(machine: Hexapod) -> tuple[FloatArray, FloatArray]:
     """Neutral axes of the frame joints (base axes) and of the platform joints (platform axes), (6, 3) each.
 
     They lie along the struts at the machine's neutral pose.
@@ -119,7 +119,7 @@ def neutral_axes(machine: Machine) -> tuple[FloatArray, FloatArray]:
     return machine.once("neutral axes", axes)
 
 
-def joint_angles(machine: Machine, struts: Struts, rotation: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
+def joint_angles(machine: Hexapod, struts: Struts, rotation: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     """Swing of the frame joints and of the platform joints from their neutral axes.
 
     Returns
@@ -140,7 +140,7 @@ def _angle(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.asarray(2.0 * np.arctan2(apart, together))
 
 
-def singularity_index(machine: Machine, struts: Struts) -> FloatArray:
+def singularity_index(machine: Hexapod, struts: Struts) -> FloatArray:
     """|det J| relative to its value at the neutral pose, (n,): 1 there, 0 where the machine is singular.
 
     The determinant of the six strut screws does not depend on the point that moments are taken about, so
@@ -150,7 +150,7 @@ def singularity_index(machine: Machine, struts: Struts) -> FloatArray:
         return np.asarray(np.abs(np.linalg.det(struts.jacobian)) / neutral_determinant(machine))
 
 
-def neutral_determinant(machine: Machine) -> float:
+def neutral_determinant(machine: Hexapod) -> float:
     """|det J| at the neutral pose, m^3."""
 
     def determinant() -> float:
@@ -160,7 +160,7 @@ def neutral_determinant(machine: Machine) -> float:
 
 
 def forward_kinematics(
-    machine: Machine, lengths: ArrayLike, start: ArrayLike | None = None, tool_length: ArrayLike = np.nan
+    machine: Hexapod, lengths: ArrayLike, start: ArrayLike | None = None, tool_length: ArrayLike = np.nan
 ) -> FloatArray:
     """Poses at which the struts have the given lengths.
 

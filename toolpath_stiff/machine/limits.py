@@ -17,7 +17,7 @@ from toolpath_stiff.machine.kinematics import (
     singularity_index,
     solve_struts_at,
 )
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
@@ -47,12 +47,12 @@ class Limit:
         return np.asarray((value - self.bound if self.lower else self.bound - value) / self.span)
 
 
-def machine_limits(machine: Machine) -> tuple[Limit, ...]:
+def machine_limits(machine: Hexapod) -> tuple[Limit, ...]:
     """The finite limits of a machine, in the order of `reach`'s columns."""
     return _finite_limits(machine)[0]
 
 
-def _finite_limits(machine: Machine) -> tuple[tuple[Limit, ...], list[int]]:
+def _finite_limits(machine: Hexapod) -> tuple[tuple[Limit, ...], list[int]]:
     """The finite limits, and which they are of all."""
 
     def finite() -> tuple[tuple[Limit, ...], list[int]]:
@@ -63,7 +63,7 @@ def _finite_limits(machine: Machine) -> tuple[tuple[Limit, ...], list[int]]:
     return machine.once("limits", finite)
 
 
-def _all_limits(machine: Machine) -> list[Limit]:
+def _all_limits(machine: Hexapod) -> list[Limit]:
     limits = machine.limits
     low, high = limits.strut_length
     span = high - low if np.isfinite(high) else max(low, 1.0)
@@ -126,7 +126,7 @@ def _shown(limit: Limit, value: float) -> str:
     return f"{value:.4f}"
 
 
-def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: ArrayLike | None = None) -> Reach:
+def reach(machine: Hexapod, position: ArrayLike, struts: Struts, rotation: ArrayLike | None = None) -> Reach:
     """Margin to every limit at n poses.
 
     Parameters
@@ -169,7 +169,7 @@ def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: Array
     return Reach(margins[rows, worst], worst, values[rows, worst], limits)
 
 
-def stand(machine: Machine, pose: ArrayLike) -> tuple[FloatArray, Struts, Reach]:
+def stand(machine: Hexapod, pose: ArrayLike) -> tuple[FloatArray, Struts, Reach]:
     """A pose (6,), m and rad, the struts there, and how it stands to the limits."""
     values = np.asarray(pose, dtype=float)
     struts = solve_struts_at(machine, values)
@@ -203,7 +203,7 @@ class Extremes:
         m, length of the tool; nan: the reference tool.
     """
 
-    machine: Machine
+    machine: Hexapod
     position: FloatArray
     lengths: FloatArray
     determinant: FloatArray

@@ -15,7 +15,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import MachineFileError
-from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, Limits, StrutLaw
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
 SETP = re.compile(r"^\s*setp\s+genhexkins\.(\S+?)\s*(?:=\s*|\s+)(\S+)\s*$")
@@ -37,7 +37,7 @@ def units_of(hal: Path) -> str | None:
     return units.pop() if len(units) == 1 else None
 
 
-def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tuple[Machine, list[str]]:
+def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tuple[Hexapod, list[str]]:
     """A machine from the text of a HAL file.
 
     Parameters
@@ -109,7 +109,7 @@ def _read_pins(text: str, file: str) -> dict[str, float]:
     return values
 
 
-def _with_assumptions(frame: FloatArray, platform: FloatArray, file: str) -> Machine:
+def _with_assumptions(frame: FloatArray, platform: FloatArray, file: str) -> Hexapod:
     """Limits and stiffness that LinuxCNC does not know, from the machine's own size."""
     size = float(np.linalg.norm(frame[:, :2], axis=1).mean())
     height = float(frame[:, 2].mean() + 0.87 * size)  # struts then lean by about 45 degrees
@@ -118,7 +118,7 @@ def _with_assumptions(frame: FloatArray, platform: FloatArray, file: str) -> Mac
     middle = float(np.sqrt(np.einsum("ij,ij->i", struts, struts)).mean())
     travel = (0.7 * middle, 1.4 * middle)
     name = Path(file).name
-    return Machine(
+    return Hexapod(
         name=Path(file).stem,
         title=f"hexapod of {name}",
         source=f"genhexkins pins of {name}",

@@ -212,7 +212,7 @@ class EffectEntry:
 
 
 @dataclass(frozen=True)
-class Machine:
+class Hexapod:
     """A six-strut platform machine, SI units.
 
     Attributes
@@ -288,7 +288,7 @@ class Machine:
         extension = np.where(np.isnan(length), 0.0, length - self.reference_tool_length)
         return np.asarray(self.platform_joints + extension[..., None, None] * np.array([0.0, 0.0, 1.0]))
 
-    def with_changes(self, **changes: Any) -> Machine:
+    def with_changes(self, **changes: Any) -> Hexapod:
         """A copy with some attributes replaced."""
         return replace(self, **changes)
 

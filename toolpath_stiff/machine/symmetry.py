@@ -16,7 +16,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import solve_struts_at
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.units import mm_from_m
 
 Pairing = tuple[int, ...]  # strut i goes over into strut pairing[i]
@@ -87,7 +87,7 @@ class Symmetry:
     residual: float = 0.0
 
 
-def find_symmetry(machine: Machine) -> Symmetry:
+def find_symmetry(machine: Hexapod) -> Symmetry:
     """The symmetry that the most joints follow, the one that fits them best; see the module."""
     bodies = {"frame": machine.frame_joints, "platform": machine.platform_joints}
     ranked: list[tuple[tuple[int, int, int, int], Symmetry]] = []
@@ -113,7 +113,7 @@ def find_symmetry(machine: Machine) -> Symmetry:
     return replace(best, strays=tuple(map(with_rival, best.strays)))
 
 
-def _spread(machine: Machine, strays: list[Stray]) -> float:
+def _spread(machine: Hexapod, strays: list[Stray]) -> float:
     """m, standard deviation of the strut lengths at the neutral pose with the strays where they are expected."""
     bodies = {"frame": machine.frame_joints.copy(), "platform": machine.platform_joints.copy()}
     for stray in strays:

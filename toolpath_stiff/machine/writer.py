@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m, pose_in_mm
 
 # `tps machine new` puts it in every section; what still has it was not replaced.
@@ -39,7 +39,7 @@ HEADINGS = {
 }
 
 
-def machine_toml(machine: Machine, preamble: str = "") -> str:
+def machine_toml(machine: Hexapod, preamble: str = "") -> str:
     """The text of a machine file. `preamble` lines are put before it as comments."""
     limits, law = machine.limits, machine.strut_law
     stiffnesses = [n_per_um_from_n_per_m(stiffness) for _, stiffness in law.points]

@@ -23,7 +23,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.evidence import LAW_PRIOR
 from toolpath_stiff.inference.judgement import NONE
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.forecasts import forecast_all
 from toolpath_stiff.planning.gaps import ReadingNoise, pair_shares, repeat_and_clamping
 from toolpath_stiff.planning.menu import Menu
@@ -143,7 +143,7 @@ class _Stop:
 
 
 def first_campaign(
-    machine: Machine,
+    machine: Hexapod,
     n: int = 24,
     *,
     menu: Menu | None = None,
@@ -187,7 +187,7 @@ def first_campaign(
     return Campaign(visits, tuple(stop.purpose for stop in stops), noise, sees)
 
 
-def _poses(machine: Machine, menu: Menu, n: int, rng: Generator) -> FloatArray:
+def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
     """(n, 6): one pose and its images, then vertical ones, then n // 2 tilted ones; as unlike each other as can be."""
     levels = menu.heights or axis_levels(machine)
     if len(levels) < 4:
@@ -210,7 +210,7 @@ def _poses(machine: Machine, menu: Menu, n: int, rng: Generator) -> FloatArray:
     return chosen
 
 
-def _images_of(machine: Machine, upright: FloatArray, levels: Sequence[float], menu: Menu) -> FloatArray:
+def _images_of(machine: Hexapod, upright: FloatArray, levels: Sequence[float], menu: Menu) -> FloatArray:
     """(3, 6) a vertical pose off the axis, at a middle height, and its two images, if the machine reaches such."""
     middle = levels[len(levels) // 2]
     off = np.hypot(upright[:, 0], upright[:, 1])
@@ -238,7 +238,7 @@ def _spread(chosen: FloatArray, pool: FloatArray, count: int, scale: FloatArray)
     return chosen
 
 
-def _stops(machine: Machine, poses: FloatArray, menu: Menu) -> list[_Stop]:
+def _stops(machine: Hexapod, poses: FloatArray, menu: Menu) -> list[_Stop]:
     """Stops at the poses: with longer tools, in other set-ups, clamped anew."""
     n, tool, setup = len(poses), menu.tool_extensions[0], menu.setups[0]
     stops = []
@@ -284,7 +284,7 @@ def _visits(stops: Sequence[_Stop], menu: Menu, rng: Generator) -> Visits:
 
 
 def _sees(
-    machine: Machine,
+    machine: Hexapod,
     visits: Visits,
     effects: Mapping[str, Effect],
     noise: float | tuple[float, float],

@@ -15,7 +15,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.noise import JOINT_ERROR
 from toolpath_stiff.inference.prediction import JOINT_STEP, Predictor
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -83,7 +83,7 @@ class Forecast:
 
 
 def forecast_all(
-    machine: Machine,
+    machine: Hexapod,
     rivals: Sequence[Rival],
     readings: Readings,
     effect_files: Sequence[str | Path] = (),

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.forecasts import forecast_all
 from toolpath_stiff.planning.gaps import pair_shares
 from toolpath_stiff.planning.plan import RivalPlan, matters
@@ -71,7 +71,7 @@ def group_of(z: FloatArray, groups: Sequence[FloatArray]) -> IntArray:
     return np.asarray(np.searchsorted(lowest, np.round(z, 4), side="right") - 1, dtype=np.int64)
 
 
-def gap_map(machine: Machine, plan: RivalPlan, effect_files: Sequence[str | Path] = ()) -> GapMap:
+def gap_map(machine: Hexapod, plan: RivalPlan, effect_files: Sequence[str | Path] = ()) -> GapMap:
     """Gaps of the plan's top pair over the menu's radius at the heights that the plan visits most."""
     pair, menu = top_pair(plan), plan.visits.menu
     rivals = [next(rival for rival in plan.rivals if rival.name == name) for name in pair]

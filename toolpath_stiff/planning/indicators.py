@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolpath_stiff.arrays import IntArray
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.visits import AXES, Visits
 from toolpath_stiff.readings.loops import LoopColumns
 from toolpath_stiff.readings.measurements import with_offsets
@@ -44,7 +44,7 @@ def loops_between(rivals: Sequence[Rival]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(loops))[:MOST_LOOPS]
 
 
-def with_indicators(machine: Machine, visits: Visits, loops: Sequence[str], noise: float) -> Visits:
+def with_indicators(machine: Hexapod, visits: Visits, loops: Sequence[str], noise: float) -> Visits:
     """The same visits, and some of them with an indicator across each loop.
 
     Parameters

@@ -26,7 +26,7 @@ from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.noise import LEAST
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.choice import Pair, choose, in_order, why_of
 from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all
 from toolpath_stiff.planning.gaps import GapShares, ReadingNoise, pair_shares, repeat_and_clamping
@@ -270,7 +270,7 @@ class RivalPlan:
 
 
 def plan_measurements(
-    machine: Machine,
+    machine: Hexapod,
     rivals: Sequence[Rival],
     noise_relative: float | tuple[float, float],
     n: int = 6,

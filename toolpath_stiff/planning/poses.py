@@ -9,7 +9,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import RAD_PER_DEG
@@ -20,7 +20,7 @@ UPRIGHT_SHARE = 0.25  # share of the poses with a vertical spindle
 STEEP_SHARE = 0.5  # share of the others with the largest tilt
 
 
-def draw_poses(machine: Machine, menu: Menu, count: int, rng: Generator) -> FloatArray:
+def draw_poses(machine: Hexapod, menu: Menu, count: int, rng: Generator) -> FloatArray:
     """(m, 6) round, reachable poses with the reference tool, m <= count; a quarter of them with a vertical spindle."""
     levels = np.array(menu.heights or axis_levels(machine))
     drawn: list[FloatArray] = []
@@ -45,7 +45,7 @@ def draw_poses(machine: Machine, menu: Menu, count: int, rng: Generator) -> Floa
     return np.array(drawn[:count]).reshape(-1, 6)
 
 
-def axis_levels(machine: Machine, count: int = 5) -> tuple[float, ...]:
+def axis_levels(machine: Hexapod, count: int = 5) -> tuple[float, ...]:
     """Heights in m, from the lowest to the highest that the tip reaches on the axis, a tenth of the way from each end.
 
     The machine's axis is its base frame's Z.
@@ -68,7 +68,7 @@ def axis_levels(machine: Machine, count: int = 5) -> tuple[float, ...]:
     return tuple((np.round(np.linspace(*ends, count) / (2.0 * ROUND)) * 2.0 * ROUND).tolist())
 
 
-def reachable(machine: Machine, pose: FloatArray, tool_extension: float, margin: float = MARGIN) -> BoolArray:
+def reachable(machine: Hexapod, pose: FloatArray, tool_extension: float, margin: float = MARGIN) -> BoolArray:
     """(n,) whether the machine takes poses (n, 6) with such a tool, clear of its limits and of a strut law at zero."""
     rotation = rotation_matrices(pose[:, 3:])
     struts = solve_struts(machine, pose[:, :3], rotation, machine.reference_tool_length + tool_extension)

@@ -16,7 +16,7 @@ from toolpath_stiff.inference.judgement import Judgement, judge
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.question import question
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.campaign import RISER, TABLE, Campaign, first_campaign
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
@@ -52,7 +52,7 @@ class Plan(FolderResult):
     command: ClassVar[str] = "plan"
     shown_by: ClassVar[str] = "plan"
 
-    machine: Machine
+    machine: Hexapod
     data: Readings | None
     choice: RivalPlan | Campaign
     effect_files: tuple[str | Path, ...]
@@ -118,7 +118,7 @@ class Plan(FolderResult):
 
 
 def plan(
-    machine: Machine,
+    machine: Hexapod,
     data: Readings | None = None,
     menu: Menu | None = None,
     *,

@@ -16,7 +16,7 @@ from numpy.random import Generator
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.menu import MINUTE, Menu
 from toolpath_stiff.planning.poses import ROUND, draw_poses, reachable
 from toolpath_stiff.readings.measurements import Readings
@@ -138,7 +138,7 @@ class Matters:
     time: bool = False
 
 
-def possible_visits(machine: Machine, menu: Menu, matters: Matters, rng: Generator) -> Visits:
+def possible_visits(machine: Hexapod, menu: Menu, matters: Matters, rng: Generator) -> Visits:
     """Every visit that a plan may choose from.
 
     Each place is offered with every choice of directions, loads and rounds. X, Y, Z are always read: what the rivals do

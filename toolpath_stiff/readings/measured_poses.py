@@ -10,7 +10,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
 from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
@@ -30,7 +30,7 @@ NAMED = 5  # so many poses are named in a warning
 
 
 def pose_warnings(
-    machine: Machine,
+    machine: Hexapod,
     position: FloatArray,
     angles: FloatArray,
     tool_extension: FloatArray,
@@ -83,7 +83,7 @@ def pose_warnings(
     return tuple(warnings)
 
 
-def _origin(machine: Machine, limit: str) -> str:
+def _origin(machine: Hexapod, limit: str) -> str:
     """Where a limit comes from."""
     quantity = next((q for q, word in LIMIT_WORDS.items() if word in limit), "")
     return machine.origins.get(quantity, "origin not stated")

@@ -18,7 +18,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.dates import day_of, days_since_first
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, offsets
 from toolpath_stiff.readings.mapping import mapped_table
@@ -153,7 +153,7 @@ class Readings:
 
 
 def read_measurements(
-    paths: str | Path | Iterable[str | Path], machine: Machine, planned: bool = False, columns: Mapped = None
+    paths: str | Path | Iterable[str | Path], machine: Hexapod, planned: bool = False, columns: Mapped = None
 ) -> Readings:
     """Read measurement files.
 
@@ -211,7 +211,7 @@ def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
     return RowFile(rows, table_1.columns | {"setup"}, (*table_1.notes, note))
 
 
-def _columns(files: list[RowFile], machine: Machine) -> Readings:
+def _columns(files: list[RowFile], machine: Hexapod) -> Readings:
     """Readings as columns; those of loops in m/N until `with_offsets`."""
     rows = [row for file in files for row in file.rows]
 
@@ -266,7 +266,7 @@ def _columns(files: list[RowFile], machine: Machine) -> Readings:
     )
 
 
-def with_offsets(data: Readings, machine: Machine, widest: float = WIDEST) -> Readings:
+def with_offsets(data: Readings, machine: Hexapod, widest: float = WIDEST) -> Readings:
     """The same with the readings of loops, until then m/N with their sd in m/N, as stiffnesses with offsets.
 
     `widest`: relative sd that no loop reading with its offset has more of.

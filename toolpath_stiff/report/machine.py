@@ -10,7 +10,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.report.figure import BLUE, house_style, new_figure, picture
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.truss import HUB, TIP, platform_bars, platform_nodes
@@ -37,7 +37,7 @@ USUAL_ZOOM = 0.8  # of the packaged machines, within 0.05
 
 
 @picture
-def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> Figure:
+def machine_picture(machine: Hexapod, pose: FloatArray, struts: Struts) -> Figure:
     """PNG of the machine at one pose (6,) m and rad, with its struts there."""
     joints = pose[:3] + struts.arms[0]
     nodes = pose[:3] + platform_nodes(machine.platform_joints) @ rotation_matrices(pose[3:]).T
@@ -52,7 +52,7 @@ def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> Figur
         return figure
 
 
-def heading(figure: Figure, machine: Machine, pose: FloatArray) -> None:
+def heading(figure: Figure, machine: Hexapod, pose: FloatArray) -> None:
     """Name of the machine, and the pose (6,) in m and rad, above everything."""
     x, y, z, a, b, c = pose_in_mm(pose.tolist())
     where = f"tool tip at X{x:g} Y{y:g} Z{z:g} mm, roll {a:g}, pitch {b:g}, yaw {c:g} degrees   ·   lengths in mm"
@@ -60,7 +60,7 @@ def heading(figure: Figure, machine: Machine, pose: FloatArray) -> None:
     figure.text(0.02, 0.91, where, fontsize=11, color="#4b5563")
 
 
-def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArray, struts: Struts) -> None:
+def _draw_whole(axes: Any, machine: Hexapod, joints: FloatArray, nodes: FloatArray, struts: Struts) -> None:
     """Frame joints joined by the frame, struts with number, length and stiffness, platform, tool."""
     frame = mm_from_m(machine.frame_joints)
     order = np.argsort(np.arctan2(frame[:, 1], frame[:, 0]), kind="stable")
@@ -134,7 +134,7 @@ def _fits(figure: Figure, axes: Any, extent: FloatArray) -> bool:
 LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
 
 
-def _draw_platform(axes: Any, machine: Machine, nodes: FloatArray) -> None:
+def _draw_platform(axes: Any, machine: Hexapod, nodes: FloatArray) -> None:
     """The truss of the platform with its nodes named."""
     _truss(axes, machine, nodes, lw=2.0)
     names = [*(f"joint {i + 1}" for i in range(6)), "hub", "tool tip"]
@@ -145,7 +145,7 @@ def _draw_platform(axes: Any, machine: Machine, nodes: FloatArray) -> None:
     _finish(axes, nodes)
 
 
-def _truss(axes: Any, machine: Machine, nodes: FloatArray, lw: float) -> None:
+def _truss(axes: Any, machine: Hexapod, nodes: FloatArray, lw: float) -> None:
     for i, j in platform_bars(machine.platform_joints):
         tool = {i, j} == {HUB, TIP}
         axes.plot(*nodes[[i, j]].T, color=TOOL if tool else PLATFORM, lw=2 * lw if tool else lw)
@@ -176,7 +176,7 @@ def _law_figures(law: StrutLaw) -> tuple[str, str]:
     return ", ".join([f"{first} mm", *rest]), "mm, linear between" if law.shape else "mm, linear"
 
 
-def machine_figures(machine: Machine) -> list[tuple[str, str, str, str, str]]:
+def machine_figures(machine: Hexapod) -> list[tuple[str, str, str, str, str]]:
     """Quantity, value, unit, origin, remark of a machine's figures, in the shop's units."""
     limits = machine.limits
 
@@ -215,13 +215,13 @@ def machine_figures(machine: Machine) -> list[tuple[str, str, str, str, str]]:
     ]
 
 
-def figure_entries(machine: Machine) -> list[dict[str, str]]:
+def figure_entries(machine: Hexapod) -> list[dict[str, str]]:
     """`machine_figures` for JSON."""
     names = ("quantity", "value", "unit", "origin", "remark")
     return [dict(zip(names, row, strict=True)) for row in machine_figures(machine)]
 
 
-def text(machine: Machine, stand: Reach) -> str:
+def text(machine: Hexapod, stand: Reach) -> str:
     """Figures with their origin, remarks, and how the pose that is drawn stands to the limits."""
     rows = machine_figures(machine)
     width = max(len(row[0]) for row in rows)

@@ -11,7 +11,7 @@ from toolpath_stiff.analysis.machine_check import BEYOND, MACHINING_CENTRE, ROBO
 from toolpath_stiff.analysis.poses import PoseStiffness
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import solve_struts_at
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.symmetry import Symmetry
 from toolpath_stiff.report.figure import house_style, new_figure, picture
 from toolpath_stiff.report.machine import FRAME, LABEL, PLATFORM, STRUT, TOOL, heading
@@ -46,7 +46,7 @@ def text(check: MachineCheck) -> str:
     return "\n".join(lines)
 
 
-def neutral_words(machine: Machine, report: PoseStiffness) -> str:
+def neutral_words(machine: Hexapod, report: PoseStiffness) -> str:
     """Stiffness at the neutral pose as one would say it."""
     x, y, z, *angles = (float(v) for v in machine.limits.neutral_pose)
     pose = " ".join(f"{axis}{mm_from_m(v) + 0.0:g}" for axis, v in zip("XYZ", (x, y, z), strict=True))

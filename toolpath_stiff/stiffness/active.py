@@ -14,7 +14,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectFault
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign, line_in, line_of_hook
 from toolpath_stiff.stiffness.possible import at_pose
@@ -67,13 +67,13 @@ class ActiveEffect:
                 raise self._fault(hook, f"is not symmetric{at_pose(path, i)}: {entries}", words)
         return added
 
-    def geometry(self, machine: Machine) -> Machine:
+    def geometry(self, machine: Hexapod) -> Hexapod:
         """The machine with the effect's geometry."""
         effect, hook = self.effect, "geometry"
         if not is_foreign(effect):
             return effect.geometry(machine, self.values)
         changed = self._called(hook, None, lambda _: effect.geometry(machine, self.values))
-        if not isinstance(changed, Machine):
+        if not isinstance(changed, Hexapod):
             raise self._fault(hook, f"returns {_kind(changed)}", "a Machine (machine.with_changes(...))")
         for name in ("frame_joints", "platform_joints"):
             joints = getattr(changed, name)

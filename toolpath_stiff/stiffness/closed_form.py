@@ -17,7 +17,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.machine.kinematics import LENGTH_TOLERANCE, Struts, solve_struts_at
-from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.stiffness.elimination import Vector, cross, dot, forces, over_struts, strut
 
 BLOCK = 2048  # poses: some 1 MB of work arrays, which stay in a core's second-level cache
@@ -49,18 +49,18 @@ class ClosedForm:
     law: StrutLaw
     arm: float
 
-    def on_joints_of(self, machine: Machine, tool_length: float) -> ClosedForm:
+    def on_joints_of(self, machine: Hexapod, tool_length: float) -> ClosedForm:
         """The same split of another machine's joints."""
         return _on_joints(machine, tool_length, self.order, self.arm)
 
 
-def prepare(machine: Machine, tool_length: float = np.nan) -> ClosedForm:
+def prepare(machine: Hexapod, tool_length: float = np.nan) -> ClosedForm:
     """The kernel's form of a machine with a tool of that length (m; nan: the reference tool), made once a machine."""
     key = ("closed form", "reference" if np.isnan(tool_length) else float(tool_length))
     return machine.once(key, lambda: _on_joints(machine, tool_length, *machine.once("split", lambda: _split(machine))))
 
 
-def _on_joints(machine: Machine, tool_length: float, order: list[int], arm: float) -> ClosedForm:
+def _on_joints(machine: Hexapod, tool_length: float, order: list[int], arm: float) -> ClosedForm:
     frame, platform = (
         np.ascontiguousarray(joints[order].T)
         for joints in (machine.frame_joints, machine.platform_joints_for(tool_length))
@@ -68,7 +68,7 @@ def _on_joints(machine: Machine, tool_length: float, order: list[int], arm: floa
     return ClosedForm(order, frame, platform, machine.strut_law, arm)
 
 
-def _split(machine: Machine) -> tuple[list[int], float]:
+def _split(machine: Hexapod) -> tuple[list[int], float]:
     """Struts, triplet A first, by the best determinants at the neutral pose; m, the size of the arms."""
     struts = solve_struts_at(machine, machine.limits.neutral_pose)
     directions, arms = struts.directions[0], struts.arms[0]

@@ -22,7 +22,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 
 if TYPE_CHECKING:
     from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
@@ -149,7 +149,7 @@ class LoadPath:
         (n,) s since the indicator was zeroed, (n,) degrees C; or None.
     """
 
-    machine: Machine
+    machine: Hexapod
     position: FloatArray
     rotation: FloatArray
     struts: Struts
@@ -303,7 +303,7 @@ class Effect:
         """
         return None
 
-    def geometry(self, machine: Machine, p: Values) -> Machine:
+    def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """The machine with this effect's geometry.
 
         Examples

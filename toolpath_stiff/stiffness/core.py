@@ -22,7 +22,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness import closed_form, exact
 from toolpath_stiff.stiffness.active import ADDING
 from toolpath_stiff.stiffness.contract import LoadPath
@@ -131,7 +131,7 @@ def _fast(
 
 
 def compliance_along_columns(
-    machine: Machine,
+    machine: Hexapod,
     position: FloatArray,
     direction: FloatArray,
     rotation: FloatArray | None,

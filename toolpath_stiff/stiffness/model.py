@@ -22,7 +22,7 @@ from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
-from toolpath_stiff.machine.model import EffectEntry, Machine
+from toolpath_stiff.machine.model import EffectEntry, Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
@@ -64,11 +64,11 @@ class StiffnessModel:
         What every result says of effects that fail `effects check` and were allowed all the same.
     """
 
-    machine: Machine
+    machine: Hexapod
     effects: tuple[ActiveEffect, ...] = ()
     instruments: tuple[ActiveEffect, ...] = ()
-    control: Machine | None = None
-    given: Machine | None = None
+    control: Hexapod | None = None
+    given: Hexapod | None = None
     conditions: Conditions = field(default_factory=Conditions)
     withheld: tuple[Idle, ...] = ()
     unchecked: tuple[str, ...] = ()
@@ -85,7 +85,7 @@ class StiffnessModel:
 
 
 def build_model(
-    machine: Machine,
+    machine: Hexapod,
     effect_files: Iterable[str | Path] = (),
     extra: Iterable[ActiveEffect] = (),
     conditions: Conditions | None = None,
@@ -143,7 +143,7 @@ def build_model(
 
 
 def _assembled(
-    given: Machine, acting: Sequence[ActiveEffect], reading: Sequence[ActiveEffect], conditions: Conditions
+    given: Hexapod, acting: Sequence[ActiveEffect], reading: Sequence[ActiveEffect], conditions: Conditions
 ) -> StiffnessModel:
     """Geometry effects applied one after the other, to the true machine and to what the control takes it for."""
     machine = control = given
@@ -190,7 +190,7 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     raise EffectError(f"machine {given.name} has no parameter {name!r}")
 
 
-def _activate(machine: Machine, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
+def _activate(machine: Hexapod, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
     kind = "instrument" if instrument else "effect"
     where = f"machine {machine.name}, [[{kind}]]"
     try:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
 from toolpath_stiff.stiffness.term_loads import carriers, coupled, pair_stiffness, reading_share, strut_share
@@ -127,7 +127,7 @@ class TermsOfGeometry(TermEffect):
     ending = "_geometry"
     unknown_to_control = True
 
-    def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
+    def geometry(self, machine: Hexapod, p: Mapping[str, float]) -> Hexapod:
         """With these joints off their places."""
         for size, term in self.terms.items():
             name = f"{term.column}_joints"

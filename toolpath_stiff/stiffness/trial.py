@@ -18,7 +18,7 @@ from toolpath_stiff.errors import EffectError, EffectFault, InputError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
@@ -75,7 +75,7 @@ def own_effects(model: StiffnessModel, effect_files: Iterable[str | Path]) -> li
     return list(dict.fromkeys([*acting, *in_files]))
 
 
-def refuse_failing(effects: Iterable[Effect], machine: Machine, machine_name: str) -> None:
+def refuse_failing(effects: Iterable[Effect], machine: Hexapod, machine_name: str) -> None:
     """Raise `InputError` for the first effect from outside the package that fails on a machine, which it names."""
     for effect in effects:
         if reason := failure(effect, machine):
@@ -85,13 +85,13 @@ def refuse_failing(effects: Iterable[Effect], machine: Machine, machine_name: st
             raise EffectError(f"effect {effect.name} {reason}", file=file, hint=hint)
 
 
-def failures(effects: Iterable[Effect], machine: Machine) -> list[str]:
+def failures(effects: Iterable[Effect], machine: Hexapod) -> list[str]:
     """What results say of effects that were used although they fail."""
     reasons = {effect.name: failure(effect, machine) for effect in effects}
     return [f"UNCHECKED effect {name} ({ALLOW}): it {reason}" for name, reason in reasons.items() if reason]
 
 
-def failure(effect: Effect, machine: Machine) -> str:
+def failure(effect: Effect, machine: Hexapod) -> str:
     """What `effects check` finds wrong in an effect, the end of a sentence; "" if nothing."""
     return _failure(effect, pickle.dumps(machine.with_changes(effects=(), instruments=())))
 
@@ -105,7 +105,7 @@ def _failure(effect: Effect, machine: bytes) -> str:
     return "; ".join(f"fails the check of its {row.name}: {row.found}" for row in outcomes if row.passed is False)
 
 
-def try_effect(effect: Effect, machine: Machine, seed: int = 0, timed: bool = True) -> Trial:
+def try_effect(effect: Effect, machine: Hexapod, seed: int = 0, timed: bool = True) -> Trial:
     """Try an effect on a machine, by itself: at its neutral value, typical values and finite bounds.
 
     Parameters
@@ -144,7 +144,7 @@ def try_effect(effect: Effect, machine: Machine, seed: int = 0, timed: bool = Tr
     return Trial(effect, tuple(outcomes))
 
 
-def _poses(effect: Effect, machine: Machine, seed: int) -> FloatArray:
+def _poses(effect: Effect, machine: Hexapod, seed: int) -> FloatArray:
     """(n, 7) m and rad within reach, the default origin first, and how much longer the tool is, if the effect asks."""
     origin = np.array(machine.default_origin)
     low, high = machine.limits.workspace

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectError
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 
 HUB, TIP = 6, 7
 
@@ -106,7 +106,7 @@ def _rigid_motions(nodes: FloatArray) -> FloatArray:
     return motions
 
 
-def structure_stiffness(machine: Machine, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+def structure_stiffness(machine: Hexapod, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """Structure stiffness matrix at one pose, (24, 24) N/m; nodes as in the module's heading, base axes.
 
     Parameters
@@ -154,7 +154,7 @@ def axis_products(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.asarray(np.outer(axis, axis) / (axis @ axis))
 
 
-def tip_compliance(machine: Machine, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+def tip_compliance(machine: Hexapod, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """(3, 3) m/N, displacements of the tip under unit forces along x, y, z."""
     loads = np.zeros((24, 3))
     loads[3 * TIP : 3 * TIP + 3] = np.eye(3)

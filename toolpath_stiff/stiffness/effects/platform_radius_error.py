@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, Values, length_error
 from toolpath_stiff.stiffness.sizes import about
 
@@ -30,7 +30,7 @@ class PlatformRadiusError(Effect):
         ),
     )
 
-    def geometry(self, machine: Machine, p: Values) -> Machine:
+    def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Joints on the wider circle; one on the tool axis has no outward direction and stays."""
         joints = machine.platform_joints.copy()
         radius = np.hypot(joints[:, 0], joints[:, 1])

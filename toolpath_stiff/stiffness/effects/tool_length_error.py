@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, Values, length_error
 from toolpath_stiff.stiffness.sizes import about
 
@@ -26,7 +26,7 @@ class ToolLengthError(Effect):
         ),
     )
 
-    def geometry(self, machine: Machine, p: Values) -> Machine:
+    def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Platform joints further above the tip."""
         return machine.with_changes(platform_joints=machine.platform_joints + np.array([0.0, 0.0, p["error"]]))
 
