@@ -14,13 +14,13 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from toolpath_stiff.errors import ProgramError, TpsError
-from toolpath_stiff.locks import temporary_folder
 
 HOW_TO_CONFINE = (
     "install bubblewrap (Debian, Ubuntu: apt install bubblewrap), or say --unconfined (unconfined=True): "
@@ -83,7 +83,8 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: 
     if sys.platform == "win32":
         raise TpsError("LinuxCNC's interpreter runs on Linux only")
     limits = limits or RunLimits()
-    with temporary_folder("tps-rs274-") as folder:
+    with tempfile.TemporaryDirectory(prefix="tps-linuxcnc-", ignore_cleanup_errors=True) as place:
+        folder = Path(place)
         (folder / PROGRAM).write_text(program, encoding="ascii")
         (folder / PARAMETERS).write_text(parameters, encoding="ascii")
         (folder / TOOLS).write_text(tools, encoding="ascii")
