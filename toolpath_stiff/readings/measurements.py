@@ -23,20 +23,20 @@ from toolpath_stiff.readings.dates import day_of, days_since_first
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, offsets
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measured_poses import pose_warnings
-from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
+from toolpath_stiff.readings.rows import AXES, COLUMNS, LABELS, OPTIONAL, POSITION, Row, RowFile, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
-from toolpath_stiff.tables import parse_table
+from toolpath_stiff.tables import Columns, parse_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 
 NIST_TABLE_1 = "nist-table1"
 
 
-RISER_ABOVE = 1.0  # m: of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser
+RISER_ABOVE_MM = 1000.0  # of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,10 @@ def read_measurements(
     errors: list[InputError] = []
     for name in names:
         try:
-            files.append(_rows(name, planned, columns))
+            table_1 = name == NIST_TABLE_1
+            files.append(
+                _table_1() if table_1 else read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
+            )
         except InputErrors as bad:  # those of all files are reported together
             errors += bad.errors
     errors = errors or duplicates([row for file in files for row in file.rows], across_files=True)
@@ -197,18 +200,18 @@ def read_measurements(
     return with_offsets(replace(data, warnings=warnings), machine)
 
 
-def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
-    """Rows of a file, or of the paper's Table 1."""
-    if name != NIST_TABLE_1:
-        return read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
+def _table_1() -> RowFile:
+    """The paper's Table 1, printed with a row a point."""
     text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
-    table_1 = read_rows(parse_table(text, NIST_TABLE_1, COLUMNS))
+    printed = parse_table(text, NIST_TABLE_1, Columns(POSITION))
     rows = tuple(
-        replace(row, labels={**row.labels, "setup": "riser" if row.position[2] > RISER_ABOVE else "no riser"})
-        for row in table_1.rows
+        (line, (*cells[:3], axis, measured, "riser" if float(cells[2]) > RISER_ABOVE_MM else "no riser"))
+        for line, cells in printed.rows
+        for axis, measured in zip(AXES, cells[3:6], strict=True)
     )
+    heading = (*POSITION, "direction", "stiffness_N_per_mm", "setup")
     note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
-    return RowFile(rows, table_1.columns | {"setup"}, (*table_1.notes, note))
+    return replace(read_rows(replace(printed, heading=heading, rows=rows)), notes=(note,))
 
 
 def _columns(files: list[RowFile], machine: Hexapod) -> Readings:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
-from toolpath_stiff.readings.raw_rows import loop_entry
 from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.report.history import dated, history_png, history_text
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
@@ -85,26 +84,24 @@ def reduction_pictures(reduction: Reduction, out: Path) -> dict[Path, Content]:
 
 def reduction_text(reduction: Reduction) -> str:
     """The figures of the loops and the struts' histories; rows of a table of stiffnesses say nothing themselves."""
-    recorded = [loop_entry(figures) for figures in reduction.recorded]
+    recorded = reduction.recorded
     history = history_text(reduction.history, undated=not recorded)
     return "\n".join([loops_text(recorded), *history]) if recorded else "\n".join(history).lstrip("\n")
 
 
-def loops_text(entries: Sequence[Mapping[str, Any]]) -> str:
+def loops_text(figures: Sequence[LoopFigures]) -> str:
     """The figures for people: a line a loop."""
-    heading = ("loop", "N/mm", "force N", "deflection um", "lost motion um", "width um", "linearity %", "closure um")
-    rows: list[tuple[str, ...]] = [heading]
-    for entry in entries:
-        force = "-" if entry["force_N"] is None else f"{entry['force_N']:.0f}"
-        cells = [entry["loop"], f"{entry['stiffness_N_per_mm']:.0f}", force]
-        for name in ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um"):
-            cells.append("-" if entry[name] is None else f"{entry[name] + 0.0:.1f}")
-        rows.append(tuple(cells))
-    widths = [max(len(row[i]) for row in rows) for i in range(len(heading))]
-    lines = [
+    rows: list[tuple[str, ...]] = [
+        ("loop", "N/mm", "force N", "deflection um", "lost motion um", "width um", "linearity %", "closure um")
+    ]
+    for loop in figures:
+        lengths = um_from_m(np.array([loop.deflection, loop.lost_motion, loop.loop_width, loop.closure]))
+        deflection, lost, width, closure = ("-" if math.isnan(um) else f"{um + 0.0:.1f}" for um in lengths)
+        stiffness = f"{n_per_mm_from_n_per_m(loop.stiffness):.0f}"
+        linearity = f"{100.0 * loop.linearity:.1f}"
+        rows.append((loop.loop.title, stiffness, f"{loop.force:.0f}", deflection, lost, width, linearity, closure))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
         "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
         for row in rows
-    ]
-    return "\n".join(
-        [*lines, *(f"{entry['loop']}: {entry['shape']['text']}" for entry in entries if entry["shape"]["text"])]
     )
