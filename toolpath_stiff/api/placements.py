@@ -122,7 +122,7 @@ def place(
     from toolpath_stiff.analysis.loads import parse_load
     from toolpath_stiff.placement.goals import SearchRules
     from toolpath_stiff.placement.placing import place_again, place_program
-    from toolpath_stiff.placement.task import PlacementTask, SearchedFront
+    from toolpath_stiff.placement.task import PlacementTask
 
     on, part = machine_from(machine), program_from(program)
     model = on.running(part)
@@ -144,7 +144,7 @@ def place(
     if pick is None:
         placed = place_program(task, counter(progress, f"{part.name}: search"))
     else:
-        placed = place_again(task, SearchedFront.of(earlier), pick)
+        placed = place_again(task, earlier, pick)
     return replace(placed, inputs=(*part.inputs, *on.inputs))
 
 
