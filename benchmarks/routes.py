@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from tests.stiffness import reference
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
-from toolpath_stiff.stiffness import truss as reference
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.stiffness.truss import TIP, platform_bars, platform_nodes
 
