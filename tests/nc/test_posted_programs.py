@@ -689,7 +689,7 @@ def test_place_works_and_write_is_refused(files, capsys):
     blocks = json.loads(capsys.readouterr().out)["offset_blocks"]
     assert not blocks["linuxcnc"] and "posted for another kinematics" in blocks["linuxcnc_reason"]
     assert main(["place", *files, *few, "--write", "placed.nc"]) == 2
-    assert "posted for another kinematics (table-table A C) is not rewritten" in capsys.readouterr().err
+    assert "posted for another kinematics (table-table A C) cannot be rewritten" in capsys.readouterr().err
     assert not Path("placed.nc").exists()
 
 
