@@ -212,10 +212,11 @@ def check(
     --------
     >>> import toolpath_stiff as tps
     >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
-    >>> [(one["line"], one["severity"]) for one in found.errors]
+    >>> [(finding.line, finding.severity) for finding in found.errors]
     [(3, 'error')]
     """
     from toolpath_stiff.analysis.program_check import check_program
+    from toolpath_stiff.nc.request import ZERO, Request
 
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
@@ -224,13 +225,13 @@ def check(
     speed = None
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
-    return check_program(
+    hexapod = None if on is None else on.model.machine
+    request = Request(
         part.lines,
         part.name,
-        machine=None if on is None else on.model.machine,
         origin=origin_si(origin_mm_deg),
-        step=m_from_mm(step_mm),
-        strut_speed=speed,
+        default_origin=ZERO if hexapod is None else hexapod.default_origin,
         controller=part.controller,
         **part.options,
     )
+    return check_program(request, hexapod, m_from_mm(step_mm), speed)
