@@ -224,9 +224,7 @@ def _stops(machine: Hexapod, poses: FloatArray, menu: Menu) -> list[Stop]:
         stops += [(fits[k], extension, setup, "longer tool") for k in spread[: len(fits)]]
     again = (0, n - 1)  # the first image and the last pose, which is tilted
     stops += [(k, tool, other, f"set-up {other}") for other in menu.setups[1:] for k in again]
-    return stops + [
-        (k, tool, name, "clamped anew") for name, k, _ in product(menu.setups, again, range(1, CLAMPINGS))
-    ]
+    return stops + [(k, tool, name, "clamped anew") for name, k, _ in product(menu.setups, again, range(1, CLAMPINGS))]
 
 
 def _visits(poses: FloatArray, stops: Sequence[Stop], menu: Menu, rng: Generator) -> Visits:
