@@ -347,4 +347,4 @@ def check_parts(
         for i in np.argsort(first).tolist()
     ]
     by_operation = zip(operations.rows, rows(operations.of_move, len(operations.rows)), strict=True)
-    return tools, [operation_heading(operation) | part for operation, part in by_operation]
+    return tools, [{**operation_heading(operation), **part} for operation, part in by_operation]

@@ -18,8 +18,8 @@ from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, n_per_m_from_n_per_mm
 
 if TYPE_CHECKING:
-    from toolpath_stiff.analysis import Analysis
     from toolpath_stiff.analysis.program_check import ProgramCheck
+    from toolpath_stiff.analysis.results import Analysis
     from toolpath_stiff.path import SampledPath
 
 RequiredStiffness = Annotated[
@@ -108,7 +108,7 @@ def analyze(
     >>> found.to_frame()[["line", "x_mm", "stiffness_N_per_mm"]].tail(1).round(0).values.tolist()
     [[4.0, 40.0, 53875.0]]
     """
-    from toolpath_stiff.analysis import analyze
+    from toolpath_stiff.analysis.results import analyze
 
     first, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
     second = first.like(compare_with) if isinstance(compare_with, str | Path) else compare_with

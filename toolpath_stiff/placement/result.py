@@ -233,7 +233,7 @@ class Placement(FolderResult, SearchedFront):
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
         offsets, (first, *others) = self.offsets, self._binding_limits()
-        smallest = float(self.best.at.margin[self.best.samples.cutting].min())
+        smallest = float(self.best.at.reach.margin[self.best.samples.cutting].min())
         document: dict[str, Any] = to_dict(
             {
                 "warnings": self.warnings,
@@ -257,14 +257,14 @@ class Placement(FolderResult, SearchedFront):
                 "offset_blocks": {name: getattr(offsets, name) or None for name in OFFSETS},
                 "written": self.written,
                 "search": self.search,
-                "assumptions": self.best.assumptions,
+                "assumptions": self.best.to_dict()["assumptions"],
             }
         )
         return document
 
     def _binding_limits(self) -> list[str]:
         """The limits that the cuts come nearest to, at most three."""
-        poses, cutting = self.best.at, self.best.samples.cutting
+        poses, cutting = self.best.at.reach, self.best.samples.cutting
         near = np.argsort(poses.margin + np.where(cutting, 0.0, np.inf), kind="stable")[:200]
         return list(dict.fromkeys(poses.limits[int(poses.limit[i])].name for i in near))[:3]
 
