@@ -211,7 +211,7 @@ def test_what_is_said_of_the_law():
     assert any("extrapolated outside 2561.6 to 3213.2 mm" in line for line in said[1])
     assert not check_machine(build_model(CONSTANT_MACHINE)).wrong
     soft = check_machine(build_model(machine_with("stiffness_N_per_um = 0.04"))).wrong
-    assert len(soft) == 1 and "if it is in kN/um" in soft[0]
+    assert len(soft) == 1 and "is it in kN/um?" in soft[0]
 
 
 def test_a_parameter_of_a_constant_law():
