@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from toolpath_stiff.analysis import Analysis
-from toolpath_stiff.analysis import analyze as analyze_path
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.program_check import ProgramCheck, check_program
+from toolpath_stiff.analysis.results import Analysis
+from toolpath_stiff.analysis.results import analyze as analyze_path
 from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
