@@ -12,8 +12,9 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.case import BLIND, draw_case, make_case
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import score, seal, unseal
-from toolpath_stiff.rig.hidden import OUTSIDE, HiddenMachine, readings
+from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import commanded_lengths, rotations
+from toolpath_stiff.rig.oddities import ODDITIES
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.unknown import LINKS, VARIABLES, Unknown
 from toolpath_stiff.rig.unknown_struts import SOUND_BAR
@@ -46,10 +47,10 @@ def at_loads(rows: Rows, force: float) -> Rows:
 
 def test_there_are_two_dozen_and_a_description_can_name_them() -> None:
     assert len(UNKNOWNS) >= 24
-    assert not {*UNKNOWNS} & {*OUTSIDE, *CATALOGUE}
+    assert not {*UNKNOWNS} & {*ODDITIES, *CATALOGUE}
     for kind in UNKNOWNS.values():
-        assert kind.links <= set(LINKS)
-        assert kind.variables <= set(VARIABLES)
+        assert set(kind.links) <= set(LINKS)
+        assert set(kind.variables) <= set(VARIABLES)
         assert 1 <= len(kind.links) <= 3
         assert 1 <= len(kind.variables) <= 4
         assert [one is not None for one in (kind.act, kind.read, kind.move)].count(True) == 1
@@ -188,5 +189,5 @@ def test_an_unknown_is_claimed_as_outside_the_catalogue_or_by_its_name() -> None
 
 def test_the_seal_keeps_an_unknown(tmp_path) -> None:
     case = draw_case(3, "paper", "worn_table_bearing")
-    (tmp_path / "sealed.bin").write_bytes(seal(case, 3, "paper"))
+    (tmp_path / "sealed.bin").write_bytes(seal(case))
     assert unseal(tmp_path / "sealed.bin")[0].machine.unknown == case.machine.unknown

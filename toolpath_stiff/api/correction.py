@@ -83,6 +83,7 @@ def update(
     >>> update.to_frame()["name"].tolist()
     ['as given', 'strut law refitted']
     """
+    from toolpath_stiff.correction.task import UpdateTask
     from toolpath_stiff.correction.update import update as update_machine
     from toolpath_stiff.stiffness.model import build_model
 
@@ -93,12 +94,12 @@ def update(
         model = replace(build_model(corrected, on.effect_files), unchecked=on.model.unchecked)
         return Machine(model, on.asked, on.effect_files, allow_unchecked_effects=on.allow_unchecked_effects)
 
-    corrected = update_machine(
+    task = UpdateTask(
         question.model, question.readings, [add] if isinstance(add, str) else list(add), strut_law=strut_law,
         keep_strut_law=keep_strut_law, auto=auto, force=force, objective=objective, files=question.files,
         machine_file=str(machine_file), asked=question.request, progress=teller(progress), **question.common,
     )  # fmt: skip
-    return replace(corrected, inputs=question.inputs, opened=opened)
+    return replace(update_machine(task), inputs=question.inputs, opened=opened)
 
 
 @checked

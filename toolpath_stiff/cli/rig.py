@@ -25,12 +25,11 @@ The rig shares no stiffness code with the model that it tests. The seal is a bli
 
 def new(args: Namespace) -> int:
     """Make a blind exercise."""
-    from toolpath_stiff.rig.exercise import new_exercise
+    from toolpath_stiff.rig.exercise import blind_case, new_exercise
 
     rules = Rules(inputs=tuple(inputs_of(args)), fresh=True, replace=args.replace, kept=tell_kept)
-    count = new_exercise(
-        args.out, args.seed, args.layout, args.hidden, args.noise / 100.0, args.machine, args.at, rules
-    )
+    case = blind_case(args.seed, args.layout, args.hidden, args.noise / 100.0, args.machine, args.at)
+    count = new_exercise(args.out, case, rules)
     print(f"{args.out}: {count} measurements, the nominal machine and the sealed truth")
     print(hint("next", _diagnose(args.out)))
     return 0

@@ -14,32 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from toolpath_stiff.rig.hidden import HiddenMachine, Oddity
-from toolpath_stiff.rig.unknown import Unknown, signed
-from toolpath_stiff.rig.unknowns import UNKNOWNS
+from toolpath_stiff.rig.hidden import HiddenMachine
+from toolpath_stiff.rig.unknown import Parameters, Unknown
+from toolpath_stiff.rig.unknowns import OUTSIDE
 from toolpath_stiff.units import m_from_mm, m_from_um, per_s_from_per_min
 
-Parameters = dict[str, Any]
 NM_PER_N = 1e-9  # m/N in nm/N
 
-# Largest compliances that are tried, nm/N: far beyond 30 % of a tip that gives 8 to 31 nm/N.
-SOFT = 60.0
-
-
-# Sizes at strength 1: ratios, or m/N where the oddity is a compliance.
-ODDITY_LIMITS = {
-    "loose_preload": SOFT * NM_PER_N,
-    "cracked_bed": SOFT * NM_PER_N,
-    "saddle_overhang": SOFT * NM_PER_N,
-    "screw_pitch_error": 0.8,
-    "ball_screw_torsion": 1.0,
-    "strut_crosstalk": 0.95,
-    "cable_drag": 0.5,
-    "warming_leg": 1.0,
-    "joint_friction": 1.0,
-}
-
-
+SOFT = 60.0  # nm/N, largest compliances that are tried: far beyond 30 % of a tip that gives 8 to 31 nm/N
 Draw = Callable[[Generator, int, list[str]], Parameters]  # of how many vertices the frame has, which set-ups there are
 
 
@@ -166,38 +148,20 @@ CATALOGUE: dict[str, Hideable] = {
 }  # fmt: skip
 
 
-# What is drawn of an oddity beside its strength.
-ODDITY_SHAPES: dict[str, Callable[[Generator], Parameters]] = {
-    "screw_pitch_error": lambda rng: {
-        "wavelength": float(rng.uniform(0.08, 0.4)), "phase": float(rng.uniform(0.0, 2.0 * np.pi))
-    },
-    "warming_leg": lambda rng: {"strut": int(rng.integers(0, 6))},
-    "cable_drag": signed,
-    "strut_crosstalk": signed,
-}  # fmt: skip
-
-
 def draw_shape(name: str, rng: Generator, vertices: int, setups: list[str]) -> Parameters:
     """What is drawn of anything that can be hidden, beside its strength."""
-    if name in CATALOGUE:
-        return CATALOGUE[name].draw(rng, vertices, setups)
-    if name in UNKNOWNS:
-        return UNKNOWNS[name].shape(rng)
-    return ODDITY_SHAPES[name](rng) if name in ODDITY_SHAPES else {}
+    return CATALOGUE[name].draw(rng, vertices, setups) if name in CATALOGUE else OUTSIDE[name].shape(rng)
 
 
 def at_strength(name: str, shape: Parameters, strength: float) -> Parameters:
     """Parameters in shop units, by the catalogue's names, for a strength in (0, 1]."""
     if name in CATALOGUE:
         return CATALOGUE[name].grow(strength, shape)
-    limit = UNKNOWNS[name].limit if name in UNKNOWNS else ODDITY_LIMITS[name]
-    return _scaled("size", limit, *(key for key in shape if key != "sign"))(strength, shape)
+    return _scaled("size", OUTSIDE[name].limit, *(key for key in shape if key != "sign"))(strength, shape)
 
 
 def with_effect(hidden: HiddenMachine, name: str, parameters: Mapping[str, Any]) -> HiddenMachine:
     """The machine with one more effect; parameters in shop units by the catalogue's names."""
     if name in CATALOGUE:
         return dataclasses.replace(hidden, **CATALOGUE[name].change(hidden, parameters))
-    if name in UNKNOWNS:
-        return dataclasses.replace(hidden, unknown=Unknown(name, parameters["size"], dict(parameters)))
-    return dataclasses.replace(hidden, oddity=Oddity(kind=name, **parameters))
+    return dataclasses.replace(hidden, unknown=Unknown(name, parameters["size"], dict(parameters)))

@@ -19,14 +19,8 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray, IntArray
 
 BARS = 19  # of the platform truss (the paper's Figure 2b)
-
-
 HUB, TIP = 6, 7  # nodes of the platform truss after its six joints
-
-
 SECANT_STEPS = 60
-
-
 SECANT_TOLERANCE = 1e-11  # relative change of the tip's compliance between two steps
 
 
@@ -118,11 +112,6 @@ class Solved:
     moved: FloatArray
     stretch: FloatArray
     platform_dofs: int
-
-
-def secant_compliance(place: Geometry, links: Links, direction: FloatArray, force: FloatArray) -> FloatArray:
-    """(n,) m/N between tool and workpiece along unit vectors `direction` (n, 3) under loads `force` (n,) N."""
-    return solved(place, links, direction, force).compliance
 
 
 def solved(place: Geometry, links: Links, direction: FloatArray, force: FloatArray) -> Solved:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.random import Generator
@@ -22,10 +22,11 @@ from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import Geometry, Links
 
+Parameters = dict[str, Any]  # by name
+F = TypeVar("F", bound=Callable[..., Any])
+
 # Words of a description.
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
-
-
 VARIABLES = (
     *("constant", "x", "y", "z", "radius", "tilt", "strut length", "strut force", "force sign"),
     *("load", "time", "order", "setup", "temperature", "direction"),
@@ -37,14 +38,8 @@ VARIABLES = (
 # varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant
 # there, and shows as the strut swings about it.
 ONE, ALL = "one strut,joints", "joints,struts"
-
-
 SOFT = 60e-9  # m/N, largest compliance that is tried: far beyond 30 % of a tip that gives 8 to 31 nm/N
-
-
 REACH = 0.3  # m, half the width of the workspace that the paper measured
-
-
 SIGN_WIDTH = 30.0  # N over which a seat opens: no contact lets go at a stroke (assumed)
 
 
@@ -64,7 +59,7 @@ class Unknown:
 
     kind: str
     size: float
-    shape: dict[str, Any] = field(default_factory=dict)
+    shape: Parameters = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -89,7 +84,7 @@ class CommandedRows:
         return np.asarray((self.lengths - low) / (high - low))
 
 
-def no_shape(rng: Generator) -> dict[str, Any]:
+def no_shape(rng: Generator) -> Parameters:
     """Nothing is drawn beside the size."""
     return {}
 
@@ -100,41 +95,69 @@ class Kind:
 
     Attributes
     ----------
-    words
-        What it is.
-    links, variables
-        What a description may name.
     limit
         Largest size that is tried.
+    shape
+        Draws what is not size; `sign` in it goes to the size.
+    links, variables
+        What a description may name.
+    varies
+        Columns of `Rows` on which the mechanics depends beside pose, direction, tool and set-up.
+    columns
+        Columns that a measurement file needs to show it.
     act
         What it does to the links; None: nothing.
     read
         (n,) factor on the stiffness that is read; None: 1.
     move
         (6, 3) m by which the frame joints stand elsewhere; None: not at all.
-    shape
-        Draws what is not size; `sign` in it goes to the size.
-    varies
-        Columns of `Rows` on which the mechanics depends beside pose, direction, tool and set-up.
-    columns
-        Columns that a measurement file needs to show it.
     """
 
-    words: str
-    links: frozenset[str]
-    variables: frozenset[str]
     limit: float
+    shape: Callable[[Generator], Parameters]
+    links: tuple[str, ...] = ()
+    variables: tuple[str, ...] = ()
+    varies: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
     act: Callable[[Links, CommandedRows, Unknown], Links] | None = None
     read: Callable[[Rows, Unknown], FloatArray] | None = None
     move: Callable[[Unknown], FloatArray] | None = None
-    shape: Callable[[Generator], dict[str, Any]] = no_shape
-    varies: tuple[str, ...] = ()
-    columns: tuple[str, ...] = ()
 
 
-def kind(words: str, links: str, variables: str, limit: float, **more: Any) -> Kind:
-    """A kind whose links and variables are given as words between commas."""
-    return Kind(words, frozenset(links.split(",")), frozenset(variables.split(",")), limit, **more)
+class Kinds(dict[str, Kind]):
+    """Kinds by their names, which are those of the functions that make them."""
+
+    def add(
+        self,
+        limit: float,
+        links: str = "",
+        variables: str = "",
+        role: str = "act",
+        shape: Callable[[Generator], Parameters] = no_shape,
+        varies: str = "",
+        columns: str = "",
+    ) -> Callable[[F], F]:
+        """Enter a function as what a kind does, its `role`; texts are words between commas."""
+
+        def entered(function: F) -> F:
+            link, variable, varying, needed = (
+                tuple(filter(None, text.split(","))) for text in (links, variables, varies, columns)
+            )
+            does: dict[str, Any] = {role: function}
+            self[function.__name__] = Kind(limit, shape, link, variable, varying, needed, **does)
+            return function
+
+        return entered
+
+
+def between(name: str, low: float, high: float) -> Callable[[Generator], Parameters]:
+    """Draws one figure, each as likely."""
+    return lambda rng: {name: float(rng.uniform(low, high))}
+
+
+def one_side(rng: Generator) -> Parameters:
+    """Whether pull or push."""
+    return {"side": float(rng.choice([-1.0, 1.0]))}
 
 
 def opened(pull: FloatArray) -> FloatArray:
@@ -147,20 +170,21 @@ def beyond(force: FloatArray, threshold: float) -> FloatArray:
     return np.asarray(np.maximum(0.0, 1.0 - threshold / np.maximum(np.abs(force), 1e-9)))
 
 
-def one_strut(rng: Generator) -> dict[str, Any]:
+def one_strut(rng: Generator) -> Parameters:
     """Which strut, from 0."""
     return {"strut": int(rng.integers(6))}
 
 
-def signed(rng: Generator) -> dict[str, Any]:
+def signed(rng: Generator) -> Parameters:
     """Which sign."""
     return {"sign": float(rng.choice([-1.0, 1.0]))}
 
 
-def _with_ends(links: Links, *ends: tuple[FloatArray, FloatArray]) -> Links:
+def with_ends(links: Links, *ends: tuple[FloatArray, FloatArray]) -> Links:
+    """Further levers (n, 3) and compliances (n,) between tool and work."""
     return dataclasses.replace(links, ends=(*links.ends, *ends))
 
 
-def _with_joints(links: Links, extra: Callable[[FloatArray], FloatArray]) -> Links:
+def with_joints(links: Links, extra: Callable[[FloatArray], FloatArray]) -> Links:
     """Further secant compliance (n, 6) along the struts from their forces (n, 6)."""
     return dataclasses.replace(links, joints=lambda forces: links.joints(forces) + extra(forces))

@@ -7,14 +7,11 @@ damaged or badly set machines show; no source gives figures for them. The sizes 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from toolpath_stiff.rig.oddities import ODDITIES
+from toolpath_stiff.rig.unknown import Kind
 from toolpath_stiff.rig.unknown_ends import END_KINDS
 from toolpath_stiff.rig.unknown_joints import JOINT_KINDS
 from toolpath_stiff.rig.unknown_struts import STRUT_KINDS
 
-if TYPE_CHECKING:
-    from toolpath_stiff.rig.unknown import Kind
-
-
 UNKNOWNS: dict[str, Kind] = {**JOINT_KINDS, **STRUT_KINDS, **END_KINDS}
+OUTSIDE: dict[str, Kind] = {**ODDITIES, **UNKNOWNS}  # the catalogue
