@@ -14,7 +14,6 @@ import pytest
 from importlinter.cli import lint_imports
 
 import toolpath_stiff
-from toolpath_stiff.cli.main import COMMANDS
 
 PACKAGE = Path(toolpath_stiff.__file__).parent
 POCKET = PACKAGE.parent / "programs" / "pocket.nc"
@@ -92,11 +91,8 @@ def test_a_run_goes_the_walk(tmp_path, walk, words):
 
 
 def test_the_help_imports_nothing_heavy():
-    """Of the tool and of every command; in a fresh interpreter, as this one has numpy already.
-
-    Commands import numpy and its like in `run`, so that a slip in an option is answered at once.
-    """
-    asked = [["--help"], ["--version"], [], *([command, "--help"] for command in COMMANDS)]
+    """Of the tool, its version, its name alone; in a fresh interpreter, as this one has numpy already."""
+    asked: list[list[str]] = [["--help"], ["--version"], []]
     code = (
         "import sys, io, contextlib\n"
         "from toolpath_stiff.cli.main import main\n"

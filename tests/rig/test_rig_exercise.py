@@ -12,7 +12,7 @@ import pytest
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import score
-from toolpath_stiff.rig.oddities import ODDITIES
+from toolpath_stiff.rig.unknowns import OUTSIDE
 
 BLIND = ["--seed", "7", "--hidden", "weak_strut", "--layout", "paper"]
 PLAN = "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm,setup,clamp\n0,0,800,X,,table,1\n0,0,800,Z,,riser,2\n"
@@ -28,7 +28,7 @@ def blind(tmp_path, capsys):
     folder = tmp_path / "blind"
     assert main(["rig", "new", *BLIND, "--out", str(folder)]) == 0
     said = capsys.readouterr().out
-    assert not any(name in said for name in (*CATALOGUE, *ODDITIES))
+    assert not any(name in said for name in (*CATALOGUE, *OUTSIDE))
     return folder
 
 
@@ -45,7 +45,7 @@ def test_the_sealed_truth_is_no_text_and_its_size_tells_nothing(blind, tmp_path)
     body = sealed.split(b"\n", 1)[1]
     # Chance makes runs of seven or eight letters in eight thousand random bytes; words and keys would be far longer.
     assert not re.search(rb"[A-Za-z_]{12,}", body)
-    assert not any(name.encode() in body for name in (*CATALOGUE, *ODDITIES))
+    assert not any(name.encode() in body for name in (*CATALOGUE, *OUTSIDE))
     counts = np.bincount(np.frombuffer(body, dtype=np.uint8), minlength=256)
     assert counts.max() < 4 * counts.mean()  # padding and JSON would pile up on a few bytes
     for hidden in ("none", "two", "screw_pitch_error"):

@@ -11,11 +11,11 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.hand_out import BatchRun, Task, answers
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.programs import JOBS, ShowPlunges, Table, analyze, check_options
+from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table, analyze, check_options
 from toolpath_stiff.defaults import job_count
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.program import Program
@@ -111,7 +111,7 @@ def analyze_many(
     folder: str | Path,
     *,
     executor: Executor | None = None,
-    jobs: Annotated[int | None, JOBS] = None,
+    jobs: Jobs = None,
     plots: bool = True,
     table: Table = "csv",
     show_plunges: ShowPlunges = False,

@@ -38,19 +38,23 @@ Partial = Annotated[
 Compared = Annotated[
     Machine | str | Path | None, Option("--compare", "MACHINE", help="Another machine to analyze the program on.")
 ]
-JOBS = Option(
-    "--jobs",
-    at_least=1,
-    help="Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each "
-    "available CPU.",
-)
-FORMAT = Option("--format", choices=("csv", "parquet"), help="Format of the samples.")
-SHOW_PLUNGES = Option(
-    "--show-plunges",
-    help="Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).",
-)
-Table = Annotated[str, FORMAT]
-ShowPlunges = Annotated[bool, SHOW_PLUNGES]
+Jobs = Annotated[
+    int | None,
+    Option(
+        "--jobs",
+        at_least=1,
+        help="Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for "
+        "each available CPU.",
+    ),
+]
+Table = Annotated[str, Option("--format", choices=("csv", "parquet"), help="Format of the samples.")]
+ShowPlunges = Annotated[
+    bool,
+    Option(
+        "--show-plunges",
+        help="Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).",
+    ),
+]
 
 
 @checked

@@ -131,9 +131,7 @@ def read(request: Request) -> ReadProgram:
 
 def _check_second(error: InputError, request: Request) -> None:
     """Raise what the built-in interpreter refused with, unless the second one is there and the program harmless."""
-    refused = linuxcnc.refusal(request.lines, request.name)
-    if refused is not None:
-        raise refused from None
+    linuxcnc.fenced(request.lines, request.name)
     try:
         find_rs274(request.rs274, request.unconfined)
     except InputError as missing:

@@ -28,7 +28,7 @@ from toolpath_stiff.rig.hidden import (
 )
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
-from toolpath_stiff.rig.oddities import IN_TIME, ODDITIES
+from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
 from toolpath_stiff.rig.sizes import scale_of
 from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
@@ -250,7 +250,7 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
     if hidden == "unknown":
         return (str(rng.choice([name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)])),)
     if hidden == "outside":
-        return (str(rng.choice([name for name in ODDITIES if layout != "paper" or name not in IN_TIME])),)
+        return (str(rng.choice([*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME)])),)
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
     everything = (*CATALOGUE, *OUTSIDE)
     if unknown := [name for name in names if name not in everything]:

@@ -31,6 +31,7 @@ from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, again, clamp_of, draw_case, rows_of
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
+from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
 from toolpath_stiff.rig.unknown import Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE
@@ -52,12 +53,9 @@ NUMBERS: dict[str, tuple[float, float, float | None]] = {
     "temperature_C": (-50.0, 100.0, 20.0),
     "length_mm": (1.0, 1e5, np.nan),
 }
-LOOPS = (
-    r"|tip|spindle|platform|table|strut [1-6]( alone)?|joint [1-6]( (platform|frame))?|frame [1-3]( (radial|vertical))?"
-)
 TEXTS = {  # column -> what matches, in words as well
     "direction": ("[XYZ]", "X, Y or Z"),
-    "loop": (LOOPS, "tip, spindle, platform, table, strut 1 (alone), joint 1 (platform, frame), frame 1 (radial)"),
+    "loop": (LOOP_PATTERN, LOOP_WORDS),
     "clamp": ("[0-9]{1,9}", "a whole number"),
     **dict.fromkeys(("repeat", "point", "setup"), ("(?s).*", "any text")),
 }

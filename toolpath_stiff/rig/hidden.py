@@ -1,9 +1,8 @@
 """The hidden machine: everything in which the true machine differs from the nominal one, and what it then shows.
 
 `HiddenMachine` holds the differences; all of them zero is the nominal machine. `true_stiffness` turns it and the
-rows of a campaign into stiffnesses, `readings` adds what the instruments do to them.
-
-`Nuisances` are what every real campaign adds, whether or not something is hidden.
+rows of a campaign into stiffnesses, `readings` adds what the instruments do to them. `Nuisances` are what every real
+campaign adds, whether or not something is hidden.
 """
 
 from __future__ import annotations
@@ -18,15 +17,19 @@ from numpy.random import Generator
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.nominal import Nominal, commanded_lengths, platform_points, rotations, true_poses
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import Geometry, Links, solved
+from toolpath_stiff.rig.structure import End, Geometry, Links, solved
 from toolpath_stiff.rig.unknown import CommandedRows, Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE
 from toolpath_stiff.units import n_per_m_from_n_per_mm, n_per_mm_from_n_per_m
 
 HERTZ_LOAD = 500.0  # N, load at which contact_nonlinearity's compliance is quoted (assumed; effects catalogue)
 SLACK_LOAD = 0.1  # N, below which a joint's secant compliance is held: far below any load of a campaign
-# Resolution of what is printed: whole N/mm, as in the paper's Table 1 (published).
-PRINTED_N_PER_MM = 1.0
+PRINTED_N_PER_MM = 1.0  # resolution of what is printed: whole N/mm, as in the paper's Table 1 (published)
+AXES = np.eye(3)
+
+
+def _zeros(*shape: int) -> FloatArray:
+    return np.zeros(shape)
 
 
 @dataclass(frozen=True)
@@ -67,8 +70,8 @@ class HiddenMachine:
         Something outside the catalogue.
     """
 
-    frame_errors: FloatArray = field(default_factory=lambda: np.zeros((6, 3)))
-    platform_errors: FloatArray = field(default_factory=lambda: np.zeros((6, 3)))
+    frame_errors: FloatArray = field(default_factory=lambda: _zeros(6, 3))
+    platform_errors: FloatArray = field(default_factory=lambda: _zeros(6, 3))
     strut_factors: FloatArray = field(default_factory=lambda: np.ones(6))
     curvature: float = 0.0
     tip_error: float = 0.0
@@ -80,11 +83,11 @@ class HiddenMachine:
     hertz: float = 0.0
     clearance: float = 0.0
     moment: float = 0.0
-    vertices: FloatArray = field(default_factory=lambda: np.zeros((6, 2)))
-    table: FloatArray = field(default_factory=lambda: np.zeros(3))
+    vertices: FloatArray = field(default_factory=lambda: _zeros(6, 2))
+    table: FloatArray = field(default_factory=lambda: _zeros(3))
     rocking: float = 0.0
     setup: str = ""
-    setup_compliance: FloatArray = field(default_factory=lambda: np.zeros(3))
+    setup_compliance: FloatArray = field(default_factory=lambda: _zeros(3))
     gauge_target: str = ""
     gauge_factor: float = 1.0
     drift: float = 0.0
@@ -104,8 +107,9 @@ def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
 def true_stiffness(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m, secant stiffness between tool and workpiece along the load."""
     first, which = _distinct(hidden, rows)
-    place, links = assembled(nominal, hidden, rows.take(first))
-    return np.asarray(1.0 / solved(place, links, rows.direction[first], rows.force[first]).compliance[which])
+    distinct = rows.take(first)
+    place, links = assembled(nominal, hidden, distinct)
+    return np.asarray(1.0 / solved(place, links, distinct.direction, distinct.force).compliance)[which]
 
 
 def _distinct(hidden: HiddenMachine, rows: Rows) -> tuple[IntArray, IntArray]:
@@ -128,17 +132,13 @@ def assembled(
     turned = rotations(rows.angles)
     lengths = commanded_lengths(nominal, rows.position, turned, rows.extension)
     place = _true_geometry(nominal, hidden, rows, turned, lengths)
-    lengths = lengths if struts is None else np.where(struts > 0.0, struts, lengths)
     links = Links(
-        struts=_struts(nominal, hidden, lengths),
+        struts=_struts(nominal, hidden, lengths if struts is None else np.where(struts > 0.0, struts, lengths)),
         joints=_joint_law(hidden),
         moment=hidden.moment,
         bars=hidden.bars,
-        spindle=_spindle(nominal, hidden, rows),
         vertices=hidden.vertices[: nominal.vertices.max() + 1],
-        table=np.broadcast_to(hidden.table, (len(rows.force), 3)),
-        rocking=hidden.rocking,
-        setup=np.where((rows.setup == hidden.setup)[:, None] & bool(hidden.setup), hidden.setup_compliance, 0.0),
+        ends=_ends(nominal, hidden, rows, place),
     )
     if hidden.unknown is not None and (act := OUTSIDE[hidden.unknown.kind].act) is not None:
         links = act(links, CommandedRows(nominal, rows, lengths, place), hidden.unknown)
@@ -198,13 +198,24 @@ def _joint_law(hidden: HiddenMachine) -> Callable[[FloatArray], FloatArray]:
     return secant
 
 
-def _spindle(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
-    """(n, 3) m/N in platform axes."""
+def _ends(nominal: Nominal, hidden: HiddenMachine, rows: Rows, place: Geometry) -> tuple[End, ...]:
+    """Spindle in platform axes; table, its rocking about the base frame's x and y through its origin, and set-up."""
+    n = len(rows.force)
     radial, axial = hidden.spindle
-    grown = np.ones(len(rows.force))
+    grown = np.ones(n)
     if nominal.tool_length > 0.0:
         grown = (1.0 + rows.extension / nominal.tool_length) ** hidden.overhang_exponent
-    return np.stack([radial * grown, radial * grown, np.full(len(grown), axial)], axis=1)
+    here = (rows.setup == hidden.setup) & bool(hidden.setup)
+    along = [np.broadcast_to(axis, (n, 3)) for axis in AXES]
+    return (
+        *(
+            End("spindle", place.rotation[:, :, j], c)
+            for j, c in enumerate((radial * grown,) * 2 + (np.full(n, axial),))
+        ),
+        *(End("table", along[j], np.full(n, hidden.table[j])) for j in range(3)),
+        *(End("table", np.cross(AXES[j], place.work_point), np.full(n, hidden.rocking)) for j in range(2)),
+        *(End("table", along[j], np.where(here, hidden.setup_compliance[j], 0.0)) for j in range(3)),
+    )
 
 
 def _gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:

@@ -22,7 +22,7 @@ from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import Nominal, reachable
 from toolpath_stiff.rig.sizes import scale_of
-from toolpath_stiff.rig.unknown import Parameters
+from toolpath_stiff.rig.unknown import Shape
 from toolpath_stiff.units import MM_PER_INCH
 
 # Kind -> what was done.
@@ -46,10 +46,10 @@ TRIES = 200  # draws until the written pose is one that the machine can reach
 VISIBLE = 5.3
 
 
-def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = None) -> tuple[Table, Parameters]:
+def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = None) -> tuple[Table, Shape]:
     """A measured table of a case with one slip in it.
 
-    Parameters
+    Shape
     ----------
     case
         Its nominal machine keeps poses reachable; with its nuisances for the size of the slip.
@@ -104,11 +104,11 @@ def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = 
     }
 
 
-def slipped_case(case: DrawnCase, seed: int, kind: str | None = None, count: int = 1) -> tuple[Table, list[Parameters]]:
+def slipped_case(case: DrawnCase, seed: int, kind: str | None = None, count: int = 1) -> tuple[Table, list[Shape]]:
     """The rows of a case with `count` slips in different rows, and their truths."""
     rng = np.random.default_rng([seed, 5])  # beyond the streams of `draw_case`
     table = case.rows
-    truths: list[Parameters] = []
+    truths: list[Shape] = []
     taken: set[int] = set()
     for _ in range(TRIES):
         if len(truths) == count:

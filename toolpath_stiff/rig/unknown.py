@@ -20,10 +20,11 @@ from numpy.random import Generator
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import Geometry, Links
+from toolpath_stiff.rig.structure import End, Geometry, Links
 
-Parameters = dict[str, Any]  # by name
-F = TypeVar("F", bound=Callable[..., Any])
+Shape = dict[str, Any]  # what is drawn of something hidden beside its size, by name
+Physics = TypeVar("Physics", bound=Callable[..., Any])
+X, Y, Z = np.eye(3)
 
 # Words of a description.
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
@@ -59,7 +60,7 @@ class Unknown:
 
     kind: str
     size: float
-    shape: Parameters = field(default_factory=dict)
+    shape: Shape = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -84,80 +85,56 @@ class CommandedRows:
         return np.asarray((self.lengths - low) / (high - low))
 
 
-def no_shape(rng: Generator) -> Parameters:
-    """Nothing is drawn beside the size."""
-    return {}
-
-
 @dataclass(frozen=True)
 class Kind:
     """A kind of unknown.
 
     Attributes
     ----------
-    limit
-        Largest size that is tried.
-    shape
-        Draws what is not size; `sign` in it goes to the size.
     links, variables
         What a description may name.
-    varies
-        Columns of `Rows` on which the mechanics depends beside pose, direction, tool and set-up.
-    columns
-        Columns that a measurement file needs to show it.
+    limit
+        Largest size that is tried.
     act
         What it does to the links; None: nothing.
     read
         (n,) factor on the stiffness that is read; None: 1.
     move
         (6, 3) m by which the frame joints stand elsewhere; None: not at all.
+    shape
+        Draws what is not size; `sign` in it goes to the size.
+    varies
+        Columns of `Rows` on which the mechanics depends beside pose, direction, tool and set-up.
+    columns
+        Columns that a measurement file needs to show it.
     """
 
+    links: frozenset[str]
+    variables: frozenset[str]
     limit: float
-    shape: Callable[[Generator], Parameters]
-    links: tuple[str, ...] = ()
-    variables: tuple[str, ...] = ()
-    varies: tuple[str, ...] = ()
-    columns: tuple[str, ...] = ()
     act: Callable[[Links, CommandedRows, Unknown], Links] | None = None
     read: Callable[[Rows, Unknown], FloatArray] | None = None
     move: Callable[[Unknown], FloatArray] | None = None
+    shape: Callable[[Generator], Shape] = lambda rng: {}
+    varies: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
 
 
-class Kinds(dict[str, Kind]):
-    """Kinds by their names, which are those of the functions that make them."""
+def kind(
+    kinds: dict[str, Kind], role: str, links: str, variables: str, limit: float, **more: Any
+) -> Callable[[Physics], Physics]:
+    """Puts the function below it among the kinds, by its name; links, variables, columns stand between commas.
 
-    def add(
-        self,
-        limit: float,
-        links: str = "",
-        variables: str = "",
-        role: str = "act",
-        shape: Callable[[Generator], Parameters] = no_shape,
-        varies: str = "",
-        columns: str = "",
-    ) -> Callable[[F], F]:
-        """Enter a function as what a kind does, its `role`; texts are words between commas."""
+    `role`: `act`, `read` or `move`.
+    """
 
-        def entered(function: F) -> F:
-            link, variable, varying, needed = (
-                tuple(filter(None, text.split(","))) for text in (links, variables, varies, columns)
-            )
-            does: dict[str, Any] = {role: function}
-            self[function.__name__] = Kind(limit, shape, link, variable, varying, needed, **does)
-            return function
+    def registered(physics: Physics) -> Physics:
+        more.update({name: tuple(filter(None, more.get(name, "").split(","))) for name in ("varies", "columns")})
+        more[role] = physics
+        kinds[physics.__name__] = Kind(frozenset(links.split(",")), frozenset(variables.split(",")), limit, **more)
+        return physics
 
-        return entered
-
-
-def between(name: str, low: float, high: float) -> Callable[[Generator], Parameters]:
-    """Draws one figure, each as likely."""
-    return lambda rng: {name: float(rng.uniform(low, high))}
-
-
-def one_side(rng: Generator) -> Parameters:
-    """Whether pull or push."""
-    return {"side": float(rng.choice([-1.0, 1.0]))}
+    return registered
 
 
 def opened(pull: FloatArray) -> FloatArray:
@@ -170,21 +147,39 @@ def beyond(force: FloatArray, threshold: float) -> FloatArray:
     return np.asarray(np.maximum(0.0, 1.0 - threshold / np.maximum(np.abs(force), 1e-9)))
 
 
-def one_strut(rng: Generator) -> Parameters:
+def uniform(name: str, low: float, high: float) -> Callable[[Generator], Shape]:
+    """One number, drawn from a range."""
+    return lambda rng: {name: float(rng.uniform(low, high))}
+
+
+def one_strut(rng: Generator) -> Shape:
     """Which strut, from 0."""
     return {"strut": int(rng.integers(6))}
 
 
-def signed(rng: Generator) -> Parameters:
+def side(rng: Generator) -> Shape:
+    """Which side."""
+    return {"side": float(rng.choice([-1.0, 1.0]))}
+
+
+def signed(rng: Generator) -> Shape:
     """Which sign."""
     return {"sign": float(rng.choice([-1.0, 1.0]))}
 
 
-def with_ends(links: Links, *ends: tuple[FloatArray, FloatArray]) -> Links:
-    """Further levers (n, 3) and compliances (n,) between tool and work."""
-    return dataclasses.replace(links, ends=(*links.ends, *ends))
+def with_ends(links: Links, *ends: tuple[FloatArray, FloatArray | float]) -> Links:
+    """Further links that carry the whole load: levers (n, 3) or (3,), compliances (n,) or alike in all rows."""
+    n = len(links.struts)
+    more = (End("", np.broadcast_to(lever, (n, 3)), np.broadcast_to(give, (n,))) for lever, give in ends)
+    return dataclasses.replace(links, ends=(*links.ends, *more))
 
 
 def with_joints(links: Links, extra: Callable[[FloatArray], FloatArray]) -> Links:
     """Further secant compliance (n, 6) along the struts from their forces (n, 6)."""
     return dataclasses.replace(links, joints=lambda forces: links.joints(forces) + extra(forces))
+
+
+def with_factors(links: Links, factor: FloatArray) -> Links:
+    """Stiffnesses of the struts times (n, 6)."""
+    root = np.sqrt(factor)
+    return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.random import Generator
 
@@ -12,17 +15,25 @@ from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import (
     REACH,
     SOFT,
-    CommandedRows,
-    Kinds,
-    Parameters,
-    Unknown,
-    between,
+    Shape,
+    X,
+    Y,
+    Z,
     beyond,
-    one_side,
+    kind,
     opened,
+    side,
     signed,
+    uniform,
     with_ends,
 )
+
+if TYPE_CHECKING:
+    from toolpath_stiff.rig.unknown import CommandedRows, Kind, Unknown
+
+END_KINDS: dict[str, Kind] = {}
+act = partial(kind, END_KINDS, "act")
+read = partial(kind, END_KINDS, "read")
 
 HALF_SPAN = 0.4  # m, half the distance of a bed's feet (assumed)
 FLOOR = -0.3  # m, height about which a bed rocks that stands on a weak floor (assumed)
@@ -31,84 +42,66 @@ SUPPORTS = 0.35  # m, radius of the circle of a table's three bearings (assumed)
 SOFTENING = 1.5  # K over which a damping plate takes up its softness (assumed; the rig's shop warms by as much)
 HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
 
-
-X, Y, Z = np.eye(3)
-
-
 # A spring between tool and work in base axes may sit in the frame as well as under the table: `BASE`. Temperature
 # follows the clock of the campaign, so order and time may stand for it. What turns about an axis has one constant
 # rotational compliance, and shows as a translation that grows with the arm: both are right. A load along the
 # tangent of a circle about the axis is described by x and y as well as by the radius.
 BASE = "table,frame"
-
-END_KINDS = Kinds()
-
-
-def _azimuth(rng: Generator) -> Parameters:
-    return {"azimuth": float(rng.uniform(0.0, 2.0 * np.pi))}
+AZIMUTH = uniform("azimuth", 0.0, 2.0 * np.pi)
 
 
-def _oblique(rng: Generator) -> Parameters:
+def _oblique(rng: Generator) -> Shape:
     """Within 25 degrees of a diagonal of X and Y, in any quadrant."""
     quadrant = 0.5 * np.pi * float(rng.integers(4))
     return {"azimuth": quadrant + float(rng.uniform(np.radians(20.0), np.radians(70.0)))}
 
 
-def _horizontal(rng: Generator) -> Parameters:
+def _holds(rng: Generator) -> Shape:
+    return {**uniform("holds", 800.0, 2500.0)(rng), "setup": "riser"}
+
+
+def _horizontal(rng: Generator) -> Shape:
     return {"axis": int(rng.integers(2))}
 
 
-def _fixed(lever: FloatArray, state: CommandedRows) -> FloatArray:
-    """(n, 3) the same lever in every row."""
-    return np.broadcast_to(lever, (len(state.rows.force), 3))
-
-
-def _constant(size: float, state: CommandedRows) -> FloatArray:
-    return np.full(len(state.rows.force), size)
-
-
-def _tip(state: CommandedRows) -> FloatArray:
-    return state.place.work_point
-
-
-@END_KINDS.add(SOFT, BASE, "x")
+@act(BASE, "x", SOFT)
 def bed_sag(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A bed on two feet sags under the work: c = c0 (1 - (x / a)^2)^2 (simply supported beam, load at x: a^2 b^2)."""
-    across = np.clip(_tip(state)[:, 0] / HALF_SPAN, -1.0, 1.0)
-    return with_ends(links, (_fixed(Z, state), u.size * (1.0 - across**2) ** 2))
+    across = np.clip(state.place.work_point[:, 0] / HALF_SPAN, -1.0, 1.0)
+    return with_ends(links, (Z, u.size * (1.0 - across**2) ** 2))
 
 
-@END_KINDS.add(SOFT, BASE, "radius")
+@act(BASE, "radius", SOFT)
 def pallet_overhang(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A pallet held in its middle bends like a cantilever: c = c0 (r / R)^3 vertically."""
-    radius = np.linalg.norm(_tip(state)[:, :2], axis=1)
-    return with_ends(links, (_fixed(Z, state), u.size * (radius / REACH) ** 3))
+    radius = np.linalg.norm(state.place.work_point[:, :2], axis=1)
+    return with_ends(links, (Z, u.size * (radius / REACH) ** 3))
 
 
-@END_KINDS.add(SOFT, BASE, "z,constant", shape=_azimuth)
+@act(BASE, "z,constant", SOFT, shape=AZIMUTH)
 def floor_rocking(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The floor lets the bed rock about one horizontal axis far below the table."""
     axis = np.array([np.cos(u.shape["azimuth"]), np.sin(u.shape["azimuth"]), 0.0])
-    return with_ends(links, (np.cross(axis, _tip(state) - FLOOR * Z), _constant(u.size, state)))
+    return with_ends(links, (np.cross(axis, state.place.work_point - FLOOR * Z), u.size))
 
 
-@END_KINDS.add(SOFT, BASE, "x,y,z,constant", shape=_azimuth)
+@act(BASE, "x,y,z,constant", SOFT, shape=AZIMUTH)
 def worn_table_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One of the three bearings under the table is worn: it gives by its share of load and tilting moment.
 
     A load d at r puts on the bearing at angle p: -d_z (1/3 + 2 e.r / 3R) + (e.d) 2 z / 3R, with e towards the bearing.
     """
     toward = np.array([np.cos(u.shape["azimuth"]), np.sin(u.shape["azimuth"]), 0.0])
-    tip = _tip(state)
+    tip = state.place.work_point
     share = 1.0 / 3.0 + 2.0 / (3.0 * SUPPORTS) * tip @ toward
     lever = (2.0 / (3.0 * SUPPORTS) * tip[:, 2])[:, None] * toward - share[:, None] * Z
-    return with_ends(links, (lever, _constant(u.size, state)))
+    return with_ends(links, (lever, u.size))
 
 
-@END_KINDS.add(
-    SOFT,
+@act(
     "table",
     "setup,load",
+    SOFT,
     shape=lambda rng: {"holds": float(rng.uniform(800.0, 2500.0)), "setup": "riser"},
     varies="force",
     columns="force_N,setup",
@@ -117,37 +110,37 @@ def fixture_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The fixture of one set-up holds by friction: beyond it the work gives sideways."""
     sideways = state.rows.force * np.linalg.norm(state.rows.direction[:, :2], axis=1)
     give = u.size * beyond(sideways, u.shape["holds"]) * (state.rows.setup == u.shape["setup"])
-    return with_ends(links, (_fixed(X, state), give), (_fixed(Y, state), give))
+    return with_ends(links, (X, give), (Y, give))
 
 
-@END_KINDS.add(SOFT, BASE, "temperature,order", varies="temperature", columns="temperature_C")
+@act(BASE, "temperature,order", SOFT, varies="temperature", columns="temperature_C")
 def damping_plate(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A polymer plate under the table softens in shear as the shop warms up."""
     give = u.size * np.maximum(state.rows.warmth, 0.0) / SOFTENING
-    return with_ends(links, (_fixed(X, state), give), (_fixed(Y, state), give))
+    return with_ends(links, (X, give), (Y, give))
 
 
-@END_KINDS.add(SOFT, BASE, "order", shape=between("after", 0.3, 0.7), varies="elapsed")
+@act(BASE, "order", SOFT, shape=uniform("after", 0.3, 0.7), varies="elapsed")
 def clamp_loosened(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A clamp of the table came loose in the middle of the campaign: from then on it gives sideways."""
     give = np.where(state.rows.elapsed > u.shape["after"], u.size, 0.0)
-    return with_ends(links, (_fixed(X, state), give), (_fixed(Y, state), give))
+    return with_ends(links, (X, give), (Y, give))
 
 
-@END_KINDS.add(4 * SOFT, BASE, "z,constant", shape=_horizontal)
+@act(BASE, "z,constant", 4 * SOFT, shape=_horizontal)
 def portal_bending(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The portal that carries the frame bends about a horizontal axis at its knee: the lower the tip, the more."""
-    arm = _tip(state) - KNEE * Z
-    return with_ends(links, (np.cross(np.eye(3)[u.shape["axis"]], arm), _constant(u.size, state)))
+    arm = state.place.work_point - KNEE * Z
+    return with_ends(links, (np.cross(np.eye(3)[u.shape["axis"]], arm), u.size))
 
 
-@END_KINDS.add(30 * SOFT, BASE, "radius,x,y,constant")
+@act(BASE, "radius,x,y,constant", 30 * SOFT)
 def frame_twist(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The frame twists about the machine's axis: a load along the tangent at radius r gives c r^2."""
-    return with_ends(links, (np.cross(Z, _tip(state)), _constant(u.size, state)))
+    return with_ends(links, (np.cross(Z, state.place.work_point), u.size))
 
 
-@END_KINDS.add(SOFT, "tool", "force sign,direction,tilt", shape=one_side, varies="force")
+@act("tool", "force sign,direction,tilt", SOFT, shape=side, varies="force")
 def spindle_thrust(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The spindle's bearings lose their preload when the tool is pulled, or pushed: it then gives, radially first."""
     tool = state.place.rotation[:, :, 2]
@@ -158,16 +151,16 @@ def spindle_thrust(links: Links, state: CommandedRows, u: Unknown) -> Links:
     )
 
 
-@END_KINDS.add(SOFT, "platform,tool", "constant", shape=_oblique)
+@act("platform,tool", "constant", SOFT, shape=_oblique)
 def spindle_flange(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A screw of the spindle's flange is loose: the spindle rocks in the platform about one oblique axis of it."""
     across = np.cos(u.shape["azimuth"]) * state.place.rotation[:, :, 0]
     across = across + np.sin(u.shape["azimuth"]) * state.place.rotation[:, :, 1]
     longer = 1.0 + state.rows.extension / max(state.nominal.tool_length, 1e-3)
-    return with_ends(links, (longer[:, None] * across, _constant(u.size, state)))
+    return with_ends(links, (longer[:, None] * across, u.size))
 
 
-@END_KINDS.add(SOFT, "tool", "load", shape=between("opens", 800.0, 2500.0), varies="force", columns="force_N")
+@act("tool", "load", SOFT, shape=uniform("opens", 800.0, 2500.0), varies="force", columns="force_N")
 def taper_opening(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The tool holder's taper opens beyond a bending moment, with a longer tool sooner; then the tool tilts in it."""
     tool = state.place.rotation[:, :, 2]
@@ -177,14 +170,14 @@ def taper_opening(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_ends(links, (state.place.rotation[:, :, 0], give), (state.place.rotation[:, :, 1], give))
 
 
-@END_KINDS.add(1.0, "instrument", "z", role="read")
+@read("instrument", "z", 1.0)
 def indicator_stand(rows: Rows, u: Unknown) -> FloatArray:
     """A tall indicator stand gives way: sideways deflections are read too large, by the square of the height."""
     sideways = np.linalg.norm(rows.direction[:, :2], axis=1)
     return np.asarray(1.0 / (1.0 + u.size * sideways * rows.position[:, 2] ** 2))
 
 
-@END_KINDS.add(1.0, "instrument", "order,load", role="read", columns="force_N,time_min")
+@read("instrument", "order,load", 1.0, columns="force_N,time_min")
 def load_cell_hysteresis(rows: Rows, u: Unknown) -> FloatArray:
     """A load cell remembers a larger load of the same clamping just before: too high by a share of the drop."""
     before = np.concatenate([[0.0], rows.force[:-1]])
@@ -193,13 +186,13 @@ def load_cell_hysteresis(rows: Rows, u: Unknown) -> FloatArray:
     return np.asarray(1.0 + u.size * drop / max(float(rows.force.max()), 1.0))
 
 
-@END_KINDS.add(0.6, "instrument", "load", role="read", shape=signed, columns="force_N")
+@read("instrument", "load", 0.6, shape=signed, columns="force_N")
 def load_cell_curve(rows: Rows, u: Unknown) -> FloatArray:
     """A load cell that is not linear: its error grows with the load."""
     return np.asarray(1.0 + u.size * (rows.force - 500.0) / 4000.0)
 
 
-@END_KINDS.add(0.6, "instrument", "y,load", role="read", shape=signed, columns="force_N")
+@read("instrument", "y,load", 0.6, shape=signed, columns="force_N")
 def hose_pull(rows: Rows, u: Unknown) -> FloatArray:
     """A hose pulls along Y the more, the further it is drawn out in y: it counts most where the load is small."""
     return np.asarray(
@@ -207,13 +200,13 @@ def hose_pull(rows: Rows, u: Unknown) -> FloatArray:
     )
 
 
-@END_KINDS.add(12.0, "instrument", "tilt", role="read")
+@read("instrument", "tilt", 12.0)
 def cosine_error(rows: Rows, u: Unknown) -> FloatArray:
     """An indicator that tilts with the tool reads too little: cosine of the tilt, to a power for its lever."""
     return np.asarray(rotations(rows.angles)[:, 2, 2] ** -u.size)
 
 
-@END_KINDS.add(0.6, "instrument", "temperature,order", role="read", shape=signed, columns="temperature_C")
+@read("instrument", "temperature,order", 0.6, shape=signed, columns="temperature_C")
 def warm_indicator(rows: Rows, u: Unknown) -> FloatArray:
     """An indicator whose amplification drifts with the temperature."""
     return np.asarray(np.maximum(1.0 + u.size * rows.warmth / SOFTENING, 0.1))
