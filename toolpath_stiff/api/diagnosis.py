@@ -326,7 +326,7 @@ def diagnose(
     >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
     (['diagnose.json', 'residuals.csv'], 6)
     """
-    from toolpath_stiff.diagnosis.diagnose import choice_on_path
+    from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
     from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
     from toolpath_stiff.placement.case_study import case_study_program
 
@@ -340,10 +340,10 @@ def diagnose(
         temperature=question.on.temperature_C,
         seed=seed or None,
     )
+    tell = teller(progress)
     diagnosis = replace(
-        diagnose_readings(
-            question.model, question.readings, names=question.files, progress=teller(progress), **question.common
-        ),
+        with_plan(diagnose_readings(question.model, question.readings, progress=tell, **question.common), tell),
+        names=question.files,
         line=question.request.command("diagnose", *circumstances, *(part.words if part else ())),
         asked=question.request,
         inputs=(*question.inputs, *(part.inputs if part else ())),
