@@ -139,14 +139,8 @@ def draft_effect(
     if name in known_effects(question.on.effect_files):
         raise InputError(f"effect {name} exists already", hint="give the draft another file name")
     diagnosis = replace(
-        diagnose(
-            question.model,
-            question.readings,
-            plan_next=False,
-            names=question.files,
-            progress=teller(progress),
-            **question.common,
-        ),
+        diagnose(question.model, question.readings, progress=teller(progress), **question.common),
+        names=question.files,
         line=question.request.command("diagnose", *options(seed=seed or None)),
         asked=question.request,
         inputs=question.inputs,
