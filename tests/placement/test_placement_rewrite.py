@@ -13,7 +13,7 @@ import pytest
 import toolpath_stiff as tps
 from tests.nc import rs274
 from tests.placement.rewriting import assert_same_path
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine

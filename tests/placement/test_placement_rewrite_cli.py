@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.placement.test_placement_search import headline_figures
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import read_program
