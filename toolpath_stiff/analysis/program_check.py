@@ -23,7 +23,8 @@ from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.path import BLOCK, Samples, move_durations, place, sample_moves
+from toolpath_stiff.path.placing import place
+from toolpath_stiff.path.sampling import BLOCK, Samples, move_durations, sample_moves
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
