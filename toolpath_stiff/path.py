@@ -22,7 +22,7 @@ from toolpath_stiff.column_files import csv_pieces
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
+from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves, held_once
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import along_tool_axis, roll_pitch_yaw, rotation_about_z, rotation_matrices

@@ -19,8 +19,8 @@ from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import check_by
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches
+from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.findings import ERROR, WARNING, Checked, Finding
-from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.nc.operations import find_operations
 from toolpath_stiff.nc.request import ZERO
