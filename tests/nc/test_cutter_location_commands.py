@@ -14,8 +14,8 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import DIALECTS, Controller
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
-from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.reader import parse_program, read_program

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.nc.cutter_location import MM, START, read, refused
-from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.path.sampling import sample_moves
 

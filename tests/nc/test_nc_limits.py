@@ -27,7 +27,7 @@ HEAD = "G21 G90 F600\nG1 X5\n"
         ("G2 X1 Y0 R1e300", "3:10", "beyond any number"),
         ("G81 X1 Z-1 R1e308", "3:12", "beyond any number"),
         ("G1 X1 F1e308", "3:7", "beyond any number"),
-        ("G1 X1 F1e-320", "3:7", "slower than a nanometre a minute"),
+        ("G1 X1 F1e-320", "3:7", "no feed that moves"),
         ("G95 S1e-9 F1\nG1 X1", "4:1", "with the spindle at S1e-09"),
         ("G10 L1 P99999999999999999999 Z1", "3:8", "beyond any number"),
         ("G43 H99999999999999999999", "3:5", "beyond any number"),

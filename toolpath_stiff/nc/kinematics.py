@@ -164,7 +164,9 @@ def _axis(toml: TomlReader, where: str, given: object, turns: str, tcp: bool) ->
     known = ("letter", "axis", "reversed", "rollover", place)
     part = toml.table(where, given, f"a table [{where}] with {', '.join(known)}")
     toml.only(where, part, known)
-    letter = toml.choice(f"{where}.letter", toml.needed(where, part, "letter", "A, B or C"), tuple(LETTERS), "A, B or C")
+    letter = toml.choice(
+        f"{where}.letter", toml.needed(where, part, "letter", "A, B or C"), tuple(LETTERS), "A, B or C"
+    )
     point = None
     if place in part:
         x, y, z = _vector(toml, f"{where}.{place}", part[place])

@@ -16,7 +16,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
+from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves, held_once
 from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.rotations import along_tool_axis

@@ -12,7 +12,7 @@ from __future__ import annotations
 from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number
-from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling
+from toolpath_stiff.nc.strokes import MOST_STROKES, Drilling
 from toolpath_stiff.units import SECONDS_PER_DAY
 
 # The first word of a cycle, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip

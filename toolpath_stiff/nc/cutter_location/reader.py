@@ -83,7 +83,7 @@ def run(state: CutterLocationState, lines: tuple[str, ...], most_errors: int = 1
     """Execute all lines in order, from what is in force in `state`, up to so many errors, which are returned."""
     index, errors = 0, list[InputError]()
     while index < len(lines) and not state.ended and len(errors) < most_errors:
-        if len(state.recorder.line) > PACKED_AT:
+        if len(state.recorder.recent) > PACKED_AT:
             state.recorder.pack()
         here = index
         statement: MajorStatement | None = MajorStatement(here + 1, 1, "GOTO")

@@ -12,12 +12,14 @@ from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.hints import both_names
+from toolpath_stiff.nc.courses import point_on_arc
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, dot, minus
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
-from toolpath_stiff.nc.geometry import Drilling, Vector, point_on_arc, strokes
-from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Recorder, ToolUse
+from toolpath_stiff.nc.geometry import Vector
+from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Move, Recorder, ToolUse
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.strokes import Drilling, strokes
 from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry, tool_of
 
 FIRST_POINT = "the path begins at the file's first point; where the tool comes from is not given (no FROM)"
@@ -241,8 +243,9 @@ def _add(
 ) -> None:
     assert state.point is not None
     start = [*state.point, *state.angles, 0.0]
-    tool, line = state.tool, state.statement.line
-    added = state.recorder.add(line, motion, start, [*end, *angles, 0.0], feed, tool, state.tool_length, NOT_MOVED, arc)
+    tool, there = state.tool, [*end, *angles, 0.0]
+    move = Move(state.statement.line, motion, start, there, feed, tool, state.tool_length, NOT_MOVED, arc)
+    added = state.recorder.add(move)
     state.point, state.angles = end, angles
     if added and tool not in state.used_tools:  # the tool table wins over the file
         entry = tool_of(state.tools, tool)
