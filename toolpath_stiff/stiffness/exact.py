@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import EffectError, InputError, PoseError
+from toolpath_stiff.errors import EffectError, PoseError
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.stiffness.possible import at_pose, possible, refuse_struts_without_stiffness
@@ -372,17 +372,12 @@ def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wren
     problem = SharedLoad(compliance, part.struts.jacobian, parallel[regular], wrench, part.force)
     forces, settled = settle(problem, part.strut_forces)
     if not settled.all():
-        raise _unsettled(model, part, int(np.argmin(settled)))
+        row = int(np.argmin(settled))
+        names = ", ".join(effect.name for effect in _acting(model) if effect.load_dependent)
+        raise EffectError(
+            f"the strut forces do not settle{at_pose(part, row)} under {part.force[row]:g} N with {names}",
+            expected="a stretch of each strut that grows with its force",
+        )
     everywhere = np.full((len(loaded), 6), np.nan)
     everywhere[regular] = forces
     return replace(loaded, strut_forces=everywhere)
-
-
-def _unsettled(model: StiffnessModel, path: LoadPath, row: int) -> InputError:
-    x, y, z = (mm_from_m(float(v)) for v in path.position[row])
-    names = ", ".join(active.effect.name for active in model.effects if active.effect.load_dependent)
-    return EffectError(
-        f"the strut forces do not settle at X{x:.1f} Y{y:.1f} Z{z:.1f} (mm) under {path.force[row]:g} N with {names}",
-        expected="a stretch of each strut that grows with its force",
-        hint="check the parameters of these effects",
-    )
