@@ -138,10 +138,10 @@ def test_regions_by_option_by_file_and_from_python_are_the_same(slot, capsys):
         (["--region", "a:0,0"], "expected NAME:X,Y,Z"),
         (["--region", "a:0,0,1e9"], "region a"),
         (["--regions", "none.csv"], "none.csv"),
-        (["--regions", "two.csv"], "two.csv:3: region a stands twice"),
-        (["--regions", "short.csv"], "short.csv:1: column z_mm is missing"),
+        (["--regions", "two.csv"], "two.csv:3: region a: a, 0, 0, 900"),
+        (["--regions", "short.csv"], "short.csv:2: region a: a, 0, 0"),
         (["--regions", "word.csv"], "word.csv:2: "),
-        (["--regions", "turn.csv"], "turn.csv:2: region a: a cell is no finite number"),
+        (["--regions", "turn.csv"], "turn.csv:2: region a: a, 0, 0, 800, nan"),
         (["--regions", "empty.csv"], "empty.csv"),
     ],
 )

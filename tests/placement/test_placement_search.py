@@ -25,12 +25,11 @@ from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
-from toolpath_stiff.placement.fronts import front_rows, thin
 from toolpath_stiff.placement.goals import Bounds, Goal, SearchRules
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import placed_path, representative_path, work_path
 from toolpath_stiff.placement.result import nothing_better_words
-from toolpath_stiff.placement.search import search_placements
+from toolpath_stiff.placement.search import front_rows, search_placements, thin
 from toolpath_stiff.placement.task import SearchRecord
 from toolpath_stiff.placement.working import Search
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -339,7 +338,7 @@ def test_nothing_better_is_said_first_with_how_hard_it_was_looked_for():
     close = Bounds(at, at + np.array([0, 0, 1e-9, 0, 0, 0]))
     found = search_placements(Search(MODEL, path, TANGENTIAL, close, present=at))
     assert found.alone and found.searches == 3
-    told = nothing_better_words(SearchRecord("", "", {}, 1, (), found.pose_evaluations, found.searches))
+    told = nothing_better_words(SearchRecord({}, 1, (), found.pose_evaluations, found.searches, True))
     assert f"3 searches from the beginning, {found.pose_evaluations} poses" in told
 
 

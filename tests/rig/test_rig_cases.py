@@ -12,8 +12,9 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.case import clamp_of, draw_case, effects_of_layout, make_case, rows_of
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text
-from toolpath_stiff.rig.hidden import OUTSIDE, Nuisances, disturb_readings
+from toolpath_stiff.rig.hidden import Nuisances, disturb_readings
 from toolpath_stiff.rig.nominal import load_nominal, reachable
+from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
 from toolpath_stiff.rig.sizes import NuisanceCovariance
 
 NIST = load_nominal("nist")
@@ -57,7 +58,7 @@ def test_tilted_poses_are_within_the_machines_limits(seed):
     assert reachable(NIST, rows.position, rows.angles, rows.extension).all()
 
 
-@pytest.mark.parametrize("name", [*CATALOGUE, *OUTSIDE])
+@pytest.mark.parametrize("name", [*CATALOGUE, *ODDITIES, *ODDITIES_IN_TIME])
 def test_every_effect_shows_at_the_size_asked_for(name):
     """A change of 5 % rms, or less where the effect's bound is nearer; the data do change."""
     rows, truth = make_case(2, "tilted", name, size=0.05, nuisances=Nuisances.none())

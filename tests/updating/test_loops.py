@@ -352,7 +352,7 @@ def test_the_next_pose_is_another_one_until_it_is_settled(step_by_step, tmp_path
 
 def test_next_says_what_it_needs(tmp_path, capsys):
     assert main(["plan", "--next", str(tmp_path)]) == 2
-    assert "folder of a plan" in capsys.readouterr().err
+    assert "no table of a plan" in capsys.readouterr().err
     (tmp_path / TABLES).write_bytes(b"nothing")
     assert main(["plan", "--next", str(tmp_path)]) == 2
     assert "no table of a plan" in capsys.readouterr().err

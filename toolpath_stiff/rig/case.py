@@ -20,8 +20,6 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE, with_effect
 from toolpath_stiff.rig.hidden import (
-    ODDITIES,
-    OUTSIDE,
     HiddenMachine,
     Nuisances,
     disturb_machine,
@@ -31,9 +29,10 @@ from toolpath_stiff.rig.hidden import (
 )
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
+from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
 from toolpath_stiff.rig.sizes import scale_of
-from toolpath_stiff.rig.unknowns import UNKNOWNS
+from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 # How often a blind draw hides what, where nothing is said (assumed).
@@ -175,7 +174,7 @@ def draw_case(
             effects.append({"effect": name, "parameters": parameters, **strength, **_looks(name)})
     true = disturb_machine(true, nuisances, streams["machine"])
     measured = measure(nominal, true, table, rows, nuisances, streams["noise"], stated_sd=layout == "paper")
-    outside = any(name in (*OUTSIDE, *UNKNOWNS) for name in names)
+    outside = any(name in OUTSIDE for name in names)
     truth = {
         "hidden": list(names),
         "kind": "outside" if outside else ("none", "one", "two", "three")[min(len(names), 3)],
@@ -248,7 +247,7 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
     if hidden == "unknown":
         return (str(rng.choice([name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)])),)
     if hidden == "outside":
-        return (str(rng.choice(list(ODDITIES) if layout == "paper" else list(OUTSIDE))),)
+        return (str(rng.choice([*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME)])),)
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
     _check_named(names, table)
     return names
@@ -256,14 +255,14 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
 
 def _check_named(names: Sequence[str], table: Table) -> None:
     """Raise `InputError` for names that are unknown, cannot be together, or need a column that is missing."""
-    all_names = (*CATALOGUE, *OUTSIDE, *UNKNOWNS)
+    all_names = (*CATALOGUE, *OUTSIDE)
     for name in names:
         if name not in all_names:
             raise InputError(
                 f"nothing called {name!r} to hide",
                 expected=f"none, one, two, three, outside, unknown, or of {', '.join(all_names)}",
             )
-    if len(set(names)) < len(names) or sum(name in (*OUTSIDE, *UNKNOWNS) for name in names) > 1:
+    if len(set(names)) < len(names) or sum(name in OUTSIDE for name in names) > 1:
         raise InputError(
             f"hidden effects {', '.join(names)}", expected="each once, and at most one outside the catalogue"
         )

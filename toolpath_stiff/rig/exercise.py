@@ -30,10 +30,11 @@ from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, again, clamp_of, draw_case
 from toolpath_stiff.rig.effects import CATALOGUE
-from toolpath_stiff.rig.hidden import LOOP_PATTERN, LOOP_WORDS, OUTSIDE, HiddenMachine, Nuisances, Oddity
+from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
+from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
 from toolpath_stiff.rig.unknown import Unknown
-from toolpath_stiff.rig.unknowns import UNKNOWNS
+from toolpath_stiff.rig.unknowns import OUTSIDE
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 MAGIC = b"tps-rig-sealed-1\n"
@@ -90,8 +91,6 @@ def seal(case: DrawnCase, seed: int, layout: str) -> bytes:
         field.name: value.tolist() if isinstance(value := getattr(case.machine, field.name), np.ndarray) else value
         for field in dataclasses.fields(case.machine)
     }
-    if case.machine.oddity is not None:
-        machine["oddity"] = dataclasses.asdict(case.machine.oddity)
     if case.machine.unknown is not None:
         machine["unknown"] = dataclasses.asdict(case.machine.unknown)
     content = {
@@ -128,9 +127,7 @@ def unseal(file: str | Path) -> tuple[DrawnCase, dict[str, Any]]:
     sealed: dict[str, Any] = json.loads(zlib.decompress(body[4 : 4 + int.from_bytes(body[:4], "big")]))
     machine: dict[str, Any] = {k: np.array(v) if isinstance(v, list) else v for k, v in sealed["machine"].items()}
     machine["spindle"] = tuple(sealed["machine"]["spindle"])
-    if sealed["machine"]["oddity"] is not None:
-        machine["oddity"] = Oddity(**sealed["machine"]["oddity"])
-    if sealed["machine"].get("unknown") is not None:
+    if machine["unknown"] is not None:
         machine["unknown"] = Unknown(**sealed["machine"]["unknown"])
     nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
     case = DrawnCase({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"]))
@@ -152,7 +149,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
     claimed = set(claim) - set(SOUND)
     truth = set(hidden)
     if claimed & set(OTHER):
-        claimed = (claimed - set(OTHER)) | ((truth & {*OUTSIDE, *UNKNOWNS}) or {"outside"})
+        claimed = (claimed - set(OTHER)) | ((truth & set(OUTSIDE)) or {"outside"})
     if not truth:
         return "wrong" if claimed else "correctly none"
     if claimed == truth:
@@ -335,7 +332,7 @@ def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
     """What was hidden, and how the claim scores: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
-    known = (*SOUND, *OTHER, *CATALOGUE, *OUTSIDE, *UNKNOWNS)
+    known = (*SOUND, *OTHER, *CATALOGUE, *OUTSIDE)
     for name in claims:
         if name not in known:
             raise InputError(f"a claim {name!r}", expected=f"one or several of {', '.join(known)}")
