@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.stiffness import effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect
 from toolpath_stiff.stiffness.declarations import check_declarations
@@ -203,10 +203,8 @@ class EffectCatalogue(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row an effect: link of the load path, name, title, equation, source."""
-        import pandas as pd
-
         columns = ["link", "name", "title", "equation", "source", "load_dependent"]
-        return pd.DataFrame(self.to_dict()["effects"])[columns]
+        return frame_of(self.to_dict()["effects"])[columns]
 
     def _short(self) -> str:
         return f"{len(self.effects)} effects"

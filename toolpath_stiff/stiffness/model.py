@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 import shlex
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
@@ -336,7 +337,7 @@ def conditions_stated(model: StiffnessModel) -> list[str]:
     return stated + [str(idle) for idle in idle_effects(model) if not idle.waiting]
 
 
-def effects_stated(model: StiffnessModel) -> dict[str, Any]:
+def effects_stated(model: StiffnessModel) -> Document:
     """The entries of a result's JSON: what acts, what does not and why, under which set-up and temperature."""
     return {
         "effects": acting_names(model),
@@ -346,7 +347,7 @@ def effects_stated(model: StiffnessModel) -> dict[str, Any]:
     }
 
 
-def machine_words(document: Mapping[str, Any]) -> str:
+def machine_words(document: Document) -> str:
     """The machine of a result, what acts on it, the set-up: "nist with setup_compliance, set-up riser"."""
     effects = document.get("effects") or []
     parts = [f"{document.get('machine') or '-'}" + (f" with {', '.join(map(str, effects))}" if effects else "")]

@@ -5,10 +5,10 @@ The terms of a file are one effect; those of the geometry and those of readings 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 from toolpath_stiff.stiffness.declarations import NAME, wrong_in
@@ -56,7 +56,7 @@ def constant_key(name: str, variable: str) -> tuple[str, float]:
     return (f"{name}_{unit}", si) if unit and name not in PLAIN else (name, 1.0)
 
 
-def entry_of(term: Term, size: str, meaning: str) -> dict[str, Any]:
+def entry_of(term: Term, size: str, meaning: str) -> Document:
     """A term as an entry of a file, in the order of its keys."""
     parameter = size_parameter(term.action, size, meaning)
     bounds, typical = _range_keys(parameter)
@@ -67,7 +67,7 @@ def entry_of(term: Term, size: str, meaning: str) -> dict[str, Any]:
     return {**entry, **more, "along": term.direction, **_shape_entry(term), **ranges, **times}
 
 
-def _shape_entry(term: Term) -> dict[str, Any]:
+def _shape_entry(term: Term) -> Document:
     of = {"of": term.column} if term.column else {}
     constants = {}
     for name, value in term.at:
@@ -108,7 +108,7 @@ def effects_of_terms(file: str) -> dict[str, Effect]:
     }
 
 
-def _entry(toml: TomlReader, where: str, row: Mapping[str, Any]) -> tuple[Term, Parameter]:
+def _entry(toml: TomlReader, where: str, row: Document) -> tuple[Term, Parameter]:
     """One entry, checked."""
     _choice(toml, where, row, "name", ("term",))
     link = _choice(toml, where, row, "link", LINKS)
@@ -125,11 +125,11 @@ def _entry(toml: TomlReader, where: str, row: Mapping[str, Any]) -> tuple[Term, 
     return term, parameter
 
 
-def _choice(toml: TomlReader, where: str, row: Mapping[str, Any], key: str, choices: Sequence[str]) -> str:
+def _choice(toml: TomlReader, where: str, row: Document, key: str, choices: Sequence[str]) -> str:
     return toml.choice(f"{where}.{key}", row.get(key), choices, f"one of {', '.join(choices)}")
 
 
-def _parameter(toml: TomlReader, where: str, row: Mapping[str, Any], action: str) -> Parameter:
+def _parameter(toml: TomlReader, where: str, row: Document, action: str) -> Parameter:
     """The size, with what it may be."""
     size, meaning = (_text(toml, f"{where}.{key}", row.get(key)) for key in ("size", "meaning"))
     usual = size_parameter(action, size, meaning)
@@ -141,9 +141,7 @@ def _parameter(toml: TomlReader, where: str, row: Mapping[str, Any], action: str
     return parameter
 
 
-def _shape(
-    toml: TomlReader, where: str, row: Mapping[str, Any], action: str, of: str
-) -> tuple[str, str, Constants, str]:
+def _shape(toml: TomlReader, where: str, row: Document, action: str, of: str) -> tuple[str, str, Constants, str]:
     """Variable, shape, constants and column of an action; "" for a second variable, which is one `of` the first's."""
     by_strut = of in (*IN_SERIES, "turning")
     seen = [name for name in SEEN if by_strut or name not in (*OF_FORCES, "strut length")]
@@ -171,7 +169,7 @@ def _shape(
     return variable, shape, values, column
 
 
-def _place(toml: TomlReader, where: str, row: Mapping[str, Any], action: str) -> int | None:
+def _place(toml: TomlReader, where: str, row: Document, action: str) -> int | None:
     """Number of the strut or of the vertex; None: all of them."""
     number = row.get("where")
     needed = action == "joint offset" or row["link"] == "one strut"

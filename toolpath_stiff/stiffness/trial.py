@@ -19,7 +19,7 @@ from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ADDING, ActiveEffect
@@ -288,10 +288,8 @@ class EffectCheck(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a check."""
-        import pandas as pd
-
         rows = [{"effect": t["effect"], **check} for t in self.to_dict()["effects"] for check in t["checks"]]
-        return pd.DataFrame(rows)
+        return frame_of(rows)
 
     def __str__(self) -> str:
         return str(self.view.trials_text(self))

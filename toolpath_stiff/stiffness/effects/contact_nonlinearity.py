@@ -25,7 +25,7 @@ class ContactNonlinearity(Effect):
     source = "Hertz (1882), point contact: approach grows as F^(2/3)"
     load_dependent = True
     needs = ("force_N",)
-    told = (
+    clause = (
         "the contacts in the joints of a strut give way by about {compliance} nm/N at "
         f"{REFERENCE_FORCE:g} N, less under more load"
     )

@@ -25,7 +25,7 @@ class JointClearance(Effect):
     source = "secant through a gap, taken up in full by any load"
     load_dependent = True
     needs = ("force_N",)
-    told = "every strut moves about {lost_motion} um to each side before it carries its load"
+    clause = "every strut moves about {lost_motion} um to each side before it carries its load"
     parameters = (
         Parameter(
             name="lost_motion",

@@ -19,7 +19,7 @@ class JointCompliance(Effect):
     link = "joints"
     equation = "c_i += c_j"
     source = "springs in series"
-    told = "joints and nut of every strut give way by about {compliance} nm/N"
+    clause = "joints and nut of every strut give way by about {compliance} nm/N"
     parameters = (
         compliance(
             "compliance",

@@ -21,7 +21,7 @@ class PlatformRadiusError(Effect):
     equation = "P_i += e (P_ix, P_iy, 0) / |(P_ix, P_iy)|"
     source = "geometry"
     unknown_to_control = True
-    told = "the platform's joints stand about {error} mm further {error:out/in} than in the machine file"
+    clause = "the platform's joints stand about {error} mm further {error:out/in} than in the machine file"
     parameters = (
         length_error(
             typical=(-3.0, 3.0),

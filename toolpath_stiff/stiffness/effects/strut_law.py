@@ -19,7 +19,7 @@ class StrutLawCurvature(Effect):
     link = "struts"
     equation = "k(L) = k_linear(L) exp(q (1 - x^2)), x = (2 L - L_1 - L_2) / (L_2 - L_1)"
     source = "lowest-order deviation from the paper's equation 5 that leaves both its constants as they are"
-    told = (
+    clause = (
         "midway between the strut law's two lengths struts are about {curvature} % {curvature:stiffer/softer} than on "
         "its straight line"
     )

@@ -17,7 +17,7 @@ class ThermalDrift(Effect):
     equation = "F / k_read = F / k + rate time"
     source = "growth of the loop between work and tip at a constant rate"
     needs = ("time_min",)
-    told = "the indicator drifts by about {rate} um/min towards {rate:larger/smaller} deflection while it is read"
+    clause = "the indicator drifts by about {rate} um/min towards {rate:larger/smaller} deflection while it is read"
     parameters = (
         Parameter(
             name="rate",

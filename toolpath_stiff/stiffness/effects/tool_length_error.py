@@ -17,7 +17,7 @@ class ToolLengthError(Effect):
     equation = "r_i += R (0, 0, e), tip -= R (0, 0, e): the struts stay, their arms about the tip grow"
     source = "geometry"
     unknown_to_control = True
-    told = "the tool is about {error} mm {error:longer/shorter} than the length that was entered"
+    clause = "the tool is about {error} mm {error:longer/shorter} than the length that was entered"
     parameters = (
         length_error(
             typical=(-10.0, 10.0),
