@@ -182,17 +182,13 @@ def _strut_law(toml: MachineToml, values: dict[str, Any], travel: dict[str, Any]
         mistake = f": {len(stiffnesses)} stiffnesses, but {len(lengths)} lengths"
         raise fault("stiffness_N_per_um", mistake, f"{len(lengths)} numbers, one for each length")
     lengths = m_from_mm(lengths)
+    steps = np.diff(lengths) if len(lengths) > 2 else np.abs(np.diff(lengths))
+    if (steps < CLOSEST_LENGTHS).any():
+        before, after = mm_from_m(lengths[int(np.argmin(steps)) :][:2]).tolist()
+        expected = "lengths 0.001 mm apart or more, those of a table rising"
+        raise fault("length_mm", f": {after:g} comes after {before:g}", expected)
     if len(lengths) > 2:
-        bad = np.flatnonzero(np.diff(lengths) < CLOSEST_LENGTHS)
-        if len(bad):
-            before, after = (float(mm_from_m(v)) for v in lengths[bad[0] : bad[0] + 2])
-            mistake = f": {after:g} comes after {before:g} (number {bad[0] + 2})"
-            raise fault("length_mm", mistake, "lengths of a table rising, 0.001 mm apart or more")
         return StrutLaw.table(lengths, stiffnesses)
-    if lengths[0] == lengths[1]:
-        raise fault("length_mm", ": both lengths are equal", "two lengths apart")
-    if abs(lengths[1] - lengths[0]) < CLOSEST_LENGTHS:
-        raise fault("length_mm", ": the lengths are all but equal", "two lengths 0.001 mm apart")
     return StrutLaw(float(lengths[0]), float(stiffnesses[0]), float(lengths[1]), float(stiffnesses[1]))
 
 

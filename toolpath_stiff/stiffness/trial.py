@@ -79,16 +79,15 @@ def refuse_failing(effects: Iterable[Effect], machine: Hexapod, machine_name: st
     """Raise `InputError` for the first effect from outside the package that fails on a machine, which it names."""
     for effect in effects:
         if reason := failure(effect, machine):
-            file = file_of(effect)
-            check = command_line("effects", "check", file, *options(machine=machine_name))
+            check = command_line("effects", "check", file_of(effect), *options(machine=machine_name))
             hint = f"`{check}` says more; with {ALLOW} (allow_unchecked_effects=True) it is used all the same"
-            raise EffectError(f"effect {effect.name} {reason}", file=file, hint=hint)
+            raise EffectError(f"effect {effect.name} {reason}", file=file_of(effect), hint=hint)
 
 
 def failures(effects: Iterable[Effect], machine: Hexapod) -> list[str]:
     """What results say of effects that were used although they fail."""
-    reasons = {effect.name: failure(effect, machine) for effect in effects}
-    return [f"UNCHECKED effect {name} ({ALLOW}): it {reason}" for name, reason in reasons.items() if reason]
+    reasons = ((effect.name, failure(effect, machine)) for effect in effects)
+    return [f"UNCHECKED effect {name} ({ALLOW}): it {reason}" for name, reason in reasons if reason]
 
 
 def failure(effect: Effect, machine: Hexapod) -> str:
