@@ -189,5 +189,5 @@ def test_an_unknown_is_claimed_as_outside_the_catalogue_or_by_its_name() -> None
 
 def test_the_seal_keeps_an_unknown(tmp_path) -> None:
     case = draw_case(3, "paper", "worn_table_bearing")
-    (tmp_path / "sealed.bin").write_bytes(seal(case, 3, "paper"))
+    (tmp_path / "sealed.bin").write_bytes(seal(case))
     assert unseal(tmp_path / "sealed.bin")[0].machine.unknown == case.machine.unknown

@@ -173,7 +173,9 @@ def plan(
             if verdict == "described":
                 notes.append("the answer is only described: the plan goes where it would show, or fail")
             elif verdict != "ambiguous":
-                notes.append(f"the diagnosis is settled ({verdict}): the plan puts it to the test")
+                notes.append(
+                    f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next"
+                )
         planned_for, errors = (scatter.typical_repeat, scatter.clamping), errors_so_far(problem, rivals)
     choice = plan_measurements(
         machine, rivals, planned_for, PLAN_POSES if n is None else n, menu=menu, seed=seed,

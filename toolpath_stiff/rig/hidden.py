@@ -284,8 +284,3 @@ def disturb_readings(stiffness: FloatArray, clamps: IntArray, nuisances: Nuisanc
         return np.asarray(shown)
     printed = np.round(n_per_mm_from_n_per_m(shown) / PRINTED_N_PER_MM) * PRINTED_N_PER_MM
     return np.asarray(n_per_m_from_n_per_mm(printed))
-
-
-def reading_sd(stiffness: FloatArray, nuisances: Nuisances) -> FloatArray:
-    """(n,) N/m, one reading's standard deviation, re-clamping included, as an experimenter would state it."""
-    return np.asarray(stiffness * np.hypot(nuisances.repeat, nuisances.clamping))

@@ -6,7 +6,6 @@ elongation of a strut, so that nothing is derived: the give of a joint, a vertex
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
 
 TIP = ("", "tip")
-LOOP_PATTERN = re.compile(
+LOOP_PATTERN = (
     r"|tip|spindle|platform|table|strut [1-6]( alone)?|joint [1-6]( (platform|frame))?|frame [1-3]( (radial|vertical))?"
 )
 LOOP_WORDS = "tip, spindle, platform, table, strut 1 (alone), joint 1 (platform, frame), frame 1 (radial, vertical)"

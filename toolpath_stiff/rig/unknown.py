@@ -28,8 +28,6 @@ X, Y, Z = np.eye(3)
 
 # Words of a description.
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
-
-
 VARIABLES = (
     *("constant", "x", "y", "z", "radius", "tilt", "strut length", "strut force", "force sign"),
     *("load", "time", "order", "setup", "temperature", "direction"),
@@ -41,14 +39,8 @@ VARIABLES = (
 # varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant
 # there, and shows as the strut swings about it.
 ONE, ALL = "one strut,joints", "joints,struts"
-
-
 SOFT = 60e-9  # m/N, largest compliance that is tried: far beyond 30 % of a tip that gives 8 to 31 nm/N
-
-
 REACH = 0.3  # m, half the width of the workspace that the paper measured
-
-
 SIGN_WIDTH = 30.0  # N over which a seat opens: no contact lets go at a stroke (assumed)
 
 

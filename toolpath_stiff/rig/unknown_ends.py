@@ -36,20 +36,10 @@ act = partial(kind, END_KINDS, "act")
 read = partial(kind, END_KINDS, "read")
 
 HALF_SPAN = 0.4  # m, half the distance of a bed's feet (assumed)
-
-
 FLOOR = -0.3  # m, height about which a bed rocks that stands on a weak floor (assumed)
-
-
 KNEE = 1.6  # m, height of a portal's knee, above all poses (assumed)
-
-
 SUPPORTS = 0.35  # m, radius of the circle of a table's three bearings (assumed)
-
-
 SOFTENING = 1.5  # K over which a damping plate takes up its softness (assumed; the rig's shop warms by as much)
-
-
 HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
 
 # A spring between tool and work in base axes may sit in the frame as well as under the table: `BASE`. Temperature
@@ -57,8 +47,6 @@ HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
 # rotational compliance, and shows as a translation that grows with the arm: both are right. A load along the
 # tangent of a circle about the axis is described by x and y as well as by the radius.
 BASE = "table,frame"
-
-
 AZIMUTH = uniform("azimuth", 0.0, 2.0 * np.pi)
 
 

@@ -35,11 +35,7 @@ act = partial(kind, STRUT_KINDS, "act")
 move = partial(kind, STRUT_KINDS, "move")
 
 LEAST_FORCE = 0.1  # N, below which a secant compliance is held
-
-
 SOUND_BAR = 3e9  # N/m, the bars of a platform one of which is cracked: 1.4 % at the tip (assumed)
-
-
 PRELOAD_GROWS = 0.3  # of the campaign, time constant of a machine that warms up (assumed)
 
 
