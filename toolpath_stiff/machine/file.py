@@ -16,6 +16,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, MachineFileError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
@@ -150,7 +151,7 @@ def _check_neutral_pose(toml: MachineToml, machine: Hexapod) -> None:
         raise toml.fault("limits.joint_angle", "neutral_pose_mm_deg", mistake, expected, hint)
 
 
-def _joints(toml: MachineToml, section: str, values: dict[str, Any]) -> FloatArray:
+def _joints(toml: MachineToml, section: str, values: Document) -> FloatArray:
     """(6, 3) m from whichever of the two forms is given."""
     cartesian, cylindrical = (values.get(key) for key in ("mm", "cylindrical_mm_deg"))
     if (cartesian is None) == (cylindrical is None):
@@ -163,7 +164,7 @@ def _joints(toml: MachineToml, section: str, values: dict[str, Any]) -> FloatArr
     return m_from_mm(np.asarray(cartesian))
 
 
-def _strut_law(toml: MachineToml, values: dict[str, Any], travel: dict[str, Any]) -> StrutLaw:
+def _strut_law(toml: MachineToml, values: Document, travel: Document) -> StrutLaw:
     """Linear by two lengths, a table by more, constant by one stiffness without a length."""
 
     def fault(key: str, mistake: str, expected: str) -> InputError:
