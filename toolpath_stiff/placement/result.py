@@ -90,8 +90,8 @@ class Placement(FolderResult):
     ('', 'G0 X0 Y0 Z5')
     >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
     (1, ['placements.csv', 'placement.json'], 'balanced')
-    >>> found.objective, found.picked, list(found.trade_offs), found.machine_stated["machine"]
-    ('balanced', False, ['mean', 'range', 'weakest'], 'nist')
+    >>> found.picked, list(found.trade_offs), found.machine_stated["machine"]
+    (False, ['mean', 'range', 'weakest'], 'nist')
     >>> found.offsets.linuxcnc[:3]
     'G21'
     >>> type(found.plot()).__name__
@@ -118,11 +118,6 @@ class Placement(FolderResult):
     def origin_mm_deg(self) -> ShopPose:
         """The chosen placement: what `analyze` takes as `origin_mm_deg`."""
         return self.chosen.origin_mm_deg
-
-    @property
-    def objective(self) -> str:
-        """The objective of the recommended placement."""
-        return self.task.rules.objective
 
     @property
     def picked(self) -> bool:
@@ -226,7 +221,7 @@ class Placement(FolderResult):
                 **self.machine_stated,
                 "load": str(self.best.load),
                 "force_N": self.best.force,
-                "objective": self.objective,
+                "objective": self.task.rules.objective,
                 "chosen": self.chosen,
                 "picked": self.picked,
                 "recommended": self.front[self.search.recommended - 1],

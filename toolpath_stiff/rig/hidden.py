@@ -256,6 +256,11 @@ class Nuisances:
     outlier_width: float = 4.0
     rounded: bool = True
 
+    @property
+    def of_reading(self) -> float:
+        """Relative standard deviation of one reading, re-clamping included."""
+        return float(np.hypot(self.repeat, self.clamping))
+
     @classmethod
     def none(cls) -> Nuisances:
         """No nuisance at all, not even rounding."""

@@ -105,18 +105,14 @@ def with_loops(
     moved = per_load * rows.force[where]
     if nuisances.repeat > 0.0:
         moved = moved * np.exp(SLANT * rng.standard_normal(len(where))) + INDICATOR * rng.standard_normal(len(where))
-    read = um_from_m(moved)
-    if nuisances.rounded:
-        read = PRINTED * np.round(read / PRINTED)
-    shown = [""] * len(loops)
-    for k, value in zip(where, read.tolist(), strict=True):
-        shown[k] = f"{value + 0.0:.10g}"
+    shown = np.zeros(len(loops))
+    shown[where] = PRINTED * np.round(um_from_m(moved) / PRINTED) if nuisances.rounded else um_from_m(moved)
     table: dict[str, Any] = {}
     for name, values in measured.items():
         empty = name in ("stiffness_N_per_mm", "sd_N_per_mm")
         table[name] = _emptied(values, beside) if empty else values
         if name == "stiffness_N_per_mm":
-            table["displacement_um"] = shown
+            table["displacement_um"] = _emptied(shown, ~beside)
     table.setdefault("force_N", np.full(len(loops), defaults.FORCE))
     if "length_mm" in table:
         table["length_mm"] = _emptied(table["length_mm"], np.isnan(lengths))

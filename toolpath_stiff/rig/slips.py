@@ -128,7 +128,7 @@ def with_stated_noise(
 
     The truth: `true_percent` and `stated_percent`, repeat noise and clamping together.
     """
-    true = float(np.hypot(nuisances.repeat, nuisances.clamping))
+    true = nuisances.of_reading
     stated: Table = {}
     for name, values in table.items():
         if name != "sd_N_per_mm":

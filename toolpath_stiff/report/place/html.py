@@ -56,7 +56,7 @@ def place_page(placed: Placement) -> str:
         data=data,
         title=f"Placements of {placed.best.program.name}",
         about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
-        objective=placed.objective,
+        objective=placed.task.rules.objective,
         load=str(best.load),
         note=note,
         warnings=placed.warnings,
