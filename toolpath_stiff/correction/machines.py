@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import resources
 from typing import Any
 
 import numpy as np
 
+from toolpath_stiff.documents import Document
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.prediction import scaled_law
@@ -31,7 +32,7 @@ def data_hash(files: Sequence[str]) -> str:
 
 
 def fitted_machine(
-    machine: Hexapod, fit: Fit, provenance: Mapping[str, Any], widened: float = 1.0, setups: Iterable[str] = ()
+    machine: Hexapod, fit: Fit, provenance: Document, widened: float = 1.0, setups: Iterable[str] = ()
 ) -> Hexapod:
     """The machine with a fit's strut law and effects, their joint uncertainty, and where they come from.
 

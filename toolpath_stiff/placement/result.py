@@ -14,7 +14,6 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
 from toolpath_stiff.placement.task import VARIED, PlacementTask, SearchRecord
@@ -68,8 +67,8 @@ class Placement(FolderResult):
         The search, as `placement.json` has it.
     chosen, present
         The chosen placement and the present one, which is None where it is out of reach.
-    present_figures, present_reason
-        What the present placement keeps, in SI; why it is out of reach.
+    present_reason
+        Why that is out of reach.
     best, before
         Analyses at the chosen and at the present placement.
     rewritten, written
@@ -106,7 +105,6 @@ class Placement(FolderResult):
     search: SearchRecord
     chosen: PlacementRow
     present: PlacementRow | None
-    present_figures: PlacementFigures
     present_reason: str
     best: Analysis
     before: Analysis | None
@@ -153,7 +151,7 @@ class Placement(FolderResult):
             nothing = "the present placement is out of reach, so nothing says what must not get worse"
             warnings.append(f"{nothing}: {self.present_reason}")
         else:
-            warnings += _present_words(self.task.rules.margin, self.present_figures)
+            warnings += self._present_words()
         if self.chosen.extrapolated_share:
             warnings.append(
                 f"the strut law is extrapolated at {100.0 * self.chosen.extrapolated_share:.0f} % of the samples: "
@@ -165,6 +163,21 @@ class Placement(FolderResult):
                 "the program only plunges along the tool axis: mean, range and weakest are those of plunges"
             )
         return list(dict.fromkeys([*warnings, *self.best.warnings]))
+
+    def _present_words(self) -> list[str]:
+        """Rules that the present placement itself does not keep, in sentences."""
+        words, margin, before = [], self.task.rules.margin, self.before
+        assert before is not None
+        least = float(before.at.margin.min())
+        if least < margin:
+            words.append(
+                f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
+                f"{100.0 * margin:g} % asked for with {both_names('--margin')}"
+            )
+        depths = [-float(box.clearances(before.samples.position).min()) for box in self.task.rules.keepouts]
+        if max(depths, default=0.0) > 0.0:
+            words.append(f"the present placement runs {mm_from_m(max(depths)):.1f} mm deep into a keep-out")
+        return words
 
     def _worse_words(self, worse: Worsening) -> str:
         share = 100.0 * worse.worse_by_N_per_mm / max(abs(worse.before_N_per_mm), 1e-12)
@@ -258,20 +271,6 @@ def nothing_better_words(search: SearchRecord) -> str:
         f"nothing better than the present placement was found within the bounds, in {search.searches} searches from "
         f"the beginning, {search.pose_evaluations} poses evaluated"
     )
-
-
-def _present_words(margin: float, present: PlacementFigures) -> list[str]:
-    """Rules that the present placement itself does not keep, in sentences."""
-    words, least = [], float(min(present.margin[0], present.rapid_margin[0]))
-    if least < margin:
-        words.append(
-            f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
-            f"{100.0 * margin:g} % asked for with {both_names('--margin')}"
-        )
-    if present.clearance[0] < 0.0:
-        depth = mm_from_m(-float(present.clearance[0]))
-        words.append(f"the present placement runs {depth:.1f} mm deep into a keep-out")
-    return words
 
 
 def bound_warnings(bounds: Bounds, placement: ShopPose, workspace: FloatArray) -> list[str]:

@@ -5,7 +5,6 @@ A `Table` maps column names of measurement files to arrays or lists of one lengt
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ LONG_TOOL = 150.0  # mm longer, at four poses
 RISER_EVERY = 3  # each third pose is taken on a riser
 
 
-def campaign(layout: str, nominal: Nominal, plan: Mapping[str, Any] | None, rng: Generator) -> Table:
+def campaign(layout: str, nominal: Nominal, plan: Table | None, rng: Generator) -> Table:
     """The campaign of a layout. Raises `InputError`."""
     if layout not in LAYOUTS:
         raise InputError(f"layout {layout!r}", expected=", ".join(LAYOUTS))

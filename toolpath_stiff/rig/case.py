@@ -7,7 +7,7 @@ effect alone.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -41,7 +41,7 @@ BLIND = {"none": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
 _STREAMS = ("kind", "campaign", "machine", "noise")
 
 
-def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows:
+def rows_of(table: Table, elapsed: FloatArray | None = None) -> Rows:
     """SI rows of a table; absent columns take their defaults: no tilt, 1000 N, the reference tool, time 0, `table`."""
     n = len(table["x_mm"])
 
@@ -67,7 +67,7 @@ def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows
     )
 
 
-def clamp_of(table: Mapping[str, Any]) -> IntArray:
+def clamp_of(table: Table) -> IntArray:
     """(n,) group of each row: its clamp, or without that column its pose and set-up."""
     if "clamp" in table:
         keys = [(int(clamp),) for clamp in table["clamp"]]
@@ -105,7 +105,7 @@ class DrawnCase:
     seed: int = 0
     layout: str = ""
 
-    def measure(self, table: Mapping[str, Any], rows: Rows, rng: Generator, stated_sd: bool = False) -> Table:
+    def measure(self, table: Table, rows: Rows, rng: Generator, stated_sd: bool = False) -> Table:
         """A table with the column `stiffness_N_per_mm`, and `sd_N_per_mm` if it is to be stated; `rows` in SI."""
         shown, nuisances = readings(self.nominal, self.machine, rows), self.nuisances
         bad = np.flatnonzero(~(np.isfinite(shown) & (shown > 0.0)))
@@ -124,7 +124,7 @@ class DrawnCase:
                     measured["sd_N_per_mm"] = np.round(stiffness * nuisances.of_reading)
         return with_loops(self.nominal, self.machine, measured, rows, nuisances, rng)
 
-    def again(self, plan: Mapping[str, Any], rng: Generator, stated_sd: bool = False) -> Table:
+    def again(self, plan: Table, rng: Generator, stated_sd: bool = False) -> Table:
         """The same hidden machine measured at a plan: new clamps, new noise; the campaign's clock stands at its end."""
         return self.measure(plan, rows_of(plan, elapsed=np.ones(len(plan["x_mm"]))), rng, stated_sd)
 
@@ -147,7 +147,7 @@ def draw_case(
     hidden: str | Sequence[str] | None = None,
     noise: float | Nuisances = 0.02,
     machine: str | Nominal = defaults.MACHINE,
-    plan: Mapping[str, Any] | None = None,
+    plan: Table | None = None,
     size: float | Sequence[float] | None = None,
 ) -> DrawnCase:
     """A blind campaign on a machine that hides something; the same arguments give the same rows.

@@ -16,7 +16,6 @@ import json
 import math
 import re
 import zlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +127,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
     return "partly" if claimed & truth else "wrong"
 
 
-def csv_text(table: Mapping[str, Any]) -> str:
+def csv_text(table: Table) -> str:
     """The table as CSV; numbers as short as they are exact to ten digits."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")

@@ -28,10 +28,6 @@ PRINTED_N_PER_MM = 1.0  # resolution of what is printed: whole N/mm, as in the p
 AXES = np.eye(3)
 
 
-def _zeros(*shape: int) -> FloatArray:
-    return np.zeros(shape)
-
-
 @dataclass(frozen=True)
 class HiddenMachine:
     """Differences from the nominal machine, SI; the defaults are none.
@@ -70,8 +66,8 @@ class HiddenMachine:
         Something outside the catalogue.
     """
 
-    frame_errors: FloatArray = field(default_factory=lambda: _zeros(6, 3))
-    platform_errors: FloatArray = field(default_factory=lambda: _zeros(6, 3))
+    frame_errors: FloatArray = field(default_factory=lambda: np.zeros((6, 3)))
+    platform_errors: FloatArray = field(default_factory=lambda: np.zeros((6, 3)))
     strut_factors: FloatArray = field(default_factory=lambda: np.ones(6))
     curvature: float = 0.0
     tip_error: float = 0.0
@@ -83,11 +79,11 @@ class HiddenMachine:
     hertz: float = 0.0
     clearance: float = 0.0
     moment: float = 0.0
-    vertices: FloatArray = field(default_factory=lambda: _zeros(6, 2))
-    table: FloatArray = field(default_factory=lambda: _zeros(3))
+    vertices: FloatArray = field(default_factory=lambda: np.zeros((6, 2)))
+    table: FloatArray = field(default_factory=lambda: np.zeros(3))
     rocking: float = 0.0
     setup: str = ""
-    setup_compliance: FloatArray = field(default_factory=lambda: _zeros(3))
+    setup_compliance: FloatArray = field(default_factory=lambda: np.zeros(3))
     gauge_target: str = ""
     gauge_factor: float = 1.0
     drift: float = 0.0

@@ -8,9 +8,6 @@ A slip of a pose or of a sign is made where a form has it once: in one row, or i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numpy.random import Generator
 
@@ -121,9 +118,7 @@ def slipped_case(case: DrawnCase, seed: int, kind: str | None = None, count: int
     raise InputError(f"{count} slips of kind {kind or 'any'}", expected="fewer: the table has no room for them")
 
 
-def with_stated_noise(
-    table: Mapping[str, Any], nuisances: Nuisances, factor: float = 1.0
-) -> tuple[Table, dict[str, float]]:
+def with_stated_noise(table: Table, nuisances: Nuisances, factor: float = 1.0) -> tuple[Table, dict[str, float]]:
     """A table that states `sd_N_per_mm`, `factor` times as large as one reading's scatter is.
 
     The truth: `true_percent` and `stated_percent`, repeat noise and clamping together.
@@ -180,6 +175,6 @@ def _mistype(wrong: Table, nominal: Nominal, kind: str, rng: Generator) -> IntAr
     raise InputError(f"no row for the slip {kind}", expected="poses off the axis, or tilted, that stay reachable")
 
 
-def _reached(table: Mapping[str, Any], nominal: Nominal, rows: IntArray) -> bool:
+def _reached(table: Table, nominal: Nominal, rows: IntArray) -> bool:
     slipped = rows_of({name: np.asarray(values)[rows] for name, values in table.items()})
     return bool(reachable(nominal, slipped.position, slipped.angles, slipped.extension).all())
