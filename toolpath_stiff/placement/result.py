@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 WORSE = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
 ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
 AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
-OFFSETS = ("linuxcnc", "linuxcnc_reason", "fanuc", "fanuc_reason")  # as placement.json has them
 
 
 @dataclass(frozen=True)
@@ -225,7 +224,6 @@ class Placement(FolderResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
-        offsets = self.offsets
         document: dict[str, Any] = to_dict(
             {
                 "warnings": self.warnings,
@@ -238,11 +236,11 @@ class Placement(FolderResult):
                 "chosen": self.chosen,
                 "picked": self.picked,
                 "recommended": self.front[self.search.recommended - 1],
-                "before": None if self.present is None else self.present.figures(),
+                "before": self.present,
                 "before_reason": self.present_reason or None,
                 "trade_offs": self.trade_offs,
                 "front": self.front,
-                "offset_blocks": {name: getattr(offsets, name) or None for name in OFFSETS},
+                "offset_blocks": {name: text or None for name, text in vars(self.offsets).items()},
                 "written": self.written,
                 "search": self.search,
                 "assumptions": self.best.assumptions,

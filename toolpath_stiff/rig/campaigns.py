@@ -44,14 +44,7 @@ def campaign(layout: str, nominal: Nominal, plan: Table | None, rng: Generator) 
         raise InputError("layout campaign and a file of poses go together", expected="both, or neither")
     if plan is not None:
         return dict(plan)
-    if layout == "paper":
-        return paper_campaign()
-    try:
-        return tilted_campaign(nominal, rng)
-    except LookupError as error:
-        raise InputError(
-            f"machine {nominal.name}: {error}", hint="use layout campaign with poses of your own for this machine"
-        ) from None
+    return paper_campaign() if layout == "paper" else tilted_campaign(nominal, rng)
 
 
 def paper_campaign() -> Table:
@@ -113,4 +106,7 @@ def _tilted_poses(nominal: Nominal, rng: Generator) -> FloatArray:
         extension = np.array([m_from_mm(_extension(pose))])
         if reachable(nominal, m_from_mm(trial[None, :3]), rad_from_deg(trial[None, 3:]), extension)[0]:
             poses.append(trial)
-    raise LookupError("too few reachable tilted poses within 300 mm of the axis")
+    raise InputError(
+        f"machine {nominal.name}: too few reachable tilted poses within {TILTED_RADIUS:g} mm of the axis",
+        hint="use layout campaign with poses of your own for this machine",
+    )

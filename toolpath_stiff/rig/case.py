@@ -30,7 +30,7 @@ from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
 from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
-from toolpath_stiff.rig.sizes import scale_of
+from toolpath_stiff.rig.sizes import Scale
 from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
@@ -188,7 +188,7 @@ def draw_case(
     rows = rows_of(table)
     true, effects = HiddenMachine(), []
     if names:
-        scale = scale_of(nominal, rows, clamp_of(table), nuisances)
+        scale = Scale(nominal, rows, clamp_of(table), nuisances)
         for name, wanted in zip(names, _sizes(size, len(names)), strict=True):
             # A stream of its own for each effect: sizes of different effects of one seed have nothing in common.
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])

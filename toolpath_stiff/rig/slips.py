@@ -18,7 +18,7 @@ from toolpath_stiff.rig.campaigns import POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import Nominal, reachable
-from toolpath_stiff.rig.sizes import scale_of
+from toolpath_stiff.rig.sizes import Scale
 from toolpath_stiff.rig.unknown import Shape
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -90,7 +90,7 @@ def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = 
         np.log(readings(case.nominal, HiddenMachine(), rows_of(one))) - np.log(one["stiffness_N_per_mm"])
         for one in (table, slipped)
     )
-    scale = scale_of(case.nominal, rows_of(table), clamp_of(table), case.nuisances)
+    scale = Scale(case.nominal, rows_of(table), clamp_of(table), case.nuisances)
     return slipped, {
         "kind": kind,
         "rows": [int(row) + 1 for row in rows],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.nominal import rotations, strut_directions
+from toolpath_stiff.rig.nominal import neutral_directions
 from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import ALL, SOFT, kind, with_joints
 
@@ -24,8 +24,7 @@ SLIP_LOAD = 300.0  # N, load at which a sticking joint carries half of what it d
 
 def _swing(state: CommandedRows) -> FloatArray:
     """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
-    pose = state.nominal.neutral_pose
-    rest = strut_directions(state.nominal, pose[None, :3], rotations(pose[None, 3:]), np.zeros(1))[1]
+    rest = neutral_directions(state.nominal)[1]
     now = state.units @ state.place.rotation
     return np.asarray(1.0 - np.minimum(np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now) ** 2, 1.0))
 

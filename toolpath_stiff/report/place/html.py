@@ -39,7 +39,7 @@ def place_page(placed: Placement) -> str:
         "front": [vars(row) for row in placed.front],
         "chosen": (placed.chosen.number or 0) - 1,
         "recommended": placed.search.recommended - 1,
-        "before": present.figures() if present else None,
+        "before": vars(present) if present else None,
         "before_reason": plain(placed.present_reason),
         "force": best.force,
         "keepouts": [
