@@ -102,23 +102,8 @@ def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
 
 def true_stiffness(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m, secant stiffness between tool and workpiece along the load."""
-    first, which = _distinct(hidden, rows)
-    distinct = rows.take(first)
-    place, links = assembled(nominal, hidden, distinct)
-    return np.asarray(1.0 / solved(place, links, distinct.direction, distinct.force).compliance)[which]
-
-
-def _distinct(hidden: HiddenMachine, rows: Rows) -> tuple[IntArray, IntArray]:
-    """First row of each mechanical state and the state of each row: repeats are solved once."""
-    states = [rows.position, rows.angles, rows.direction, rows.extension[:, None]]
-    states.append(np.unique(rows.setup, return_inverse=True)[1].reshape(-1, 1).astype(float))
-    if hidden.hertz or hidden.clearance:
-        states.append(rows.force[:, None])
-    if hidden.unknown is not None:
-        varies = OUTSIDE[hidden.unknown.kind].varies
-        states += [np.asarray(getattr(rows, name), dtype=float)[:, None] for name in varies]
-    _, first, which = np.unique(np.concatenate(states, axis=1), axis=0, return_index=True, return_inverse=True)
-    return first, which.ravel()
+    place, links = assembled(nominal, hidden, rows)
+    return np.asarray(1.0 / solved(place, links, rows.direction, rows.force).compliance)
 
 
 def assembled(

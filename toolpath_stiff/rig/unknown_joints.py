@@ -53,7 +53,7 @@ def joint_binding(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return dataclasses.replace(links, moment=links.moment + u.size * _swing(state) / SWING)
 
 
-@act("joints,struts,platform", "load", 6e6, varies="force", columns="force_N")
+@act("joints,struts,platform", "load", 6e6, columns="force_N")
 def joint_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Sticking joints that slip: rotational secant stiffness m0 F0 / (F0 + F), Masing's element smeared out."""
     held = SLIP_LOAD / (SLIP_LOAD + state.rows.force)
