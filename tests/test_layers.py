@@ -105,20 +105,6 @@ def test_the_help_imports_nothing_heavy():
     assert done.stdout.splitlines() == [f"{words} []" for words in asked]
 
 
-def test_single_poses_load_no_nc_program():
-    """`tps pose` needs the machine and its stiffness alone."""
-    code = (
-        "import sys, io, contextlib\n"
-        "from toolpath_stiff.cli.main import main\n"
-        "with contextlib.redirect_stdout(io.StringIO()):\n"
-        "    assert main(['pose', '0', '0', '800']) == 0\n"
-        "rooms = {'.'.join(name.split('.')[:2]) for name in sys.modules if name.startswith('toolpath_stiff.')}\n"
-        "print(sorted(rooms & {'toolpath_stiff.nc', 'toolpath_stiff.path', 'toolpath_stiff.placement'}))\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
 def test_array_types_stand_in_one_place():
     again = [
         str(path)

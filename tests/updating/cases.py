@@ -257,7 +257,7 @@ def correlated_covariance(own: ArrayLike, shared: ArrayLike) -> Covariance:
 
 def examined(machine: Hexapod, data: Readings, **options: Any) -> Diagnosis:
     """A diagnosis without the plan of what to measure next."""
-    return diagnose(machine, data, plan_next=False, **options)
+    return diagnose(machine, data, **options)
 
 
 @cache

@@ -15,7 +15,7 @@ from tests.updating.cases import campaign, read_text
 from tests.updating.test_diagnose import SADDLE
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
-from toolpath_stiff.diagnosis.diagnose import common_verdict, diagnose
+from toolpath_stiff.diagnosis.diagnose import common_verdict, diagnose, with_plan
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.drawn import CONFIRMS, foretold
 from toolpath_stiff.inference.evidence import Problem
@@ -52,7 +52,7 @@ def among_few(data, file):
 def described(tmp_path_factory):
     """Judged by the readings that it was drawn from alone."""
     file = drawn_file(tmp_path_factory.mktemp("draft_status"), slice(None))
-    return diagnose(nist(), DATA, effect_files=[file]), file
+    return with_plan(diagnose(nist(), DATA, effect_files=[file])), file
 
 
 def test_the_readings_that_it_was_drawn_from_only_describe(described):

@@ -230,9 +230,9 @@ def joints(tmp_path_factory):
 
 def test_what_the_tip_cannot_tell_an_indicator_names(joints):
     """A constant compliance in series with every strut is a strut law to the tip; across a joint it is nothing else."""
-    alone = diagnose(nist(), read_measurements(joints[0], nist()), plan_next=False)
+    alone = diagnose(nist(), read_measurements(joints[0], nist()))
     assert alone.verdict == "adequate" and "joint_compliance" in alone.plausible
-    found = diagnose(nist(), read_measurements(list(joints), nist()), plan_next=False)
+    found = diagnose(nist(), read_measurements(list(joints), nist()))
     assert (found.verdict, found.plausible) == ("identified", ["joint_compliance"])
     written = found.to_dict()
     # Errors are those of the tip's readings; the loops stand beside them.

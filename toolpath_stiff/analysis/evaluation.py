@@ -13,7 +13,7 @@ from toolpath_stiff.analysis.loads import Load, geometric_directions, load_direc
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import PoseError
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Extremes, Limit, Reach, machine_limits, reach
+from toolpath_stiff.machine.limits import Extremes, Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
@@ -39,30 +39,20 @@ class Evaluation:
         (n, 6) m.
     extrapolated
         (n,) a strut is longer or shorter than the strut law was given for.
-    margin, limit, limit_value
-        (n,) as in `Reach`.
-    limits
-        The machine's limits.
+    reach
+        Margins and limits.
     """
 
     stiffness: FloatArray
     substituted: BoolArray
     strut_lengths: FloatArray
     extrapolated: BoolArray
-    margin: FloatArray
-    limit: IntArray
-    limit_value: FloatArray
-    limits: tuple[Limit, ...]
+    reach: Reach
 
     @property
     def reachable(self) -> BoolArray:
         """(n,) whether every limit is kept."""
-        return np.asarray(self.margin >= 0.0)
-
-    @property
-    def reach(self) -> Reach:
-        """The limits' side of it, for `Reach.describe`."""
-        return Reach(self.margin, self.limit, self.limit_value, self.limits)
+        return self.reach.reachable
 
     def put(
         self,
@@ -74,7 +64,8 @@ class Evaluation:
     ) -> None:
         """Enter the figures of some rows."""
         self.stiffness[rows], self.strut_lengths[rows], self.extrapolated[rows] = stiffness, strut_lengths, extrapolated
-        self.margin[rows], self.limit[rows], self.limit_value[rows] = stand.margin, stand.limit, stand.value
+        for name in ("margin", "limit", "value"):
+            getattr(self.reach, name)[rows] = getattr(stand, name)
 
 
 def evaluate(
@@ -125,10 +116,7 @@ def evaluate(
         substituted=np.zeros(n, dtype=bool),
         strut_lengths=np.empty((n, 6)),
         extrapolated=np.zeros(n, dtype=bool),
-        margin=np.empty(n),
-        limit=np.zeros(n, dtype=np.int64),
-        limit_value=np.empty(n),
-        limits=machine_limits(model.machine),
+        reach=Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(model.machine)),
     )
     task = _Task(model, position, abc, tangent, lengths, load or Load(), force, route, result)
     for start in range(0, n, BLOCK):

@@ -55,7 +55,7 @@ def new_effect(args: Namespace, file: File) -> int:
     return 0
 
 
-@command("effects draft", DATA, tps.Machine.load, tps.Measurements.read, tps.draft_effect, REPLACE, JSON)
+@command("effects draft", DATA, "Machine.load", "Measurements.read", "draft_effect", REPLACE, JSON)
 def draft_effect(
     args: Namespace,
     output: Annotated[str, Option("-o --output", "FILE.toml", help="file to write")] = "missing.toml",

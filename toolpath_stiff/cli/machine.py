@@ -29,7 +29,7 @@ OUT_OF_REACH = NOT_GOOD = 1  # exit codes
 MOST_NAMED = 10
 
 
-@command("pose", tps.pose, tps.Machine.load, tps.Machine.under, JSON)
+@command("pose", "pose", "Machine.load", "Machine.under", JSON)
 def pose(
     args: Namespace,
     pose: Annotated[Sequence[float], Option("X Y Z [A B C]", read=finite_number, count="*")] = (),
@@ -71,7 +71,7 @@ def _heights(text: str) -> list[float]:
     return heights
 
 
-@command("map", tps.map_stiffness, tps.Machine.load, tps.Machine.under, *FOLDER)
+@command("map", "map_stiffness", "Machine.load", "Machine.under", *FOLDER)
 def map(
     args: Namespace,
     slices: Annotated[Sequence[float], Option("--slices", "Z,Z,...", read=_heights, instead_of="z_mm")] = (),
@@ -141,7 +141,7 @@ def _picture_file(out: str | None, name: str) -> Path:
     return place
 
 
-@command("machine check", tps.Machine.load, REPLACE, JSON, without=["machine"])
+@command("machine check", "Machine.load", REPLACE, JSON, without=["machine"])
 def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Picture = None) -> int:
     """Check a machine file for mistakes, draw it; exit code 1 if it cannot be right."""
     if not Path(file).is_file():
@@ -163,7 +163,7 @@ def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     return 0
 
 
-@command("machine from-linuxcnc", tps.machine_from_linuxcnc, REPLACE)
+@command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
 def from_linuxcnc(
     args: Namespace,
     file: Annotated[str, Option("FILE.hal")],
@@ -183,7 +183,7 @@ def from_linuxcnc(
     return 0
 
 
-@command("machine recover", tps.recover_geometry, JSON)
+@command("machine recover", "recover_geometry", JSON)
 def recover(args: Namespace) -> int:
     """Fit the NIST geometry to the paper's Table 1 anew."""
     return show(args, call(args, tps.recover_geometry))

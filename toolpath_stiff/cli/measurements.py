@@ -16,7 +16,7 @@ from toolpath_stiff.options import Option
 from toolpath_stiff.workbooks import split_name
 
 
-@command("reduce", tps.Measurements.read, REPLACE, NO_PLOTS, JSON)
+@command("reduce", "Measurements.read", REPLACE, NO_PLOTS, JSON)
 def reduce(
     args: Namespace,
     raw: Annotated[Sequence[str], Option("RAW", count="+")],
@@ -64,7 +64,7 @@ def reduce(
     )
 
 
-@command("compare", DATA, tps.Machine.load, tps.compare, *FOLDER)
+@command("compare", DATA, "Machine.load", "compare", *FOLDER)
 def compare(args: Namespace) -> int:
     """Where the model fails: errors, structure in the residuals, pictures, page.
 
@@ -81,7 +81,7 @@ def compare(args: Namespace) -> int:
     return run_to_folder(args, tps.compare, tps.Comparison, args.data)
 
 
-@command("diagnose", DATA, tps.Machine.load, tps.Machine.under, tps.diagnose, tps.Program.read, *FOLDER)
+@command("diagnose", DATA, "Machine.load", "Machine.under", "diagnose", "Program.read", *FOLDER)
 def diagnose(args: Namespace) -> int:
     """Which physical effect the model lacks, if any. Any verdict is success.
 
@@ -98,7 +98,7 @@ def diagnose(args: Namespace) -> int:
     return run_to_folder(args, tps.diagnose, tps.Diagnosis, args.data)
 
 
-@command("update", DATA, tps.Machine.load, tps.update, *FOLDER)
+@command("update", DATA, "Machine.load", "update", *FOLDER)
 def update(
     args: Namespace,
     output: Annotated[
@@ -128,7 +128,7 @@ def update(
     return show(args, fitted, *after, *(["", *fitted.next] if fitted.next else []))
 
 
-@command("plan", tps.Machine.load, tps.plan, *FOLDER)
+@command("plan", "Machine.load", "plan", *FOLDER)
 def plan(
     args: Namespace,
     data: Annotated[Sequence[str], Option("DATA", count="*", help=f"{FILES}; none: a first campaign")] = (),

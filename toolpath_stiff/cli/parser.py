@@ -9,8 +9,10 @@ import re
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, NoReturn
 
+import toolpath_stiff as tps
 from toolpath_stiff.cli.outputs import tell_incomplete
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import PARAMETERS, SWITCHES, Argument, Option, arguments_of
@@ -36,21 +38,23 @@ FOLDER = (OUT, REPLACE, NO_PLOTS, JSON)
 
 @dataclass(frozen=True)
 class Command:
-    """A command: what runs it and gives the exit code, what it takes options of, names of options that it leaves."""
+    """A command: what runs it and gives the exit code, what it takes options of, names of options that it leaves.
+
+    It takes those of public functions by name, which are imported with what they need when the command is run.
+    """
 
     run: Callable[..., int]
-    takes: tuple[Callable[..., Any] | Argument, ...]
+    takes: tuple[str | Argument, ...]
     without: tuple[str, ...] = ()
 
     @property
     def arguments(self) -> dict[str, Argument]:
         """All arguments by name, its own first; of one that several functions take, the first."""
-        arguments: dict[str, Argument] = {}
-        for part in (self.run, *self.takes):
-            for argument in [part] if isinstance(part, Argument) else arguments_of(part).values():
-                if argument.name not in self.without:
-                    arguments.setdefault(argument.name, argument)
-        return arguments
+        arguments = dict(arguments_of(self.run))
+        for part in self.takes:
+            taken = {part.name: part} if isinstance(part, Argument) else arguments_of(attrgetter(part)(tps))
+            arguments |= {name: argument for name, argument in taken.items() if name not in arguments}
+        return {name: argument for name, argument in arguments.items() if name not in self.without}
 
     def __call__(self, name: str, words: Sequence[str]) -> int:
         """Run the command; the exit code. Raises `InputError`."""
@@ -89,7 +93,7 @@ COMMANDS: dict[str, Command] = {}  # "rig new": of the modules that are imported
 
 
 def command(
-    name: str, *takes: Callable[..., Any] | Argument, without: Iterable[str] = ()
+    name: str, *takes: str | Argument, without: Iterable[str] = ()
 ) -> Callable[[Callable[..., int]], Callable[..., int]]:
     """Make a command of a function of (all values, those of its own options by name)."""
 

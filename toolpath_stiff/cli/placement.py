@@ -14,11 +14,11 @@ from toolpath_stiff.cli.parser import FOLDER, PROGRAM, command
 from toolpath_stiff.cli.program import READ
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.options import Option, arguments_of, numbers
+from toolpath_stiff.options import Option, numbers
 from toolpath_stiff.results_folder import incomplete
 
 
-@command("place", PROGRAM, tps.place, *READ, *FOLDER)
+@command("place", PROGRAM, "place", *READ, *FOLDER)
 def place(args: Namespace) -> int:
     """Where the work should sit: Pareto front and one recommended placement.
 
@@ -65,7 +65,7 @@ def _region(text: str) -> tuple[str, tuple[float, ...]]:
 Region = tuple[str, tuple[float, ...]]
 
 
-@command("case-study", tps.case_study, arguments_of(tps.analyze)["force_N"], *READ, *FOLDER)
+@command("case-study", "case_study", *READ, *FOLDER)
 def case_study(
     args: Namespace,
     program: Annotated[str | None, Option("PROGRAM")] = None,

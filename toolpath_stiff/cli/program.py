@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,10 +25,10 @@ BELOW_REQUIRED = 3  # exit code
 INCOMPLETE = 1  # exit code: samples were left out, or of several programs one failed
 CONNECT_SECONDS = 10  # for a scheduler to answer
 NO_MACHINE = "none"
-READ = (tps.Program.read, tps.Machine.load, tps.Machine.under)
+READ = ("Program.read", "Machine.load", "Machine.under")
 
 
-@command("analyze", tps.analyze, *READ, *FOLDER)
+@command("analyze", "analyze", *READ, *FOLDER)
 def analyze(
     args: Namespace,
     programs: Annotated[Sequence[str], Option("PROGRAM", count="+")],
@@ -118,10 +119,7 @@ def _analyze_many(args: Namespace, files: Sequence[Found], counts: Sequence[Fold
             )
     finally:
         say("")
-    if args.json:
-        _write_pieces(analyses.json_pieces())
-    else:
-        show(args, analyses, written_text(analyses.written))
+    show(args, analyses, written_text(analyses.written))
     if not analyses.complete:
         return INCOMPLETE
     return BELOW_REQUIRED if analyses.below_required else 0
@@ -153,15 +151,7 @@ def _executor(args: Namespace) -> Iterator[Executor | None]:
         yield client.get_executor(pure=False)
 
 
-def _write_pieces(pieces: Iterable[str | bytes]) -> None:
-    """Text in pieces on standard output, as long as somebody reads it."""
-    for piece in pieces:
-        sys.stdout.write(piece if isinstance(piece, str) else piece.decode())
-        if getattr(sys.stdout, "gone", False):
-            return
-
-
-@command("path", PROGRAM, tps.sample_path, tps.Program.read, REPLACE)
+@command("path", PROGRAM, "sample_path", "Program.read", REPLACE)
 def path(
     args: Namespace,
     csv: Annotated[bool, Option("--csv", help="write CSV to standard output (the default)")] = False,
@@ -181,13 +171,14 @@ def path(
     if out:
         write_single(args, {Path(out): sampled.csv()})
     else:
-        _write_pieces(sampled.csv())
+        for piece in takewhile(lambda _: not getattr(sys.stdout, "gone", False), sampled.csv()):
+            sys.stdout.write(piece.decode())
     tell("warning", (f"{sampled.name}: {warning}" for warning in sampled.warnings))
     tell("note", sampled.unsupported)
     return 0
 
 
-@command("check", PROGRAM, tps.check, tps.Program.read, JSON)
+@command("check", PROGRAM, "check", "Program.read", JSON)
 def check(
     args: Namespace,
     machine: Annotated[

@@ -17,7 +17,7 @@ from toolpath_stiff.studio.run import ask_for_effects, opened_case, serve
 @command(
     "studio",
     arguments_of(Machine.load)["effects"],
-    Program.read,
+    "Program.read",
     without=["interpreter", "rs274", "subprograms", "unconfined"],
 )
 def studio(

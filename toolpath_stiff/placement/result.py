@@ -243,7 +243,7 @@ class Placement(FolderResult):
                 "offset_blocks": {name: text or None for name, text in vars(self.offsets).items()},
                 "written": self.written,
                 "search": self.search,
-                "assumptions": self.best.assumptions,
+                "assumptions": self.best.to_dict()["assumptions"],
             }
         )
         return document

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
-from toolpath_stiff.machine.kinematics import solve_struts_at
+from toolpath_stiff.machine.kinematics import LENGTH_TOLERANCE, solve_struts_at
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.stiffness.elimination import Vector, cross, dot, forces, over_struts, strut
 
@@ -24,6 +24,7 @@ BLOCK = 2048  # poses: some 1 MB of work arrays, which stay in a core's second-l
 # Determinants of unit directions lie within 0 and 1. Above this the elimination loses up to seven of sixteen digits:
 # at one pose in a hundred three or more, at most less than one (144,000 poses of random machines, many near singular).
 SMALL_DETERMINANT = 1e-3
+FOLLOWING_STEPS = 25  # a platform radius 1 mm off takes three
 
 
 @dataclass(frozen=True)
@@ -49,16 +50,21 @@ class ClosedForm:
     arm: float
 
 
-def prepare(machine: Hexapod, tool_length: float = np.nan) -> ClosedForm:
-    """The kernel's form of a machine with a tool of that length (m; nan: the reference tool), made once a machine."""
+def prepare(machine: Hexapod, tool_length: float = np.nan, split_of: Hexapod | None = None) -> ClosedForm:
+    """The kernel's form of a machine with a tool of that length (m; nan: the reference tool), made once a machine.
+
+    `split_of`: in the order of struts of another machine, which differs from it by little.
+    """
 
     def on_joints() -> ClosedForm:
-        order, arm = machine.once("split", lambda: _split(machine))
+        other = split_of or machine
+        order, arm = other.once("split", lambda: _split(other))
         bodies = (machine.frame_joints, machine.platform_joints_for(tool_length))
         frame, platform = (np.ascontiguousarray(joints[order].T) for joints in bodies)
         return ClosedForm(order, frame, platform, machine.strut_law, arm)
 
-    return machine.once(("closed form", "reference" if np.isnan(tool_length) else float(tool_length)), on_joints)
+    key = ("closed form", "reference" if np.isnan(tool_length) else float(tool_length))
+    return on_joints() if split_of else machine.once(key, on_joints)
 
 
 def _split(machine: Hexapod) -> tuple[list[int], float]:
@@ -99,10 +105,10 @@ class _Block:
         self.arms, vectors = _struts(kernel, position, rotation)
         self.directions, moments, self.lengths = strut(vectors, self.arms)
         self.w, first = _inverse([c[:3] for c in self.directions])
-        rows = dot(self.w[:, :, None], [c[3:] for c in self.directions])
-        self.t = rows.swapaxes(0, 1)
+        self.rows = dot(self.w[:, :, None], [c[3:] for c in self.directions])  # of t
+        self.t = self.rows.swapaxes(0, 1)
         self.moments = np.concatenate([c[:3] for c in moments]).reshape(3, 3, -1).swapaxes(0, 1)
-        taken = dot(self.moments[:, :, None], rows[:, None])
+        taken = dot(self.moments[:, :, None], self.rows[:, None])
         s = [whole[3:] - part for whole, part in zip(moments, taken, strict=True)]
         self.q, second = _inverse(s)
         self.determinant = np.abs(first * second)
@@ -242,3 +248,61 @@ def strut_forces_columns(
             good[rows] = block.good & np.isfinite(force[rows]).all(axis=1)
             del block
     return force, good
+
+
+def followed_columns(
+    kernel: ClosedForm, control: ClosedForm, position: FloatArray, rotation: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Where a platform goes whose struts get the lengths that a control computes for the poses on its own geometry.
+
+    `control` has the joints of the control's machine in the order of `kernel`; the other arguments as of
+    `compliance_along_columns`. Newton's method with the first inverse throughout: geometries differ by little.
+
+    Returns
+    -------
+    position, rotation, good
+        (3, n) m, (9, n), and (n,) where the lengths are met.
+    """
+    n = position.shape[1]
+    tips, turns, good = position.copy(), np.empty((9, n)), np.empty(n, dtype=bool)
+    turns[:] = np.eye(3).reshape(9, 1) if rotation is None else rotation
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for rows in _blocks(n):
+            tip, turn, programmed = tips[:, rows], turns[:, rows].reshape(3, 3, -1), _turns(rotation, rows)
+            wanted, left = _lengths(control, tip, programmed), np.full(tip.shape[1], np.inf)
+            block = _Block(kernel, tip, programmed)
+            missing, before = wanted - block.lengths, np.array(kernel.arm)
+            for _ in range(FOLLOWING_STEPS):
+                shift, spin = _twist(block, missing)
+                tip, turn = tip + shift, _spun(spin, turn)
+                error = np.abs(missing).max(axis=0)
+                left = error * error / before  # a step shortens what is missing as the one before it did
+                if not (left > LENGTH_TOLERANCE).any():
+                    break
+                missing = wanted - _lengths(kernel, tip, turn)
+                before = np.maximum(error, LENGTH_TOLERANCE)
+            tips[:, rows], turns[:, rows] = tip, turn.reshape(9, -1)
+            good[rows] = left <= LENGTH_TOLERANCE
+    return tips, turns, good
+
+
+def _lengths(kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None) -> FloatArray:
+    vectors = _struts(kernel, position, rotation)[1]
+    return np.sqrt(dot(vectors, vectors))
+
+
+def _twist(block: _Block, missing: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Shift (3, m) and turn (3, m) of the tip that lengthen the struts by (6, m)."""
+    a, b = missing[:3], missing[3:]
+    x = b - dot(block.rows, a)
+    spin = np.array([dot(column, x) for column in block.q])
+    rest = a - dot(block.moments.swapaxes(0, 1), spin)
+    return np.array([dot(column, rest) for column in block.w]), spin
+
+
+def _spun(spin: FloatArray, turn: FloatArray) -> FloatArray:
+    """Orientations (3, 3, m) turned further by small vectors (3, m), by Cayley's formula: a rotation to all digits."""
+    half = 0.5 * spin
+    scale = 2.0 / (1.0 + dot(half, half))
+    across = np.array(cross(half, turn))
+    return np.asarray(turn + scale * (across + np.array(cross(half, across))))

@@ -139,23 +139,27 @@ def compliance_with_effects(
 ) -> FloatArray:
     """Compliance along one direction a pose of one tool, effects included, without a pivoted solve.
 
-    The struts are statically determinate: their forces are the closed form's, whatever gives way.
+    The struts are statically determinate: their forces are the closed form's, whatever gives way. Where the control
+    knows the geometry less well, the closed form also says where the platform goes.
 
     Returns
     -------
     (n,) m/N; nan where the exact route must be asked. Columns as of `compliance_along_columns`.
     """
     n = position.shape[1]
-    compliance = np.full(n, np.nan)
-    turns = None if rotation is None else rotation.T.reshape(-1, 3, 3)
+    compliance, sure = np.full(n, np.nan), np.ones(n, dtype=bool)
     kernel = closed_form.prepare(model.machine, tool_length)
+    if model.control is not None:
+        control = closed_form.prepare(model.control, tool_length, split_of=model.machine)
+        position, rotation, sure = closed_form.followed_columns(kernel, control, position, rotation)
+        model = replace(model, control=None)
+    turns = None if rotation is None else rotation.T.reshape(-1, 3, 3)
     for rows, path in _paths(model, position.T, turns, np.full(n, tool_length), force):
-        turn = None if rotation is None and model.control is None else path.rotation.reshape(-1, 9).T
-        tip = np.ascontiguousarray(path.position.T)
-        forces, good = closed_form.strut_forces_columns(kernel, tip, direction[:, rows], turn)
-        some = np.flatnonzero(good)
-        sure = path if len(some) == len(good) else path.take(some)
-        compliance[rows.start + some] = exact.compliance_along(model, sure, direction[:, rows].T[some], forces[some])
+        turn = None if rotation is None else rotation[:, rows]
+        forces, good = closed_form.strut_forces_columns(kernel, position[:, rows], direction[:, rows], turn)
+        some = np.flatnonzero(good & sure[rows])
+        known = path if len(some) == len(good) else path.take(some)
+        compliance[rows.start + some] = exact.compliance_along(model, known, direction[:, rows].T[some], forces[some])
     return compliance
 
 

@@ -138,7 +138,7 @@ def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOut
         except EffectFault:
             raise
         except InputError as error:  # at its bounds an effect may ask more than a machine can give
-            if words != "bounds":
+            if "bounds" not in words:
                 yield TrialOutcome("stiffness", False, f"{words}: {error}")
                 return
         if words == "typical, high":
@@ -184,14 +184,14 @@ def _poses(effect: Effect, machine: Hexapod, seed: int) -> FloatArray:
 def _parameter_sets(effect: Effect) -> Iterator[tuple[str, Values]]:
     """Words -> SI values. A bound that is not finite is left out."""
     sets = (("neutral", "neutral", 0), ("typical, low", "typical", 0), ("typical, high", "typical", 1))
-    for words, attribute, index in (*sets, ("bounds", "bounds", 0), ("bounds", "bounds", 1)):
+    for words, attribute, index in (*sets, ("lower bounds", "bounds", 0), ("upper bounds", "bounds", 1)):
         values: dict[str, str | float] = {}
         for p in effect.parameters:
             if p.discrete:
                 values[p.name] = SETUPS[0] if p.kind == "text" else int(p.bounds[index])
             else:
                 values[p.name] = p.si * (p.neutral if words == "neutral" else getattr(p, attribute)[index])
-        if words != "bounds" or np.isfinite([value for value in values.values() if isinstance(value, float)]).all():
+        if "bounds" not in words or np.isfinite([value for value in values.values() if isinstance(value, float)]).all():
             yield words, values
 
 
