@@ -72,8 +72,8 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
     search.report = progress or search.report
     front = search_placements(search)
-    number, left_out = front.best + 1, front.rapids_left_out
-    record = SearchRecord(task.options(), number, left_out, search.poses, front.searches, front.alone)
+    number = front.best + 1
+    record = SearchRecord(task.options(), number, search.left_out, search.poses, front.searches, front.alone)
     return _placed(task, numbered_rows(task.model, path, task.load, front, task.force), record, number)
 
 

@@ -167,7 +167,7 @@ class Placement(FolderResult):
         """Rules that the present placement itself does not keep, in sentences."""
         words, margin, before = [], self.task.rules.margin, self.before
         assert before is not None
-        least = float(before.at.margin.min())
+        least = float(before.at.reach.margin.min())
         if least < margin:
             words.append(
                 f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
