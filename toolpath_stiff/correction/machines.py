@@ -26,8 +26,8 @@ def data_hash(files: Sequence[str]) -> str:
     digest = hashlib.sha256()
     packaged = resources.files("toolpath_stiff") / "data" / "nist_table1.csv"
     for file in files:
-        own = file == NIST_TABLE_1
-        digest.update(packaged.read_bytes() if own else read_bytes(split_name(file)[0], "measurements"))
+        paper = file == NIST_TABLE_1
+        digest.update(packaged.read_bytes() if paper else read_bytes(split_name(file)[0], "measurements"))
     return digest.hexdigest()
 
 

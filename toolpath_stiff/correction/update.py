@@ -49,7 +49,7 @@ def update(task: UpdateTask) -> Update:
     """
     task = replace(task, files=tuple(task.files) or tuple(dict.fromkeys(task.data.file.tolist())))
     effect_files = tuple(map(str, task.effect_files))
-    request = task.asked or Asked(tuple(task.files), task.machine.name, effect_files, task.noise, task.strut_spread)
+    request = task.request or Asked(tuple(task.files), task.machine.name, effect_files, task.noise, task.strut_spread)
     if task.objective == MEAN_ERROR:
         if task.add or task.auto or not task.strut_law:
             raise InputError(

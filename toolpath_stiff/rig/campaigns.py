@@ -101,7 +101,7 @@ def _tilted_poses(nominal: Nominal, rng: Generator) -> FloatArray:
         radius, azimuth = TILTED_RADIUS * np.sqrt(rng.random()), rng.uniform(0.0, 2.0 * np.pi)
         tilt, about = rng.uniform(5.0, 25.0), rng.uniform(0.0, 2.0 * np.pi)
         height = TILTED_HEIGHTS[pose % len(TILTED_HEIGHTS)]
-        across, tilted = ((size * np.cos(at), size * np.sin(at)) for size, at in ((radius, azimuth), (tilt, about)))
+        across, tilted = ((r * np.cos(angle), r * np.sin(angle)) for r, angle in ((radius, azimuth), (tilt, about)))
         trial = np.round([*across, height, *tilted, rng.uniform(-10.0, 10.0)], 1)
         extension = np.array([m_from_mm(_extension(pose))])
         if reachable(nominal, m_from_mm(trial[None, :3]), rad_from_deg(trial[None, 3:]), extension)[0]:

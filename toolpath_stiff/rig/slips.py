@@ -93,9 +93,9 @@ def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = 
         name: values.tolist() if isinstance(table[name], list) else values.astype(np.asarray(table[name]).dtype)
         for name, values in wrong.items()
     }
-    modelled, found = (
-        np.log(readings(case.nominal, HiddenMachine(), rows_of(one))) - np.log(one["stiffness_N_per_mm"])
-        for one in (table, slipped)
+    before, after = (
+        np.log(sheet["stiffness_N_per_mm"]) - np.log(readings(case.nominal, HiddenMachine(), rows_of(sheet)))
+        for sheet in (table, slipped)
     )
     scale = Scale(case.nominal, rows_of(table), clamp_of(table), case.nuisances)
     return slipped, {
@@ -104,7 +104,7 @@ def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = 
         "columns": changed,
         "written": {name: np.asarray(slipped[name])[rows].tolist() for name in changed},
         "meant": {name: np.asarray(table[name])[rows].tolist() for name in changed},
-        "detectability": scale.covariance.length(modelled - found),
+        "detectability": scale.covariance.length(after - before),
     }
 
 
