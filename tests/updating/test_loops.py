@@ -22,7 +22,7 @@ from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.tables import TABLES, Tables, tables_of
 from toolpath_stiff.readings.measurements import measured_path, model_stiffness, read_measurements
 from toolpath_stiff.report.compare.page import text
-from toolpath_stiff.rig.case import again, draw_case
+from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import HiddenMachine
 from toolpath_stiff.rig.loops import true_displacements
@@ -213,7 +213,7 @@ def measured_again(case, file, loops, seed: int = 1):
     x, y, z, direction, loop, force = zip(*rows, strict=True)
     plan = {"x_mm": np.array(x), "y_mm": np.array(y), "z_mm": np.array(z), "direction": list(direction)}
     plan |= {"loop": list(loop), "force_N": np.array(force)}
-    table = again(case.nominal, case.machine, case.nuisances, plan, np.random.default_rng(seed))
+    table = case.again(plan, np.random.default_rng(seed))
     file.write_text(csv_text(table))
     return str(file)
 
