@@ -11,8 +11,8 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, examined, predictor_for, table_1
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.correction.update import update
+from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.file import load_machine
 
 ASKED = "Are these readings of this machine?"

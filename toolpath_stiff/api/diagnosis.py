@@ -13,7 +13,7 @@ from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.documents import without_nan
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import Asked, options
+from toolpath_stiff.hints import Asked, hint, options
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, numbers
 from toolpath_stiff.results import Progress, teller
@@ -277,8 +277,9 @@ def compare(
 
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     teller(progress)("comparing")
-    comparison = compare_readings(question.model, question.readings, asked=question.request, **question.common)
-    return replace(comparison, inputs=question.inputs)
+    comparison = compare_readings(question.model, question.readings, **question.common)
+    following = hint("which effect would explain it", question.request.command("diagnose"))
+    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=(following,)))
 
 
 @checked

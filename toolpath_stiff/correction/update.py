@@ -24,13 +24,13 @@ from toolpath_stiff.correction.strut_law import (
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import baseline
 from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.model import build_model, setup_of
