@@ -70,7 +70,7 @@ def _drafted(job: Job, folder: Path) -> dict[str, Any]:
     tables = {"same": case.rows}
     if job.hidden != NOISE:
         # The same seed: the same poses, struts, joints and scatter.
-        tables["gone"] = case_module.draw_case(job.seed, "tilted", "none", nuisances=Nuisances()).rows
+        tables["gone"] = case_module.draw_case(job.seed, "tilted", "none", noise=Nuisances()).rows
     old = np.asarray(case.rows["clamp"]) % 2 == 0
     file = folder / "old.csv"
     file.write_text(exercise.csv_text({name: np.asarray(values)[old] for name, values in case.rows.items()}))

@@ -68,7 +68,7 @@ def campaign(
     nuisances: hidden_module.Nuisances | None = None,
 ) -> tuple[Readings, dict[str, Any]]:
     """A blind campaign on the NIST machine and its truth."""
-    rows, truth = case.make_case(seed, layout=layout, hidden=hidden, size=size, nuisances=nuisances)
+    rows, truth = case.make_case(seed, layout=layout, hidden=hidden, size=size, noise=nuisances or 0.02)
     return read_text(exercise.csv_text(rows)), truth
 
 

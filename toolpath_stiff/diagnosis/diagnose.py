@@ -257,7 +257,7 @@ def choice_on_path(
     Where the program is out of reach, or a model has no answer there, the reason instead. `given` is under what the
     program runs; unless it names a set-up, the one that an explanation belongs to: there the choice matters.
     """
-    from toolpath_stiff.analysis import analyze
+    from toolpath_stiff.analysis.results import analyze
     from toolpath_stiff.analysis.statistics import stiffness_figures
 
     names = [name for name in diagnosis.explanations if name == NONE or name in diagnosis.fits]

@@ -50,7 +50,7 @@ def front_picture(placed: Placement) -> Figure:
     colour_scale(figure, dots, (0.845, 0.12, 0.022, 0.69), "weakest place, N/mm (more is better)")
     text = f"machine {machine_text(placed.machine_stated)}   ·   load {placed.best.load}"
     text += f"   ·   objective {placed.objective}"
-    heading(figure, 0.12, 0.94, f"Placements of {plain(placed.program.name)}", 0.045, text)
+    heading(figure, 0.12, 0.94, f"Placements of {plain(placed.best.program.name)}", 0.045, text)
     return figure
 
 
