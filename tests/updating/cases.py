@@ -173,7 +173,7 @@ def predictor_for(data: Readings) -> Predictor:
     design = (*(np.asarray(getattr(data, name)).tobytes() for name in DESIGN), data.missing)
     if design not in PREDICTORS:
         PREDICTORS[design] = Predictor(nist(), data)
-        PREDICTORS[design].joint_columns()  # kept with the predictor from now on
+        assert PREDICTORS[design].joint_columns.size  # kept with the predictor from now on
     found = copy.copy(PREDICTORS[design])
     idle = idle_on(found.base, data).values()
     found.data = replace(data, warnings=tuple(dict.fromkeys((*data.warnings, *idle))))

@@ -14,7 +14,7 @@ from scipy.stats import norm
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, dense, make_problem, simple_noise, table_1
 from tests.updating.test_evidence import by_hand, logs_by_hand, one_table, scatter
-from toolpath_stiff.inference.confounding import CONFOUNDED, Confounding, _linked, confounding
+from toolpath_stiff.inference.confounding import CONFOUNDED, Confounding, confounding
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.hidden_sizes import Detectable, detectable_sizes
 from toolpath_stiff.inference.hypotheses import Family, score_families, score_single
@@ -100,13 +100,6 @@ def test_sets_stand_together():
         apart = {name for name in found.names if not any(name in group for group in found.sets)}
         for name in apart:
             assert sum(found.matrix[found.names.index(name)] > CONFOUNDED) == 1
-
-
-def test_links_chain():
-    close = np.eye(5, dtype=bool)
-    for i, j in ((0, 2), (2, 4)):
-        close[i, j] = close[j, i] = True
-    assert _linked(close) == [[0, 2, 4], [1], [3]]
 
 
 def sizes(problem: Problem, families: list[Family], threshold: float = 9.0) -> dict[tuple[str, str], Detectable]:

@@ -26,7 +26,7 @@ TENFOLD = replace(TABLE, stiffness=10.0 * TABLE.stiffness)
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (CONSTANT, "all alike"),
+        (CONSTANT, "do not follow the model"),
         (SHUFFLED, "do not follow the model"),
         (replace(TABLE, stiffness=TABLE.stiffness[::-1]), "do not follow the model"),
         (TENFOLD, "9.9 times what the model says"),

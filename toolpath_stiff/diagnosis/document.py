@@ -159,7 +159,6 @@ def _not_excluded(hidden: Unexcluded) -> Document:
         "choice": dict(hidden.candidate.choice),
         "up_to": json_number(hidden.value / hidden.parameter.si, 2),
         "rms_percent": percent_of(hidden.rms, 2),
-        "left_percent": percent_of(hidden.left, 2),
         "probability": json_number(hidden.probability, 2),
         "would_tell": would_tell(hidden),
     }

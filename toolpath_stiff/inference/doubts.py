@@ -51,9 +51,8 @@ def _unlike(predictor: Predictor) -> str:
     modelled, off = (np.bincount(which, weights=values) / count for values in (model, residual))
     if len(count) < FEWEST_FOLLOWING or float(modelled.std()) < TELLS:
         return ""
-    if float((modelled + off).std()) <= NOTHING * float(modelled.std()):
-        return "The readings are all alike, where the model says that they differ"
-    correlation = float(np.corrcoef(modelled, modelled + off)[0, 1])
+    alike = float((modelled + off).std()) <= NOTHING * float(modelled.std())
+    correlation = 0.0 if alike else float(np.corrcoef(modelled, modelled + off)[0, 1])
     if correlation >= FOLLOWS:
         return ""
     return (

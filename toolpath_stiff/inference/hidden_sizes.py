@@ -96,8 +96,6 @@ class Unexcluded:
         SI value of the parameter up to which the readings do not exclude it (95 %), its other parameters neutral.
     rms
         Rms change of the tip's ln stiffness that it makes there, on its own.
-    left
-        Rms of what strut law and explanation cannot take up of that.
     probability
         Of being there beside the explanation, at any size.
     """
@@ -107,7 +105,6 @@ class Unexcluded:
     parameter: Parameter
     value: float
     rms: float
-    left: float
     probability: float = np.nan
 
 
@@ -159,26 +156,24 @@ class _Beside:
         And the mean of the likelihood over the prior of the size, 1 where the readings say nothing.
         """
         component = table.candidate.components[j]
-        least, squares = self._moved(self.fit.residual[None])
-        none, gain, mass = float(squares[0]), 0.0, 0.0
+        none, gain, mass = float(self._squares(self.fit.residual[None])[0]), 0.0, 0.0
         sides = []
         for sizes in self._sizes(table, j):
             every = np.zeros((len(sizes), len(table.candidate.components)))
             every[:, j] = sizes
             whole = self.problem.base_compliance if table.candidate.effect.is_instrument else self.compliance
             change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
-            moves, squares = self._moved(self.fit.residual + change)
-            rest = change - (moves - least[0]) @ self.fit.jacobian.T
-            changes, lefts = (np.sqrt(np.mean(rows[:, self.tip] ** 2, axis=1)) for rows in (change, rest))
-            sides.append((sizes, changes, lefts, squares))
+            squares = self._squares(self.fit.residual + change)
+            changes = np.sqrt(np.mean(change[:, self.tip] ** 2, axis=1))
+            sides.append((sizes, changes, squares))
             # Of the prior, as far as sizes are expected; whether the readings would show them does not matter here.
             weights = np.exp(log_expected(changes) + log_usual(sizes, component.typical()))
             weights *= np.abs(np.gradient(np.log(np.abs(sizes))))
             gain, mass = gain + float(weights @ np.exp(0.5 * (none - squares))), mass + float(weights.sum())
         most = min(none, *(float(squares.min()) for *_, squares in sides)) + LIKELY
-        size, rms, left = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
+        size, rms = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
         candidate, value = table.candidate, component.value(size)
-        return Unexcluded(candidate.effect, candidate, component.parameter, value, rms, left), gain / mass
+        return Unexcluded(candidate.effect, candidate, component.parameter, value, rms), gain / mass
 
     def _sizes(self, table: CandidateTable, j: int) -> Iterator[FloatArray]:
         """Sizes (g,) of each sign, rising."""
@@ -193,27 +188,24 @@ class _Beside:
             ends = np.minimum(np.array([SMALLEST, LARGEST]) / max(scale, 1e-300), component.reach(sign))
             yield sign * np.geomspace(min(ends[0], 0.1 * ends[1]), ends[1], SIZES)
 
-    def _moved(self, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Moves (g, 2 + p) of law and sizes that fit residuals (g, n) best, and the squares (g,) that are left."""
+    def _squares(self, residuals: FloatArray) -> FloatArray:
+        """(g,) squares that are left of residuals (g, n) once law and sizes have moved to fit them best."""
         gradient = residuals @ self.weighted.T + self.pull
         moves = np.linalg.solve(self.information, gradient.T).T
         for k in np.flatnonzero(((moves < self.low) | (moves > self.high)).any(axis=1)).tolist():
             moves[k] = bounded_step(self.information, gradient[k], self.low, self.high)
         squares = self.precision.squares(residuals) - 2.0 * (gradient * moves).sum(axis=1)
-        return moves, squares + ((moves @ self.information) * moves).sum(axis=1)
+        return np.asarray(squares + ((moves @ self.information) * moves).sum(axis=1))
 
 
-def _widest(side: tuple[FloatArray, ...], none: float, most: float) -> tuple[float, float, float]:
-    """Size, rms and what is left at the largest size whose squares are at most `most`; between two by a line.
+def _widest(side: tuple[FloatArray, ...], none: float, most: float) -> tuple[float, float]:
+    """Size and rms at the largest size whose squares are at most `most`; between two by a line.
 
     `side`: the same and the squares of sizes (g,) of one sign; `none`: the squares at size 0.
     """
-    figures = np.concatenate([[[0.0], [0.0], [0.0], [none]], np.array(side)], axis=1)
-    squares = figures[3]
+    sizes, rms, squares = np.concatenate([[[0.0], [0.0], [none]], np.array(side)], axis=1)
     last = int(np.flatnonzero(squares <= most).max(initial=0))
-    share = 0.0
-    if last + 1 < len(squares):
-        share = float(np.clip((most - squares[last]) / (squares[last + 1] - squares[last]), 0.0, 1.0))
-    further = figures[:3, min(last + 1, len(squares) - 1)]
-    size, rms, left = (figures[:3, last] + share * (further - figures[:3, last])).tolist()
-    return size, rms, left
+    after = min(last + 1, len(squares) - 1)
+    share = float(np.clip((most - squares[last]) / (squares[after] - squares[last]), 0.0, 1.0)) if after > last else 0.0
+    size, value = (float(x[last] + share * (x[after] - x[last])) for x in (sizes, rms))
+    return size, value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from math import erfc, sqrt
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from toolpath_stiff.inference.covariances import Precision
 from toolpath_stiff.inference.evidence import MOST_ROUNDS, Fit, Problem, law_prior, law_terms
 from toolpath_stiff.inference.gates import Forms, FormStatistics, set_wild_aside
 from toolpath_stiff.inference.size_priors import likely_interval
-from toolpath_stiff.inference.tails import normal_below
 from toolpath_stiff.stiffness.contract import Effect
 
 NOTHING = -1e9  # log evidence of what cannot be
@@ -227,12 +227,15 @@ def _quantile(
 ) -> float:
     """Size up to which the mixture of cut-off normals (share, mean, sd) and of zero holds `share`."""
 
+    def normal(x: float) -> float:
+        return 0.5 * erfc(-x / sqrt(2.0))
+
     def below(size: float) -> float:
         total = absent if size >= 0.0 else 0.0
         for part, mean, sd in parts:
             first, last, here = ((x - mean) / sd for x in (*bracket, size))
-            start = normal_below(first)
-            total += part * (normal_below(here) - start) / max(normal_below(last) - start, 1e-300)
+            start = normal(first)
+            total += part * (normal(here) - start) / max(normal(last) - start, 1e-300)
         return total
 
     low, high = bracket

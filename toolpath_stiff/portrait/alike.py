@@ -16,7 +16,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import candidates_of
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.portrait.choice import ROUGH, Leading, summed
+from toolpath_stiff.portrait.choice import ROUGH, Leading, fewest, summed
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.selection import Selection
 from toolpath_stiff.stiffness.term_effect import CATALOGUE_LINKS
@@ -31,9 +31,6 @@ ITSELF = 0.99  # correlation from which a term of the same link is the named eff
 
 
 MOST_TOLD, TOLD = 6, 0.03  # terms that are told, and the least share of one
-
-
-HELD = 0.90  # share that the links and variables told add up to
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,7 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
     shares = weights[order] / weights.sum()
     sized = [terms[i].sized(_size(selection, terms[i], float(sizes.size[i, -1]))) for i in rows[order].tolist()]
     leading = [(term, share, True) for term, share in zip(sized, shares.tolist(), strict=True)]
-    links, variables = (_fewest(summed(leading, of)) for of in (lambda term: term.link, lambda term: term.variable))
+    links, variables = (fewest(summed(leading, of)) for of in (lambda term: term.link, lambda term: term.variable))
     return Alike(_told(leading), links, variables)
 
 
@@ -134,9 +131,3 @@ def _told(leading: list[Leading]) -> tuple[tuple[Term, float], ...]:
         shares[kind] = shares.get(kind, 0.0) + weight
     ranked = sorted(shares.items(), key=lambda item: -item[1])
     return tuple((best[kind], share) for kind, share in ranked[:MOST_TOLD] if share >= TOLD)
-
-
-def _fewest(summed: list[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
-    """The fewest that hold `HELD`."""
-    count = 1 + int(np.searchsorted(np.cumsum([share for _, share in summed]), HELD - 1e-9))
-    return tuple(summed[:count])

@@ -39,6 +39,9 @@ BEGINNINGS = 3  # further links at which the search begins
 ROUGH, SHAPE = 2.5, 0.0015
 
 
+HELD = 0.90  # probability that a set of links or variables adds up to
+
+
 FAINT = 0.02  # share below which a description, or a term as the leading one of it, is left out of the sums
 
 
@@ -51,6 +54,12 @@ def summed(leading: Sequence[Leading], of: Callable[[Term], str]) -> list[tuple[
     for term, weight, _ in leading:
         sums[of(term)] = sums.get(of(term), 0.0) + weight
     return sorted(sums.items(), key=lambda item: (-item[1], item[0]))
+
+
+def fewest(summed: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
+    """The fewest names that hold `HELD` of the probability."""
+    count = 1 + int(np.searchsorted(np.cumsum([share for _, share in summed]), HELD - 1e-9))
+    return tuple(summed[:count])
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,10 @@ from toolpath_stiff.inference.gates import simulate
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.portrait.choice import Chosen, choose, summed
+from toolpath_stiff.portrait.choice import Chosen, choose, fewest, summed
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.selection import Description, Selection
 from toolpath_stiff.stiffness.terms import Term
-
-HELD = 0.90  # probability that a set of links or variables adds up to
-
 
 MOST_LINKS, MOST_VARIABLES, MOST_ALIKE = 4, 3, 4
 
@@ -162,15 +159,9 @@ def _sized(ground: Ground, description: Description, k: int, probability: float 
 
 
 def _honest(summed: Sequence[tuple[str, float]], most: int, cut: bool = False) -> tuple[tuple[str, float], ...]:
-    """The fewest that hold `HELD`; where that takes more than `most`, none, or the first ones if `cut`."""
-    fewest: list[tuple[str, float]] = []
-    for name, weight in summed:
-        fewest.append((name, weight))
-        if sum(w for _, w in fewest) >= HELD:
-            break
-    if len(fewest) > most:
-        return tuple(fewest[:most]) if cut else ()
-    return tuple(fewest)
+    """The fewest that hold most of the probability; where these are more than `most`, none, or the first if `cut`."""
+    names = fewest(summed)
+    return names[:most] if cut or len(names) <= most else ()
 
 
 def _alike(selection: Selection, chosen: Chosen) -> tuple[Sized, ...]:
@@ -198,7 +189,7 @@ def _kind(term: Term) -> tuple[object, ...]:
 def _explained(selection: Selection, start: Description, description: Description) -> float:
     """Under the scatter of the description, so that wild readings count alike."""
     precision, free = description.fit.scatter.precision, len(selection.compliance) - 2
-    fixed = selection.described((), start.columns, start.scale, start.fit.law, description.fit.scatter)
+    fixed = selection.described((), start.fit.law, description.fit.scatter)
     before, after = (float(precision.squares(fitted.fit.residual)) for fitted in (fixed, description))
     return float(np.clip((before - after) / max(before - free, 1e-9), 0.0, 1.0)) if before > after else 0.0
 
