@@ -26,7 +26,6 @@ from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
 from toolpath_stiff.rig import exercise
-from toolpath_stiff.rig.case import again
 from toolpath_stiff.rig.exercise import read_plan
 
 LAYOUTS = ("tilted", "paper")
@@ -113,7 +112,7 @@ def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: 
     file = folder / "measurements.csv"
     file.write_text(exercise.csv_text(rows), encoding="utf-8")
     start = time.process_time()
-    diagnosis = diagnose(machine(), read_measurements(file, machine()), plan_next=False, **stated)
+    diagnosis = diagnose(machine(), read_measurements(file, machine()), **stated)
     found = diagnosis.to_dict()
     cpu = time.process_time() - start
     record = {
@@ -176,7 +175,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
     case = case_module.draw_case(job.seed, job.layout, hidden=job.hidden)
     file = folder / "measurements.csv"
     file.write_text(exercise.csv_text(case.rows), encoding="utf-8")
-    before = diagnose(machine(), read_measurements(file, machine()), plan_next=False)
+    before = diagnose(machine(), read_measurements(file, machine()))
     truth = case.truth["hidden"][0]
     record: Record = {"truth": [truth], "effects": case.truth["effects"], "plausible": list(before.plausible)}
     plans = {n: _plan(before, n) for n in POSES}
@@ -207,7 +206,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
         for label, further, clamps in (("planned", chosen, kept), ("random", random, list(range(n)))):
             more = folder / f"{label}_{n}.csv"
             more.write_text(_rows_of_clamps(further, clamps), encoding="utf-8")
-            after = diagnose(machine(), read_measurements([file, more], machine()), plan_next=False)
+            after = diagnose(machine(), read_measurements([file, more], machine()))
             settled = after.verdict == "identified" and after.plausible == [truth]
             record[f"{label}_{n}"] = [after.verdict, list(after.plausible), settled]
     return record
@@ -239,7 +238,7 @@ def _measured(
     file.write_text(plan_csv(plan_rows(plan.visits, visits, set(before.data.point.tolist()))), encoding="utf-8")
     table = read_plan(str(file), case.nominal)
     table["clamp"] = table["clamp"] + CLAMPS_LATER
-    return again(case.nominal, case.machine, case.nuisances, table, np.random.default_rng(seed))
+    return case.again(table, np.random.default_rng(seed))
 
 
 def _rows_of_clamps(table: dict[str, Any], clamps: Sequence[int]) -> str:

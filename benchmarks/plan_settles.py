@@ -32,7 +32,7 @@ from toolpath_stiff.planning.result import plan
 from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.tables import TABLES, tables_of
 from toolpath_stiff.readings.measurements import read_measurements
-from toolpath_stiff.rig.case import DrawnCase, again, draw_case
+from toolpath_stiff.rig.case import DrawnCase, draw_case
 from toolpath_stiff.rig.exercise import csv_text, read_plan
 
 POSES = 6
@@ -82,7 +82,7 @@ def _planned(seed: int, hidden: str, folder: Path) -> Record:
     tip = folder / "tip.csv"
     tip.write_text(csv_text(case.rows))
     data = read_measurements(str(tip), machine)
-    before = diagnose(machine, data, plan_next=False)
+    before = diagnose(machine, data)
     if before.verdict != "ambiguous" and hidden != "joint_compliance":
         return {}
     proposal = plan(machine, data, replace(Menu.of(data), indicators=True), n=POSES, judgement=before.main)
@@ -95,7 +95,7 @@ def _planned(seed: int, hidden: str, folder: Path) -> Record:
         files = files or taken
         needed = _needed(folder, taken)
         minutes.append(visits.minutes(some[:needed]))
-    after = diagnose(machine, read_measurements([str(tip), *files], machine), plan_next=False)
+    after = diagnose(machine, read_measurements([str(tip), *files], machine))
     outlook = proposal.choice.after
     rivals = [rival.name for rival in proposal.choice.rivals]
     true = " + ".join(sorted(case.truth["hidden"]))
@@ -124,7 +124,7 @@ def _measured(case: DrawnCase, planned: RivalPlan, visit: int, file: Path, numbe
         row["clamp"], row["point"] = number + 1, f"{file.stem}"
     file.write_text(plan_csv(rows))
     table = read_plan(str(file), case.nominal)
-    file.write_text(csv_text(again(case.nominal, case.machine, case.nuisances, table, np.random.default_rng(number))))
+    file.write_text(csv_text(case.again(table, np.random.default_rng(number))))
     return str(file)
 
 

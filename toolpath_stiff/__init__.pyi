@@ -8,13 +8,11 @@ from toolpath_stiff.analysis.results import Analysis as Analysis
 from toolpath_stiff.api.by_hand import Preview as Preview
 from toolpath_stiff.api.by_hand import preview as preview
 from toolpath_stiff.api.case_studies import case_study as case_study
-from toolpath_stiff.api.correction import plan as plan
+from toolpath_stiff.api.comparison import compare as compare
+from toolpath_stiff.api.correction import draft_effect as draft_effect
 from toolpath_stiff.api.correction import update as update
-from toolpath_stiff.api.diagnosis import Measurements as Measurements
-from toolpath_stiff.api.diagnosis import compare as compare
 from toolpath_stiff.api.diagnosis import diagnose as diagnose
 from toolpath_stiff.api.effects import check_effects as check_effects
-from toolpath_stiff.api.effects import draft_effect as draft_effect
 from toolpath_stiff.api.effects import effect_template as effect_template
 from toolpath_stiff.api.effects import effects as effects
 from toolpath_stiff.api.machine_files import MachineFile as MachineFile
@@ -24,10 +22,12 @@ from toolpath_stiff.api.machine_files import recover_geometry as recover_geometr
 from toolpath_stiff.api.machines import Machine as Machine
 from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
 from toolpath_stiff.api.many import analyze_many as analyze_many
+from toolpath_stiff.api.measurements import Measurements as Measurements
 from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
 from toolpath_stiff.api.placements import place as place
 from toolpath_stiff.api.placements import rewrite as rewrite
 from toolpath_stiff.api.placements import try_placement as try_placement
+from toolpath_stiff.api.planning import plan as plan
 from toolpath_stiff.api.poses import map_stiffness as map_stiffness
 from toolpath_stiff.api.poses import pose as pose
 from toolpath_stiff.api.poses import read_poses as read_poses
@@ -52,7 +52,7 @@ from toolpath_stiff.errors import TableError as TableError
 from toolpath_stiff.errors import TpsError as TpsError
 from toolpath_stiff.errors import UnreachableError as UnreachableError
 from toolpath_stiff.nc.program import Program as Program
-from toolpath_stiff.path import SampledPath as SampledPath
+from toolpath_stiff.path.table import SampledPath as SampledPath
 from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
 from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
 from toolpath_stiff.placement.result import Placement as Placement

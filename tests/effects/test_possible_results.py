@@ -12,10 +12,10 @@ import pytest
 import toolpath_stiff as tps
 from tests.effects.test_own_effects import BODY, FORM, own, use, with_machine
 from tests.stiffness.cases import nist
-from toolpath_stiff.analysis import analyze
 from toolpath_stiff.analysis.document import required_stiffness_missed
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.poses import evaluate_poses
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, PoseError, TpsError
 from toolpath_stiff.nc.reader import parse_program
@@ -105,7 +105,7 @@ def test_an_indefinite_form_is_refused_however_small_its_share(tmp_path):
     ("key", "value", "told"),
     [
         ("stiffness_N_per_um", "[5e-324, 5e-324]", "stiffness_N_per_um = 4.94066e-324"),
-        ("length_mm", "[1e-300, 2e-300]", "the lengths are all but equal"),
+        ("length_mm", "[1e-300, 2e-300]", "0.001 mm apart or more"),
     ],
 )
 def test_machine_files_with_absurd_laws_are_refused_with_their_line(tmp_path, capsys, key, value, told):

@@ -12,11 +12,11 @@ import pytest
 
 from tests.browser import needs_browser, opened, painted
 from tests.placement.test_placement_search import headline_figures
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
-from toolpath_stiff.path import sample_moves
+from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.report.place.html import thinned_rows
 
 ROOT = Path(__file__).parent.parent.parent

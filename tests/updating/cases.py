@@ -68,7 +68,7 @@ def campaign(
     nuisances: hidden_module.Nuisances | None = None,
 ) -> tuple[Readings, dict[str, Any]]:
     """A blind campaign on the NIST machine and its truth."""
-    rows, truth = case.make_case(seed, layout=layout, hidden=hidden, size=size, nuisances=nuisances)
+    rows, truth = case.make_case(seed, layout=layout, hidden=hidden, size=size, noise=nuisances or 0.02)
     return read_text(exercise.csv_text(rows)), truth
 
 
@@ -173,7 +173,7 @@ def predictor_for(data: Readings) -> Predictor:
     design = (*(np.asarray(getattr(data, name)).tobytes() for name in DESIGN), data.missing)
     if design not in PREDICTORS:
         PREDICTORS[design] = Predictor(nist(), data)
-        PREDICTORS[design].joint_columns()  # kept with the predictor from now on
+        assert PREDICTORS[design].joint_columns.size  # kept with the predictor from now on
     found = copy.copy(PREDICTORS[design])
     idle = idle_on(found.base, data).values()
     found.data = replace(data, warnings=tuple(dict.fromkeys((*data.warnings, *idle))))
@@ -246,7 +246,7 @@ def judged(seed: int, layout: str = "tilted", hidden: str = "none", size: float 
 def make_problem(machine: Hexapod, data: Readings, noise: Noise) -> tuple[Problem, FloatArray]:
     """Data, model and scatter, ready for fits; and the covariance (n, n) of ln readings."""
     problem = Problem.of(Predictor(machine, data), noise)
-    return problem, problem.scatter.covariance.dense()
+    return problem, dense(problem.scatter.covariance)
 
 
 def correlated_covariance(own: ArrayLike, shared: ArrayLike) -> Covariance:
@@ -255,9 +255,21 @@ def correlated_covariance(own: ArrayLike, shared: ArrayLike) -> Covariance:
     return Covariance(own, Groups.by(np.arange(len(own))), 0.0, np.asarray(shared, dtype=float).T)
 
 
+def dense(covariance: Covariance) -> FloatArray:
+    """(n, n), written out."""
+    same = covariance.groups.of[:, None] == covariance.groups.of[None, :]
+    return np.diag(covariance.own_variance) + covariance.common * same + covariance.shared.T @ covariance.shared
+
+
+def selected(covariance: Covariance, kept: NDArray[np.bool_]) -> Covariance:
+    """Of some of the readings."""
+    groups = Groups.by(covariance.groups.of[kept])
+    return Covariance(covariance.own_variance[kept], groups, covariance.common, covariance.shared[:, kept])
+
+
 def examined(machine: Hexapod, data: Readings, **options: Any) -> Diagnosis:
     """A diagnosis without the plan of what to measure next."""
-    return diagnose(machine, data, plan_next=False, **options)
+    return diagnose(machine, data, **options)
 
 
 @cache

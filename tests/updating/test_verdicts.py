@@ -24,7 +24,6 @@ from toolpath_stiff.inference.judgement import (
     FALSE_ALARM,
     NONE,
     OUTSIDE,
-    Probabilities,
     _smallest_set,
     _sparing,
     decide,
@@ -146,7 +145,8 @@ def test_two_strong_effects_are_both_named(pair):
     assert judgement.probability[name] > 0.9
     # Each of them is needed.
     best = next(p for p in judgement.pairs if p.names == tuple(sorted(pair.split(","))))
-    assert all(best.log_evidence > judgement.family(member).log_evidence + 10.0 for member in best.names)
+    evidence = {family.name: family.log_evidence for family in judgement.families}
+    assert all(best.log_evidence > evidence[member] + 10.0 for member in best.names)
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_the_plausible_set_is_the_smallest_that_holds_95_percent():
     ],
 )
 def test_a_pair_is_named_where_no_other_is_left(weights, verdict, explanations):
-    assert decide(SimpleNamespace(enough=False, singles=()), Probabilities(weights)) == (verdict, explanations)
+    assert decide(SimpleNamespace(enough=False, singles=()), weights) == (verdict, explanations)
 
 
 @pytest.mark.parametrize(

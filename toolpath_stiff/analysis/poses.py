@@ -10,14 +10,14 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import refuse_no_number
-from toolpath_stiff.analysis.loads import softest_directions, stiffest_directions
+from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.documents import without_nan
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, reach
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
@@ -124,9 +124,7 @@ class PoseStiffness(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a pose, the columns of `tps pose --csv`."""
-        import pandas as pd
-
-        return pd.DataFrame(self.columns)
+        return frame_of(self.columns)
 
     def to_dict(self) -> dict[str, Any]:
         """Of a single pose its figures; of several, a list of them under "poses", null where out of reach."""
@@ -183,7 +181,7 @@ def evaluate_poses(
     if model.load_dependent:
         soft, stiff = (core.extreme_directions(model, tip, turn, tool_length, force, which) for which in (True, False))
     else:
-        soft, stiff = softest_directions(compliance), stiffest_directions(compliance)
+        soft, stiff = (principal_directions(compliance, which) for which in (True, False))
     axes = [along(np.broadcast_to(axis, (len(tip), 3))) for axis in np.eye(3)]
 
     def spread(values: FloatArray) -> FloatArray:

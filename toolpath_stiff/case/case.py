@@ -18,9 +18,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.inputs import finite, pose_si
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.measurements import Measurements
 from toolpath_stiff.api.programs import analyze
 from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.case.contents import reading_arguments

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
-from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.measurements import Measurements
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_bytes, write_atomically

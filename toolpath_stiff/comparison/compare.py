@@ -6,7 +6,7 @@ counted and which sign they have: `baseline`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from io import StringIO
@@ -16,18 +16,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.comparison.answers import Answer, summary_of
 from toolpath_stiff.comparison.load_path import LinkShares, load_path_shares
 from toolpath_stiff.comparison.loop_readings import BesideTip, beside_tip, strut_history
 from toolpath_stiff.comparison.principles import Check, assess, model_free_checks
 from toolpath_stiff.comparison.residuals import ReadingNames, Residuals, Variable
 from toolpath_stiff.comparison.structure import Scattering, find_structure
-from toolpath_stiff.comparison.summary import ComparisonSummary
+from toolpath_stiff.comparison.summary import Answer, ComparisonSummary, summary_of
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
-from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import base_fit
@@ -47,9 +44,6 @@ DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 
 
 FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
-
-
-TELLS_LAW = 0.01  # smallest over largest singular value from which data tell the law's two constants apart
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,11 +127,6 @@ class Comparison(FolderResult):
         figure: Figure = self.view.measured_modelled_png.figure(self)
         return figure
 
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps compare`."""
-        files: Mapping[str, Content] = self.view.files(self, plots=plots)
-        return files
-
     def _short(self) -> str:
         return f"{self.summary.machine}, mean error {self.summary.baseline.mean_abs_error_percent:.2f} %"
 
@@ -156,7 +145,6 @@ def compare(
     effect_files: Sequence[str | Path] = (),
     seed: int = 0,
     draws: int = DRAWS,
-    asked: Asked | None = None,
 ) -> Comparison:
     """How far the model is from measurements, where, and how much of it is more than scatter.
 
@@ -176,8 +164,6 @@ def compare(
         Of the simulated scatter.
     draws
         Simulated sets of readings.
-    asked
-        What the commands that go on from here carry.
 
     Raises
     ------
@@ -204,26 +190,14 @@ def compare(
     noises = noise_models(data, noise, strut_spread)
     checks, cannot = model_free_checks(machine, data)
     answers = [_answer(residuals, checks, noise_model, draws, seed) for noise_model in noises]
-    files = tuple(dict.fromkeys(data.file.tolist()))
-    request = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
     beside = _beside_tip(machine, every, effect_files, noise_models(every, noise, strut_spread)[-1], seed)
-    following = [hint("which effect would explain it", request.command("diagnose"))]
     scattering = answers[-1].scattering
+    summary = certain(summary_of(residuals, answers, cannot, beside, seed))
     return Comparison(
-        residuals.predictor,
-        data,
-        noises,
-        residuals.log_model,
-        residuals.values,
-        np.sqrt(scattering.square),
-        scattering.covariance,
-        scattering.places,
-        answers[-1].structure.excess,
-        tuple(residuals.numbers),
-        tuple(residuals.names),
-        load_path_shares(residuals.predictor.base, data),
-        certain(summary_of(residuals, answers, cannot, beside, seed, following)),
-    )
+        residuals.predictor, data, noises, residuals.log_model, residuals.values, np.sqrt(scattering.square),
+        scattering.covariance, scattering.places, answers[-1].structure.excess, tuple(residuals.numbers),
+        tuple(residuals.names), load_path_shares(residuals.predictor.base, data), summary,
+    )  # fmt: skip
 
 
 def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int, seed: int) -> Answer:
@@ -232,14 +206,10 @@ def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int,
     spread = covariance(noise, predictor)
     scattering = Scattering(noise, spread, predictor.data.clamp, residuals.places, draws, seed)
     structure = find_structure(values, residuals.patterns, scattering)
-    refitted = law = None
     problem = Problem(predictor, Scatter.of(noise, spread))
-    if len(values) >= FEWEST_TO_REFIT:
-        law = base_fit(problem, law_free=True)
-        if np.linalg.cond(residuals.law_columns) < 1.0 / TELLS_LAW:
-            refitted = find_structure(values, residuals.patterns, scattering, residuals.law_columns.T, most=0)
+    law = base_fit(problem, law_free=True) if len(values) >= FEWEST_TO_REFIT else None
     model_free = assess(checks, predictor.data, spread, scattering.draws(0.0))
-    return Answer(noise, scattering, structure, refitted, law, model_free, problem)
+    return Answer(noise, scattering, structure, law, model_free, problem)
 
 
 def _beside_tip(

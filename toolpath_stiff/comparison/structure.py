@@ -106,7 +106,7 @@ class FoundPattern:
         t, positive: stiffer than modelled.
     p_adjusted
         Probability of such a largest |t| in scatter alone.
-    coefficient, standard_error
+    coefficient
         Of the column, beside the patterns found before it.
     alike
         Other patterns that cannot be told from it in these data.
@@ -116,7 +116,6 @@ class FoundPattern:
     statistic: float
     p_adjusted: float
     coefficient: float
-    standard_error: float
     alike: tuple[Pattern, ...]
 
 
@@ -358,8 +357,6 @@ def find_structure(
     residual: FloatArray,
     patterns: list[Pattern],
     scattering: Scattering,
-    fixed: FloatArray | None = None,
-    most: int = MOST_PATTERNS,
 ) -> FoundPatterns:
     """Which patterns residuals (n,) show beyond scatter.
 
@@ -371,18 +368,13 @@ def find_structure(
         What is looked for.
     scattering
         The scatter.
-    fixed
-        (m, n) columns that are free anyway, such as those of the strut law.
-    most
-        So many patterns are taken out one after the other.
     """
-    n = len(residual)
     columns = np.array([pattern.values for pattern in patterns])
-    base = np.zeros((0, n)) if fixed is None else fixed
+    base = np.zeros((0, len(residual)))
     detections: list[FoundPattern] = []
     tests: tuple[FoundPattern, ...] = ()
     excess = left = 0.0
-    for step in range(most + 1):
+    for step in range(MOST_PATTERNS + 1):
         fit = _Fit(scattering, columns, base)
         statistic, grid, factor = fit.statistics(residual[None])
         t, excess_index = statistic[0], int(grid[0])
@@ -394,15 +386,15 @@ def find_structure(
         alike = np.abs(x.T @ x) > ALIKE
         np.fill_diagonal(alike, val=False)
         answers = [
-            FoundPattern(pattern, float(t[i]), float(p[i]), float(t[i] / sizes[i]), float(1.0 / sizes[i]),
+            FoundPattern(pattern, float(t[i]), float(p[i]), float(t[i] / sizes[i]),
                          tuple(patterns[j] for j in np.flatnonzero(alike[i])))
             for i, pattern in enumerate(patterns)
         ]  # fmt: skip
         if step == 0:
             excess = left
-            tests = tuple(test for test in answers if test.standard_error > 0.0)
+            tests = tuple(test for test, size in zip(answers, sizes, strict=True) if np.isfinite(size))
         best = int(np.argmax(np.abs(t) >= (1.0 - TIED) * np.abs(t).max()))
-        if p[best] >= SIGNIFICANT or step == most:
+        if p[best] >= SIGNIFICANT or step == MOST_PATTERNS:
             break
         detections.append(answers[best])
         base = np.concatenate([base, columns[[best]]])

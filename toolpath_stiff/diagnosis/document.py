@@ -6,15 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.diagnosis.beside import beside_text, would_tell
 from toolpath_stiff.diagnosis.examination import Examination
 from toolpath_stiff.diagnosis.rows import HypothesisRow, HypothesisRows, percent_of, rounded_errors
-from toolpath_stiff.diagnosis.words import assumptions, doubts, next_steps, verdict_text, why
+from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why, would_tell
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.inference.confounding import CONFOUNDED
-from toolpath_stiff.inference.detectable import Detectable
+from toolpath_stiff.inference.hidden_sizes import Detectable, Unexcluded
 from toolpath_stiff.inference.judgement import Judgement
-from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.portrait.document import alike_entry, portrait_entry
 from toolpath_stiff.units import certain, json_number, mm_from_m, n_per_um_from_n_per_m
 
@@ -74,9 +72,6 @@ def document_of(diagnosis: Examination, rows: HypothesisRows) -> dict[str, Any]:
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": [*diagnosis.data.notes, *doubts(diagnosis)],
         "suspect_rows": to_dict(diagnosis.suspects),
-        "detectable_slips": [
-            {"column": slip.column, "unit": slip.unit, "size": json_number(slip.size, 2)} for slip in diagnosis.slips
-        ],
         "seed": diagnosis.seed,
         "machine": diagnosis.machine.name,
         "effects": diagnosis.predictor.effects_that_act,
@@ -164,7 +159,6 @@ def _not_excluded(hidden: Unexcluded) -> Document:
         "choice": dict(hidden.candidate.choice),
         "up_to": json_number(hidden.value / hidden.parameter.si, 2),
         "rms_percent": percent_of(hidden.rms, 2),
-        "left_percent": percent_of(hidden.left, 2),
         "probability": json_number(hidden.probability, 2),
         "would_tell": would_tell(hidden),
     }

@@ -10,15 +10,14 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.loop_readings import BesideTip
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.confounding import Confounding
-from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.hidden_sizes import Detectable, Unexcluded
 from toolpath_stiff.inference.judgement import Judgement
 from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.slips import SlipSize, SuspectEntry
-from toolpath_stiff.inference.unexcluded import Unexcluded
+from toolpath_stiff.inference.slips import SuspectEntry
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait
@@ -65,8 +64,6 @@ class Examination:
         Effects that the readings neither show nor exclude beside the likeliest explanation, at a size that matters.
     suspects
         Rows that look mistyped; `data` no longer holds those that are clear.
-    slips
-        The smallest slips of a pose that these readings would show; none where rows were not looked at.
     loops
         Readings of indicators beside the tip against the likeliest explanation. Everything above with an entry a
         reading is of those of the tip.
@@ -97,7 +94,6 @@ class Examination:
     alike: Alike | None = None
     unexcluded: tuple[Unexcluded, ...] = ()
     suspects: tuple[SuspectEntry, ...] = ()
-    slips: tuple[SlipSize, ...] = ()
     loops: BesideTip = field(default_factory=BesideTip)
     inputs: tuple[str, ...] = ()
 

@@ -18,7 +18,8 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import Candidate, CandidateTable, Component
 from toolpath_stiff.inference.covariances import Precision
-from toolpath_stiff.inference.noise import Noise, NormalEquations, Scatter, covariance, gauss_newton, scaled_inverse
+from toolpath_stiff.inference.least_squares import NormalEquations, gauss_newton, scaled_inverse
+from toolpath_stiff.inference.noise import Noise, Scatter, covariance
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.size_priors import Sight, SizePrior, log_comparable
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -364,11 +365,8 @@ class Problem:
 
 def split(tables: Sequence[CandidateTable], sizes: FloatArray) -> Iterator[tuple[CandidateTable, FloatArray]]:
     """Each table with its own of the sizes (p,)."""
-    start = 0
-    for table in tables:
-        end = start + len(table.candidate.components)
-        yield table, sizes[start:end]
-        start = end
+    ends = np.cumsum([len(table.candidate.components) for table in tables])
+    return zip(tables, np.split(sizes, ends[:-1]), strict=True)
 
 
 def _just_beyond(component: Component, size: float) -> bool:

@@ -17,9 +17,7 @@ guessed low and high.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +30,6 @@ from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats
 from toolpath_stiff.readings.measurements import Readings
-
-At = TypeVar("At")  # where a fit stands
-
 
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
 
@@ -174,14 +169,14 @@ def _noise_of_tip(
 ) -> tuple[Noise, ...]:
     n, copies = len(data), copied(data)
     repeats = None if copies else from_repeats(data)
+    wild = OUTLIERS if repeats is None else repeats.wild
 
     def model(
         name: str, repeat: float | FloatArray, clamping: float, freedom: float, origin: str, remark: str = ""
     ) -> Noise:
-        wild, every = OUTLIERS if repeats is None else repeats.wild, np.full(n, repeat)
-        if every.min() < LEAST:
+        every = np.maximum(np.full(n, repeat), LEAST)
+        if np.min(repeat) < LEAST:
             origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
-        every = np.maximum(every, LEAST)
         return Noise(name, every, clamping, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark)
 
     remark = ""
@@ -203,24 +198,23 @@ def _noise_of_tip(
         origin += _percent(repeats.repeat, repeats.clamping)
         origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
         repeat, freedom = np.full(n, repeats.repeat), repeats.freedom
-        if rows.any() and not rows.all():  # of other readings, mostly: both count
-            repeat, freedom = _both(relative, rows, repeats, trusted=not remark)
+        if rows.any() and not rows.all():  # each stands for its own readings, trusted as far as the less certain one
+            repeat[rows], freedom = _parts(relative[rows])[0], min(STATED_FREEDOM, freedom)
             origin += f", and from sd_N_per_mm of {int(rows.sum())} readings, {_percent(*_shared(total))}"
         return (model("measured", repeat, repeats.clamping, freedom, origin, remark),)
     if rows.any():
         stating, clamping = _parts(relative[rows])
         repeat = np.full(n, np.sqrt(np.mean(stating**2)))
         repeat[rows] = stating
-        origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of "
-        origin += f"which {100 * clamping:.2g} % is assumed to be clamping"
+        origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of which {100 * clamping:.2g} % is "
+        origin += "assumed to be clamping"
         if not rows.all():
             origin += f"; {n - int(rows.sum())} readings do not state it and are assumed to scatter as the others do"
         return (model("stated", repeat, clamping, STATED_FREEDOM, origin),)
     why = "the repeats agree exactly, as copies do" if copies else "the data hold neither repeats nor sd_N_per_mm"
-    shared = {name: _shared(guess) for name, guess in GUESSES.items()}
     return tuple(
-        model(name, *both, GUESSED_FREEDOM, f"a {name} guess, {_percent(*both)}: {why}")
-        for name, both in shared.items()
+        model(name, *_shared(guess), GUESSED_FREEDOM, f"a {name} guess, {_percent(*_shared(guess))}: {why}")
+        for name, guess in GUESSES.items()
     )
 
 
@@ -228,24 +222,6 @@ def _parts(relative: FloatArray) -> tuple[FloatArray, float]:
     """Stated relative sds (n,) as repeat noise (n,) and clamping."""
     clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
     return np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2)), float(clamping)
-
-
-def _both(relative: FloatArray, rows: NDArray[np.bool_], repeats: Repeats, trusted: bool) -> tuple[FloatArray, float]:
-    """Repeat noise (n,) where some `rows` state theirs, and what it is worth.
-
-    Two estimates of one thing are weighed by their degrees of freedom. Where they contradict each other, each stands
-    for its own readings, and both are trusted as far as the less certain one.
-    """
-    repeat = np.full(len(relative), repeats.repeat)
-    repeat[rows] = _parts(relative[rows])[0]
-    if not trusted:
-        return repeat, min(STATED_FREEDOM, repeats.freedom)
-    level = float(np.sqrt(np.mean(repeat[rows] ** 2)))
-    freedom = STATED_FREEDOM + repeats.freedom
-    pooled = float(np.sqrt((STATED_FREEDOM * level**2 + repeats.freedom * repeats.repeat**2) / freedom))
-    repeat[rows] *= pooled / level
-    repeat[~rows] = pooled
-    return repeat, freedom
 
 
 def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str, used: str = "instead") -> str:
@@ -280,7 +256,7 @@ def _percent(repeat: float, clamping: float) -> str:
 def covariance(noise: Noise, predictor: Predictor) -> Covariance:
     """Of ln readings."""
     struts = noise.strut_spread * predictor.strut_columns()
-    shifted = noise.joint_error * predictor.joint_columns()
+    shifted = noise.joint_error * predictor.joint_columns
     shared = np.ascontiguousarray(np.concatenate([struts, shifted], axis=1).T)
     return Covariance(noise.repeat**2, Groups.by(predictor.data.clamp), noise.clamping**2, shared)
 
@@ -367,61 +343,4 @@ class Scatter:
 
     def log_likelihood(self, residual: FloatArray) -> FloatArray:
         """(...,) of residuals (..., n), the price of wild readings included, without the constant n ln(2 pi) / 2."""
-        squared = self.precision.squares(residual)
-        return np.asarray(-0.5 * (squared + self.covariance.log_determinant) - len(self.wild) * self.price)
-
-
-@dataclass(frozen=True)
-class NormalEquations:
-    """At one point: jacobian (n, q) of ln k to q unknowns, information (q, q) and gradient (q,), priors included."""
-
-    jacobian: FloatArray
-    information: FloatArray
-    gradient: FloatArray
-
-    @property
-    def scale(self) -> FloatArray:
-        """(q,) of the unknowns, whose units may be very different."""
-        return np.sqrt(np.maximum(np.diag(self.information), 1e-300))
-
-
-def gauss_newton(
-    start: At,
-    equations: Callable[[At], NormalEquations],
-    move: Callable[[At, NormalEquations], tuple[At, FloatArray] | None],
-    steps: int,
-    tolerance: float,
-) -> tuple[At, NormalEquations]:
-    """Least squares step by step: on tables (`evidence`) and with the model itself (`fits`).
-
-    Parameters
-    ----------
-    start
-        Where to begin, whatever `equations` and `move` understand.
-    equations
-        The normal equations at a point.
-    move
-        The next point and the step (q,) that was wanted; None where no step helps.
-    steps, tolerance
-        At most so many, and until a step is so small in standard deviations.
-
-    Returns
-    -------
-    The last point, and the equations of the last step.
-    """
-    point = start
-    for _ in range(steps):
-        here = equations(point)
-        moved = move(point, here)
-        if moved is None:
-            break
-        point, step = moved
-        if np.abs(step * here.scale).max() < tolerance:
-            break
-    return point, here
-
-
-def scaled_inverse(matrix: FloatArray) -> FloatArray:
-    """Inverse of a covariance or information matrix (p, p) whose rows may have very different units."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
+        return np.asarray(-0.5 * self.precision.squares(residual) + self.log_price)

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
 
@@ -199,8 +200,8 @@ class EffectEntry:
     """
 
     name: str
-    parameters: Mapping[str, Any]
-    provenance: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Document
+    provenance: Document = field(default_factory=dict)
     file: str = field(default="", compare=False)
     lines: Mapping[str, int] = field(default_factory=dict, compare=False)
 
@@ -283,7 +284,9 @@ class Hexapod:
         A longer tool puts the joints further above the tip, along the spindle axis.
         """
         length = np.asarray(tool_length, dtype=float)
-        if length.ndim == 0 and np.isnan(length):
+        if length.size and (np.isnan(length).all() or np.ptp(length) == 0.0):
+            length = length.flat[0]  # one for all: the kinematics is then cheaper
+        if np.ndim(length) == 0 and np.isnan(length):
             return self.platform_joints
         extension = np.where(np.isnan(length), 0.0, length - self.reference_tool_length)
         return np.asarray(self.platform_joints + extension[..., None, None] * np.array([0.0, 0.0, 1.0]))

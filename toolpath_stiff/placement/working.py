@@ -12,7 +12,6 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
-from toolpath_stiff.placement.fronts import apart
 from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
 from toolpath_stiff.placement.paths import WorkPath, representative_path, with_rows
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -39,6 +38,8 @@ class Search:
         Called with (stages done, stages in all).
     start, now
         The present placement where it lies within the bounds, (0, 6) or (1, 6); its figures, within them or not.
+    left_out
+        Lines of rapids that no placement within the bounds keeps within reach.
     rules
         Get their largest share of extrapolated samples when the scouts are back.
     """
@@ -57,6 +58,7 @@ class Search:
     evaluators: dict[str, Evaluator] = field(default_factory=dict)
     made: list[Evaluator] = field(default_factory=list)
     heeded: IntArray = field(init=False)
+    left_out: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         self.rules, self.start = PlacementRules(self.wanted.margin), np.zeros((0, 6))
@@ -127,4 +129,4 @@ class Search:
     ) -> FloatArray:
         """The best of some placements for a goal that are not beside each other."""
         ranked = placements[self.ranked(goal, figures)]
-        return ranked[apart(self.bounds, ranked, count, distance)]
+        return ranked[self.bounds.apart(ranked, count, distance)]

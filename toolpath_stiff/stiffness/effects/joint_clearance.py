@@ -6,10 +6,11 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
-from toolpath_stiff.stiffness.sizes import about
 
 # N: a strut under less is idle. It would add less than g times this over F^2 to the tip's compliance, some 1e-14 m/N.
 IDLE = 1e-3
+EXPERIENCE = "engineering experience, no source"
+MEANING = "motion of one strut to one side before it carries: half its total play"
 
 
 class JointClearance(Effect):
@@ -26,24 +27,11 @@ class JointClearance(Effect):
     source = "secant through a gap, taken up in full by any load"
     load_dependent = True
     needs = ("force_N",)
-    parameters = (
-        Parameter(
-            name="lost_motion",
-            unit="um",
-            si=1e-6,
-            bounds=(0.0, 200.0),
-            typical=(1.0, 10.0),
-            source="engineering experience, no source",
-            meaning="motion of one strut to one side before it carries: half its total play",
-        ),
-    )
+    clause = "every strut moves about {lost_motion} um to each side before it carries its load"
+    parameters = (Parameter("lost_motion", "um", 1e-6, (0.0, 200.0), (1.0, 10.0), EXPERIENCE, meaning=MEANING),)
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Secant compliance of the gaps under the present strut forces."""
         if path.strut_forces is None:
             return None
         return np.asarray(p["lost_motion"] / np.maximum(np.abs(path.strut_forces), IDLE))
-
-    def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        return f"every strut moves about {about(p['lost_motion'])} um to each side before it carries its load"

@@ -6,7 +6,12 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance
-from toolpath_stiff.stiffness.sizes import about
+
+SOURCE = (
+    "two joints in series: 94 N/um each for a flexure joint (T. Dehaeze, test bench of flexible joints, "
+    "by finite elements), over 100 N/um for a kinematic coupling (Schouten, Rosielle, Schellekens 1997); "
+    "lower end: engineering experience, no source"
+)
 
 
 class JointCompliance(Effect):
@@ -20,22 +25,11 @@ class JointCompliance(Effect):
     link = "joints"
     equation = "c_i += c_j"
     source = "springs in series"
+    clause = "joints and nut of every strut give way by about {compliance} nm/N"
     parameters = (
-        compliance(
-            "compliance",
-            largest=200.0,
-            typical=(3.0, 20.0),
-            source="two joints in series: 94 N/um each for a flexure joint (T. Dehaeze, test bench of flexible joints, "
-            "by finite elements), over 100 N/um for a kinematic coupling (Schouten, Rosielle, Schellekens 1997); "
-            "lower end: engineering experience, no source",
-            meaning="both joints, nut and bearings of one strut together",
-        ),
+        compliance("compliance", 200.0, (3.0, 20.0), SOURCE, "both joints, nut and bearings of one strut together"),
     )
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """The constant, for every strut and pose."""
         return np.full((len(path), 6), p["compliance"])
-
-    def finding(self, p: Values) -> str:
-        """Which part gives way, by how much."""
-        return f"joints and nut of every strut give way by about {about(p['compliance'])} nm/N"

@@ -6,7 +6,8 @@ import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, Values, length_error
-from toolpath_stiff.stiffness.sizes import about
+
+EXPERIENCE = "engineering experience, no source"
 
 
 class PlatformRadiusError(Effect):
@@ -22,13 +23,8 @@ class PlatformRadiusError(Effect):
     equation = "P_i += e (P_ix, P_iy, 0) / |(P_ix, P_iy)|"
     source = "geometry"
     unknown_to_control = True
-    parameters = (
-        length_error(
-            typical=(-3.0, 3.0),
-            source="engineering experience, no source",
-            meaning="true radius less that of the machine file",
-        ),
-    )
+    clause = "the platform's joints stand about {error} mm further {error:out/in} than in the machine file"
+    parameters = (length_error((-3.0, 3.0), EXPERIENCE, "true radius less that of the machine file"),)
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Joints on the wider circle; one on the tool axis has no outward direction and stays."""
@@ -37,8 +33,3 @@ class PlatformRadiusError(Effect):
         off_axis = radius > 0.0
         joints[off_axis, :2] *= (1.0 + p["error"] / radius[off_axis])[:, None]
         return machine.with_changes(platform_joints=joints)
-
-    def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        side = "out" if p["error"] > 0.0 else "in"
-        return f"the platform's joints stand about {about(p['error'])} mm further {side} than in the machine file"

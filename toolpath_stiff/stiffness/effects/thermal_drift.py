@@ -6,7 +6,8 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
-from toolpath_stiff.stiffness.sizes import about
+
+SOURCE = "engineering experience, no source: a steel strut of 3 m grows 35 um/K, rooms change by 1 K/h"
 
 
 class ThermalDrift(Effect):
@@ -18,15 +19,10 @@ class ThermalDrift(Effect):
     equation = "F / k_read = F / k + rate time"
     source = "growth of the loop between work and tip at a constant rate"
     needs = ("time_min",)
+    clause = "the indicator drifts by about {rate} um/min towards {rate:larger/smaller} deflection while it is read"
     parameters = (
         Parameter(
-            name="rate",
-            unit="um/min",
-            si=1e-6 / 60.0,
-            bounds=(-20.0, 20.0),
-            typical=(-1.0, 1.0),
-            source="engineering experience, no source: a steel strut of 3 m grows 35 um/K, rooms change by 1 K/h",
-            meaning="drift towards larger deflection",
+            "rate", "um/min", 1e-6 / 60.0, (-20.0, 20.0), (-1.0, 1.0), SOURCE, meaning="drift towards larger deflection"
         ),
     )
 
@@ -36,8 +32,3 @@ class ThermalDrift(Effect):
             return stiffness
         deflection = path.force / stiffness + p["rate"] * path.time
         return np.where(deflection > 0.0, path.force / np.where(deflection > 0.0, deflection, 1.0), np.nan)
-
-    def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        side = "larger" if p["rate"] > 0.0 else "smaller"
-        return f"the indicator drifts by about {about(p['rate'])} um/min towards {side} deflection while it is read"

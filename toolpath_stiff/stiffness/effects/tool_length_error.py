@@ -6,7 +6,8 @@ import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, Values, length_error
-from toolpath_stiff.stiffness.sizes import about
+
+EXPERIENCE = "engineering experience, no source: the tool of the neighbouring pocket"
 
 
 class ToolLengthError(Effect):
@@ -18,19 +19,9 @@ class ToolLengthError(Effect):
     equation = "r_i += R (0, 0, e), tip -= R (0, 0, e): the struts stay, their arms about the tip grow"
     source = "geometry"
     unknown_to_control = True
-    parameters = (
-        length_error(
-            typical=(-10.0, 10.0),
-            source="engineering experience, no source: the tool of the neighbouring pocket",
-            meaning="true tool length less the entered one",
-        ),
-    )
+    clause = "the tool is about {error} mm {error:longer/shorter} than the length that was entered"
+    parameters = (length_error((-10.0, 10.0), EXPERIENCE, "true tool length less the entered one"),)
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Platform joints further above the tip."""
         return machine.with_changes(platform_joints=machine.platform_joints + np.array([0.0, 0.0, p["error"]]))
-
-    def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        side = "longer" if p["error"] > 0.0 else "shorter"
-        return f"the tool is about {about(p['error'])} mm {side} than the length that was entered"

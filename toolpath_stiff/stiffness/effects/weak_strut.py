@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, choice
 from toolpath_stiff.stiffness.sizes import about
+
+EXPERIENCE = "engineering experience, no source"
+MEANING = "stiffness of this strut over that of the others"
 
 
 class WeakStrut(Effect):
@@ -18,27 +21,8 @@ class WeakStrut(Effect):
     equation = "k_s(L) = factor k_linear(L) for strut s"
     source = "worn nut, lost preload"
     parameters = (
-        Parameter(
-            name="strut",
-            unit="",
-            si=1.0,
-            bounds=(1, 6),
-            typical=(1, 6),
-            source="number of the strut",
-            neutral=1,
-            meaning="which strut",
-            kind="integer",
-        ),
-        Parameter(
-            name="factor",
-            unit="",
-            si=1.0,
-            bounds=(0.3, 1.0),
-            typical=(0.4, 0.9),
-            source="engineering experience, no source",
-            neutral=1.0,
-            meaning="stiffness of this strut over that of the others",
-        ),
+        choice("strut", (1, 6), "number of the strut", "which strut", neutral=1),
+        Parameter("factor", "", 1.0, (0.3, 1.0), (0.4, 0.9), EXPERIENCE, 1.0, MEANING),
     )
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
