@@ -185,10 +185,7 @@ def read_measurements(
     errors: list[InputError] = []
     for name in names:
         try:
-            table_1 = name == NIST_TABLE_1
-            files.append(
-                _table_1() if table_1 else read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
-            )
+            files.append(_table_1() if name == NIST_TABLE_1 else _rows(name, planned, columns))
         except InputErrors as bad:  # those of all files are reported together
             errors += bad.errors
     errors = errors or duplicates([row for file in files for row in file.rows], across_files=True)
@@ -198,6 +195,10 @@ def read_measurements(
     places = list(zip(data.file.tolist(), data.line.tolist(), strict=True))
     warnings = pose_warnings(machine, data.position, data.angles, data.tool_extension, places)
     return with_offsets(replace(data, warnings=warnings), machine)
+
+
+def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
+    return read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
 
 
 def _table_1() -> RowFile:
@@ -341,13 +342,9 @@ def _points(poses: FloatArray, labels: TextArray) -> TextArray:
 
 def _clampings(rows: list[Row], point: TextArray, setup: TextArray) -> TextArray:
     """Labels of the clampings. Numbers start anew in every file; without a number, a point in a set-up is one."""
-    return np.array(
-        [
-            f"{row.file}: clamp {row.labels['clamp']}" if row.labels["clamp"] else f"point {p}, set-up {s}"
-            for row, p, s in zip(rows, point, setup, strict=True)
-        ],
-        dtype=str,
-    )
+    numbered = [f"{row.file}: clamp {row.labels['clamp']}" if row.labels["clamp"] else "" for row in rows]
+    named = [f"point {p}, set-up {s}" for p, s in zip(point, setup, strict=True)]
+    return np.array([number or name for number, name in zip(numbered, named, strict=True)], dtype=str)
 
 
 def reading_columns(data: Readings) -> dict[str, NDArray[Any]]:
@@ -373,29 +370,19 @@ def reading_columns(data: Readings) -> dict[str, NDArray[Any]]:
 MARK = 10  # hexadecimal digits of a reading's mark: among 5,000 readings two differ in it but for one time in 90,000
 
 
-DIGITS = {
-    "mm": 2,
-    "deg": 3,
-    "direction": 3,
-    "stiffness": 5,
-}  # to which readings are told apart: decimals; of N/m, digits
-
-
 def reading_marks(data: Readings) -> TextArray:
     """(n,) what tells a reading from others, however its file is called, sorted or laid out.
 
     The first `MARK` digits of the SHA-256 of its pose (to 0.01 mm and 0.001 degrees), its direction (without sign) and
     the measured stiffness (to five digits).
     """
-    pose = np.concatenate(
-        [np.round(mm_from_m(data.position), DIGITS["mm"]), np.round(deg_from_rad(data.angles), DIGITS["deg"])], axis=1
-    )
-    axis = np.round(data.direction, DIGITS["direction"])
+    pose = np.concatenate([np.round(mm_from_m(data.position), 2), np.round(deg_from_rad(data.angles), 3)], axis=1)
+    axis = np.round(data.direction, 3)
     first = np.take_along_axis(axis, np.argmax(axis != 0.0, axis=1)[:, None], axis=1)
     rows = np.concatenate([pose, axis * np.sign(first)], axis=1) + 0.0  # no -0
     return np.array(
         [
-            hashlib.sha256(f"{row} {stiffness:.{DIGITS['stiffness'] - 1}e}".encode()).hexdigest()[:MARK]
+            hashlib.sha256(f"{row} {stiffness:.4e}".encode()).hexdigest()[:MARK]
             for row, stiffness in zip(rows.tolist(), data.stiffness.tolist(), strict=True)
         ],
         dtype=str,
