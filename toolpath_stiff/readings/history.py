@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import certain
 from toolpath_stiff.readings.strut_series import (
     FEWEST_DIFFERENCES,
     MOUNTING,
@@ -21,7 +22,6 @@ from toolpath_stiff.readings.strut_series import (
     changes_of,
     series_of,
 )
-from toolpath_stiff.units import certain
 
 # Relative sd, the same on all dates, of a difference of tension and compression; assumed: load cell, indicator and
 # friction are not alike on both sides of zero.
