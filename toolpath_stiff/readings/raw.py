@@ -22,7 +22,7 @@ from toolpath_stiff.readings.raw_history import remarks, struts_over_dates
 from toolpath_stiff.readings.raw_records import COLUMNS, Loop, read_raw
 from toolpath_stiff.readings.raw_rows import loop_entry, measurement_csv
 from toolpath_stiff.readings.strut_tables import is_strut_table, read_strut_table
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, frame_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,9 +101,7 @@ class Reduction(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a loop."""
-        import pandas as pd
-
-        return pd.DataFrame(self.to_dict()["loops"])
+        return frame_of(self.to_dict()["loops"])
 
     def plot(self) -> Figure:
         """Force against deflection of each loop; without records the struts over their dates."""

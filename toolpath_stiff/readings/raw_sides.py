@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.readings.strut_series import chance_of_t
 
 A_SIDE = 3  # forces on each side of zero
 RESOLUTION = 0.05e-6  # m, rms that no line is believed to fit better than; assumed: half a step of 0.1 um
@@ -37,7 +40,7 @@ def play_of(force: FloatArray, deflection: FloatArray, way: FloatArray) -> tuple
     The lines lie between `NEARER` and `FARTHER` of each extreme: closer in a gap may still be open, farther out joints
     that stick after the turn make both sides stiffer, which looks like a gap. Friction moves the two ways apart by an
     even function of the force (Masing 1926): a constant and a square are fitted beside the lines, and a steady drift.
-    Shown is what an F test at 1 % finds and what is `APART` of the deflection, as less does not blur a stiffness.
+    Shown is what a t test at 1 % finds and what is `APART` of the deflection, as less does not blur a stiffness.
 
     Parameters
     ----------
@@ -48,8 +51,6 @@ def play_of(force: FloatArray, deflection: FloatArray, way: FloatArray) -> tuple
     -------
     nan and False without records of both sides.
     """
-    from scipy.special import fdtrc
-
     high, low = float(force.max()), float(force.min())
     share = np.where(force > 0.0, force / high, force / low) if low < 0.0 < high else np.zeros_like(force)
     inside = (share >= NEARER) & (share <= FARTHER)
@@ -64,7 +65,7 @@ def play_of(force: FloatArray, deflection: FloatArray, way: FloatArray) -> tuple
     if freedom < 1 or size < APART * float(np.ptp(deflection)):
         return size, False
     after = max(after, freedom * RESOLUTION**2)
-    return size, bool(fdtrc(1, freedom, max(before - after, 0.0) / (after / freedom)) < SURE)
+    return size, chance_of_t(math.sqrt(max(before - after, 0.0) / (after / freedom)), freedom) < SURE
 
 
 def _both_sides(force: FloatArray) -> bool:
