@@ -283,7 +283,7 @@ def _taken(tables: Tables, files: tuple[str, ...], columns: Mapped) -> tuple[Tak
         known.setdefault(_key(row, setup, loop), k)
     rows, logs, clamps, where, others = [], [], [], [], 0
     for table in [mapped_table(name, "measurements", COLUMNS, columns) for name in files]:
-        for row in read_rows(table, planned=True).rows:
+        for row in read_rows(table, planned=True)[0]:
             tool = 0.0 if np.isnan(row.tool_extension) else row.tool_extension
             setup, loop = row.labels["setup"] or tables.visits.menu.setups[0], row.labels["loop"]
             place = known.get(_key([*row.position, *row.angles, *row.direction, row.force, tool], setup, loop))

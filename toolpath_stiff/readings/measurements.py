@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from importlib import resources
@@ -23,7 +23,7 @@ from toolpath_stiff.readings.dates import day_of, days_since_first
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, offsets
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measured_poses import pose_warnings
-from toolpath_stiff.readings.rows import AXES, COLUMNS, LABELS, OPTIONAL, POSITION, Row, RowFile, duplicates, read_rows
+from toolpath_stiff.readings.rows import AXES, COLUMNS, LABELS, OPTIONAL, POSITION, Row, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -181,27 +181,32 @@ def read_measurements(
     twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
     if twice is not None:
         raise MeasurementError(f"{twice!r} is given twice", hint="name it once")
-    files: list[RowFile] = []
+    rows: list[Row] = []
+    notes: list[str] = []
     errors: list[InputError] = []
     for name in names:
         try:
-            files.append(_table_1() if name == NIST_TABLE_1 else _rows(name, planned, columns))
+            of_file, remarks = _rows(name, planned, columns)
+            rows += of_file
+            notes += remarks
         except InputErrors as bad:  # those of all files are reported together
             errors += bad.errors
-    errors = errors or duplicates([row for file in files for row in file.rows], across_files=True)
+    errors = errors or duplicates(rows, across_files=True)
     if errors:
         raise InputErrors(errors)
-    data = _columns(files, machine)
+    data = _columns(rows, notes, machine)
     places = list(zip(data.file.tolist(), data.line.tolist(), strict=True))
     warnings = pose_warnings(machine, data.position, data.angles, data.tool_extension, places)
     return with_offsets(replace(data, warnings=warnings), machine)
 
 
-def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
+def _rows(name: str, planned: bool, columns: Mapped) -> tuple[list[Row], list[str]]:
+    if name == NIST_TABLE_1:
+        return _table_1()
     return read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
 
 
-def _table_1() -> RowFile:
+def _table_1() -> tuple[list[Row], list[str]]:
     """The paper's Table 1, printed with a row a point."""
     text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
     printed = parse_table(text, NIST_TABLE_1, Columns(POSITION))
@@ -212,12 +217,11 @@ def _table_1() -> RowFile:
     )
     heading = (*POSITION, "direction", "stiffness_N_per_mm", "setup")
     note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
-    return replace(read_rows(replace(printed, heading=heading, rows=rows)), notes=(note,))
+    return read_rows(replace(printed, heading=heading, rows=rows))[0], [note]
 
 
-def _columns(files: list[RowFile], machine: Hexapod) -> Readings:
+def _columns(rows: list[Row], notes: Sequence[str], machine: Hexapod) -> Readings:
     """Readings as columns; those of loops in m/N until `with_offsets`."""
-    rows = [row for file in files for row in file.rows]
 
     def numbers(name: str) -> FloatArray:
         return np.array([getattr(row, name) for row in rows], dtype=float)
@@ -259,7 +263,7 @@ def _columns(files: list[RowFile], machine: Hexapod) -> Readings:
         # Set-ups and loops may go without a name; of the other columns every reading must have its own.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
         notes=(
-            *(note for file in files for note in file.notes),
+            *notes,
             *_incomplete(given),
             *(f"column {name} is not in every file and is not used" for name in dropped),
             *[bench] * bool(unknown),

@@ -113,16 +113,8 @@ class Row:
         return not self.labels["loop"]
 
 
-@dataclass(frozen=True)
-class RowFile:
-    """Rows of a file, and what was not used, in words."""
-
-    rows: tuple[Row, ...]
-    notes: tuple[str, ...]
-
-
-def read_rows(table: Table, planned: bool = False) -> RowFile:
-    """Rows of a measurement file.
+def read_rows(table: Table, planned: bool = False) -> tuple[list[Row], list[str]]:
+    """Rows of a measurement file; and what was not used, in words.
 
     Parameters
     ----------
@@ -151,9 +143,7 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
     errors += duplicates(rows)
     if errors:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
-    return RowFile(
-        tuple(rows), (*table.notes, *(f"{file}: column {name} holds text and is not used" for name in unused))
-    )
+    return rows, [*table.notes, *(f"{file}: column {name} holds text and is not used" for name in unused)]
 
 
 def parsed_rows(table: Table, parse: Callable[[int, dict[str, str]], Parsed]) -> tuple[list[Parsed], list[InputError]]:
