@@ -20,10 +20,10 @@ from toolpath_stiff.defaults import job_count
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import arguments_of, checked
-from toolpath_stiff.report.analysis.summary import check_table
-from toolpath_stiff.report.batch.index import files, names
+from toolpath_stiff.report.analysis import other_samples
+from toolpath_stiff.report.batch.index import files
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, columns_of, terminal_summary
-from toolpath_stiff.report.batch.programs import Found, Listed, find_programs, report_folders
+from toolpath_stiff.report.batch.programs import RESERVED, Found, Listed, find_programs, report_folders
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, Result
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
@@ -178,7 +178,7 @@ def analyze_many(
     compared = path_options.pop("compare_with", None)
     other = on.like(compared) if isinstance(compared, str | Path) else compared
     check_options(**path_options)  # a mistake in them is one error
-    check_table(table)
+    other_samples(table)
     listed, given = _listed(programs)
     example = Program.from_text("", **options)
     each = [example, *given.values()]
@@ -187,7 +187,7 @@ def analyze_many(
     files_read = (*(program.file for program in listed), *(file for program in each for file in program.inputs))
     rules = Rules(inputs=(*files_read, *on.inputs, *(other.inputs if other else ())), replace=replace)
     out = Path(folder)
-    check_folder(out, names(), rules)
+    check_folder(out, RESERVED, rules)
     run = BatchRun(
         out.absolute(), str(out), pickle.dumps((on, other)), path_options, plots, table, show_plunges, replace
     )

@@ -109,7 +109,7 @@ def update(args: Namespace) -> int:
     """
     args.replace |= args.force
     replaced = check_single(args, args.output, mark=b"# Command: tps update")
-    target = destination(args, tps.Update, args.data, machine=args.output is None)
+    target = destination(args, tps.Update, args.data, () if args.output is None else ("machine.toml",))
     fitted = call(args, tps.update, machine_file=args.output or target.folder / "machine.toml")
     keep(replaced, quiet=args.json)
     machine = {args.output: fitted.machine_text()} if args.output and fitted.accepted else {}

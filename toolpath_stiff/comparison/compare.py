@@ -6,7 +6,7 @@ counted and which sign they have: `baseline`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from io import StringIO
@@ -26,7 +26,6 @@ from toolpath_stiff.comparison.summary import ComparisonSummary
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Problem
@@ -41,7 +40,6 @@ from toolpath_stiff.units import certain
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 
@@ -95,7 +93,7 @@ class Comparison(FolderResult):
     """
 
     command: ClassVar[str] = "compare"
-    shown_by: ClassVar[str] = "compare.page"
+    shown_by: ClassVar[str] = "compare"
 
     predictor: Predictor
     data: Readings
@@ -127,16 +125,6 @@ class Comparison(FolderResult):
         import pandas as pd
 
         return pd.read_csv(StringIO(self.view.residuals_csv(self)))
-
-    def plot(self) -> Figure:
-        """Measured against modelled."""
-        figure: Figure = self.view.measured_modelled_png.figure(self)
-        return figure
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps compare`."""
-        files: Mapping[str, Content] = self.view.files(self, plots=plots)
-        return files
 
     def _short(self) -> str:
         return f"{self.summary.machine}, mean error {self.summary.baseline.mean_abs_error_percent:.2f} %"

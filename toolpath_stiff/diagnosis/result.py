@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -10,12 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from toolpath_stiff.diagnosis.document import document_of
 from toolpath_stiff.diagnosis.examination import Examination
 from toolpath_stiff.diagnosis.rows import HypothesisRows, rows_of
-from toolpath_stiff.files import Content
 from toolpath_stiff.results import FolderResult
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -23,7 +20,7 @@ class Diagnosis(Examination, FolderResult):
     """Which physical effect the model lacks, if any, and what stands behind it; attributes as of `Examination`."""
 
     command: ClassVar[str] = "diagnose"
-    shown_by: ClassVar[str] = "diagnose.page"
+    shown_by: ClassVar[str] = "diagnose"
 
     @cached_property
     def rows(self) -> HypothesisRows:
@@ -39,16 +36,6 @@ class Diagnosis(Examination, FolderResult):
         import pandas as pd
 
         return pd.DataFrame(self.to_dict()["candidates"])
-
-    def plot(self) -> Figure:
-        """The error as given, with the strut law refitted, and with each candidate."""
-        figure: Figure = self.view.ladder_png.figure(self)
-        return figure
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps diagnose`."""
-        files: Mapping[str, Content] = self.view.files(self, plots=plots)
-        return files
 
     def _short(self) -> str:
         names = ", ".join(self.plausible)
