@@ -104,7 +104,7 @@ def facts(summary: Document) -> list[tuple[str, str]]:
         ("stiffness", f"mean {mean} N/mm, min {low}, max {high}, range {span} N/mm"),
         *_plunges(summary),
         *_band(summary),
-        ("weakest", _weakest(summary["weakest"])),
+        *_weakest(summary["weakest"]),
         ("limits", limit),
         ("extrapolated", f"{summary['extrapolated_share']:.1%} of the cutting samples are outside the strut law"),
     ]
@@ -133,11 +133,12 @@ def _band(summary: Document) -> list[tuple[str, str]]:
     return [("95 % band", f"mean {mean}, min {lowest} N/mm, from the fitted parameters alone; widest on {widest}")]
 
 
-def _weakest(place: Document | None) -> str:
+def _weakest(place: Document | None) -> list[tuple[str, str]]:
     if place is None:
-        return "-"
-    where = f"in line {place['line']} at {position(place, 3)}"
-    return f"{number(place['stiffness_N_per_mm'])} N/mm {where}{': ' if place['text'] else ''}{place['text']}"
+        return [("weakest", "-")]
+    stiffness, text = number(place["stiffness_N_per_mm"]), shortened(place["text"], WIDTH - LABEL - 2)
+    where = f"{stiffness} N/mm in line {place['line']} at {position(place, 3)}"
+    return [("weakest", where), *([("", text)] if text else [])]
 
 
 def position(place: Document, decimals: int) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from toolpath_stiff.analysis.machine_check import MachineCheck
 from toolpath_stiff.api.machines import Machine
@@ -22,7 +23,8 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, pose_in_mm
 
 STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
 BELOW = -0.1  # of the picture's height: the views' empty rims lie beyond it
-ZOOM = 0.78  # of a view, at which its axes and labels stay in its half
+TOP = 0.84  # of the picture's height, below the headings
+FULL = 0.96  # of its half that a view fills
 LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
 
 
@@ -36,7 +38,23 @@ def machine_picture(of: Machine, *, pose_mm_deg: Sequence[float] | None = None) 
     whole = figure.add_axes((0.0, BELOW, 0.5, 1.0), projection="3d")
     _draw_whole(whole, machine, mm_from_m(joints), mm_from_m(nodes), struts)
     _draw_platform(figure.add_axes((0.5, BELOW, 0.5, 1.0), projection="3d"), machine, mm_from_m(nodes))
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        _fill(axes, figure.bbox.height)
     return figure
+
+
+def _fill(axes: Any, height: float) -> None:
+    """Zoom a view, as drawn once, so that its axes and labels fill its half of the picture."""
+    room, drawn = (
+        axes.get_window_extent(),
+        Bbox.union([axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]),
+    )
+    x, y = 0.5 * (room.x0 + room.x1), 0.5 * (room.y0 + room.y1)
+    across = max(x - drawn.x0, drawn.x1 - x) / (0.5 * room.width)
+    up = max((y - drawn.y0) / y, (drawn.y1 - y) / (TOP * height - y))
+    spans = [high - low for low, high in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
+    axes.set_box_aspect(spans, zoom=FULL / max(across, up))
 
 
 def _where(pose: FloatArray) -> str:
@@ -91,8 +109,8 @@ def _finish(axes: Any, points: FloatArray) -> None:
         pad = 8.0 if axis == "z" else None  # clear of the figures
         getattr(axes, f"set_{axis}label")(f"{axis.upper()} mm", fontsize=9, color="#4b5563", labelpad=pad)
         getattr(axes, f"{axis}axis").pane.set_facecolor("#f8fafc")
+    axes.set_box_aspect(1.1 * span)
     axes.patch.set_visible(False)
-    axes.set_box_aspect([high - low for low, high in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())], zoom=ZOOM)
     axes.tick_params(labelsize=7.5, colors="#6b7280")
     axes.locator_params(nbins=5)
     axes.view_init(elev=18, azim=-62)
