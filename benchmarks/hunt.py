@@ -26,7 +26,7 @@ from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
-from toolpath_stiff.nc.linuxcnc.reader import refusal
+from toolpath_stiff.nc.linuxcnc.reader import fenced
 from toolpath_stiff.nc.moves import MOTION_NAMES, ReadProgram
 from toolpath_stiff.nc.reader import read_program
 from toolpath_stiff.nc.words import split_lines
@@ -114,8 +114,7 @@ def hunt_one(text: str, folder: Path, controller: Controller = UNKNOWN_CONTROL) 
     file = folder / "part.ngc"
     for _ in range(MOST_REPAIRS):
         try:
-            if refusal(split_lines(text, file.name), file.name) is not None:
-                return None
+            fenced(split_lines(text, file.name), file.name)
         except TpsError:
             return None
         file.write_text(text, newline="")

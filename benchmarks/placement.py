@@ -27,7 +27,6 @@ from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator
-from toolpath_stiff.placement.fronts import apart
 from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.placing import place_program
@@ -204,7 +203,7 @@ def ends(program: ReadProgram) -> tuple[str, bool]:
     for ours, weights in zip(np.max(front * (1.0, -1.0, 1.0), axis=0), np.eye(3), strict=True):
         goal = Goal(tuple(weights), np.full(3, -np.inf))
         ranked = points[np.lexsort((-goal.value(figures), rules.violation(figures)))]
-        first = ranked[apart(BOUNDS, ranked, SOBOL_CLIMBS, 0.05)]
+        first = ranked[BOUNDS.apart(ranked, SOBOL_CLIMBS, 0.05)]
         met = whole.figures(Climber(whole, BOUNDS, rules).climb(first, goal, SOBOL_STEPS))
         values = np.where(rules.violation(met) > 0.0, -np.inf, goal.value(met))
         best = n_per_mm_from_n_per_m(float(values.max()))

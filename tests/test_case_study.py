@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.placement.case_study import LOW_MM, case_study_program, conclusions, origin_of, run_case_study
@@ -138,10 +138,10 @@ def test_regions_by_option_by_file_and_from_python_are_the_same(slot, capsys):
         (["--region", "a:0,0"], "expected NAME:X,Y,Z"),
         (["--region", "a:0,0,1e9"], "region a"),
         (["--regions", "none.csv"], "none.csv"),
-        (["--regions", "two.csv"], "two.csv:3: region a stands twice"),
-        (["--regions", "short.csv"], "short.csv:1: column z_mm is missing"),
+        (["--regions", "two.csv"], "two.csv:3: region a: a, 0, 0, 900"),
+        (["--regions", "short.csv"], "short.csv:2: region a: a, 0, 0"),
         (["--regions", "word.csv"], "word.csv:2: "),
-        (["--regions", "turn.csv"], "turn.csv:2: region a: a cell is no finite number"),
+        (["--regions", "turn.csv"], "turn.csv:2: region a: a, 0, 0, 800, nan"),
         (["--regions", "empty.csv"], "empty.csv"),
     ],
 )

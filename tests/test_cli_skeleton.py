@@ -17,10 +17,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli import program as program_commands
 from toolpath_stiff.cli.main import COMMANDS, GROUPS, TRACEBACK, main
 from toolpath_stiff.cli.main import _stop as stop
 from toolpath_stiff.cli.main import _stop_at as stop_at
+from toolpath_stiff.cli.parser import COMMANDS as MADE
 from toolpath_stiff.cli.parser import Command
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import write_atomically
@@ -159,8 +159,8 @@ def failing(monkeypatch, error):
     def fail(_args):
         raise error
 
-    takes = program_commands.COMMANDS["path"].takes
-    monkeypatch.setitem(program_commands.COMMANDS, "path", Command(fail, *takes))
+    main(["path", "--help"])
+    monkeypatch.setitem(MADE, "path", Command(fail, MADE["path"].takes))
 
 
 def test_interruption_is_130(part, monkeypatch, capsys):
@@ -172,10 +172,8 @@ def test_interruption_is_130(part, monkeypatch, capsys):
 UNFORESEEN = [
     (ValueError("a\nbug"), r"an error that should not be \(ValueError, test_cli_skeleton.py:\d+\): a bug"),
     (np.linalg.LinAlgError("Singular matrix"), r"\(LinAlgError, .*: Singular matrix"),
-    (MemoryError("Unable to allocate 9. GiB"), r"out of memory \(Unable to allocate 9. GiB\): take a larger --step"),
-    (RecursionError("maximum depth"), "nested too deeply"),
-    (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "full/part.csv"), "'full/part.csv': No space left on device"),
-    (OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG)), "error: File name too long"),
+    (MemoryError("Unable to allocate 9. GiB"), r"Unable to allocate 9. GiB: take a larger --step"),
+    (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "full/part.csv"), "No space left on device: 'full/part.csv'"),
     (AssertionError(), "no more is known"),
 ]
 

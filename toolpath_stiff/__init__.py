@@ -28,13 +28,11 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.by_hand import Preview as Preview
     from toolpath_stiff.api.by_hand import preview as preview
     from toolpath_stiff.api.case_studies import case_study as case_study
-    from toolpath_stiff.api.correction import plan as plan
+    from toolpath_stiff.api.comparison import compare as compare
+    from toolpath_stiff.api.correction import draft_effect as draft_effect
     from toolpath_stiff.api.correction import update as update
-    from toolpath_stiff.api.diagnosis import Measurements as Measurements
-    from toolpath_stiff.api.diagnosis import compare as compare
     from toolpath_stiff.api.diagnosis import diagnose as diagnose
     from toolpath_stiff.api.effects import check_effects as check_effects
-    from toolpath_stiff.api.effects import draft_effect as draft_effect
     from toolpath_stiff.api.effects import effect_template as effect_template
     from toolpath_stiff.api.effects import effects as effects
     from toolpath_stiff.api.machine_files import MachineFile as MachineFile
@@ -44,10 +42,12 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.machines import Machine as Machine
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
+    from toolpath_stiff.api.measurements import Measurements as Measurements
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
     from toolpath_stiff.api.placements import try_placement as try_placement
+    from toolpath_stiff.api.planning import plan as plan
     from toolpath_stiff.api.poses import map_stiffness as map_stiffness
     from toolpath_stiff.api.poses import pose as pose
     from toolpath_stiff.api.poses import read_poses as read_poses
@@ -99,13 +99,16 @@ _PUBLIC = {
     "analysis.results": ("Analysis",),
     "api.by_hand": ("Preview", "preview"),
     "api.case_studies": ("case_study",),
-    "api.correction": ("plan", "update"),
-    "api.diagnosis": ("Measurements", "compare", "diagnose"),
-    "api.effects": ("check_effects", "draft_effect", "effect_template", "effects"),
+    "api.comparison": ("compare",),
+    "api.correction": ("draft_effect", "update"),
+    "api.diagnosis": ("diagnose",),
+    "api.effects": ("check_effects", "effect_template", "effects"),
     "api.machine_files": ("MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry"),
     "api.machines": ("Machine",),
     "api.many": ("ManyAnalyses", "analyze_many"),
+    "api.measurements": ("Measurements",),
     "api.placements": ("PlacementTrial", "place", "rewrite", "try_placement"),
+    "api.planning": ("plan",),
     "api.poses": ("map_stiffness", "pose", "read_poses"),
     "api.programs": ("analyze", "check", "sample_path"),
     "case.case": ("Case",),

@@ -17,6 +17,7 @@ from typing import Any, TypeVar, cast, get_args, get_type_hints
 from toolpath_stiff.errors import InputError
 
 F = TypeVar("F", bound=Callable[..., Any])
+PARAMETERS = "Parameters\n----------\n"  # of a docstring
 SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
 
 
@@ -160,20 +161,22 @@ def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
         marks = [mark for part in parts for mark in getattr(part, "__metadata__", ())]
         option = next((mark for mark in marks if isinstance(mark, Option)), None)
         if option is not None:
+            default = inspect.signature(function).parameters[name].default
             kinds = [kind for part in parts for kind in (part, *get_args(part)) if kind in (bool, int, float)]
             arguments[name] = Argument(
                 name,
                 option,
                 option.help or texts.get(name, ""),
                 kinds[0] if kinds and option.read is None else str,
-                inspect.signature(function).parameters[name].default,
+                None if default is inspect.Parameter.empty else default,
+                default is inspect.Parameter.empty,
             )
     return arguments
 
 
 def parameter_texts(function: Callable[..., Any]) -> dict[str, str]:
     """What a docstring says of each argument."""
-    section = (inspect.getdoc(function) or "").partition("Parameters\n----------\n")[2].partition("\n\n")[0]
+    section = (inspect.getdoc(function) or "").partition(PARAMETERS)[2].partition("\n\n")[0]
     texts: dict[str, str] = {}
     names: list[str] = []
     for line in section.splitlines():

@@ -103,7 +103,7 @@ def test_what_passes_holds_nothing_that_runs(pieces, block_delete):
     try:
         lines = split(split_lines("".join(pieces), "part.nc"), "part.nc")
         refuse_other_programs(lines, "part.nc")
-        copy = numbered(lines, "part.nc", block_delete=block_delete, tags=True)
+        copy = numbered(lines, "part.nc", block_delete=block_delete)
     except InputError:
         return
     assert copy.isascii()

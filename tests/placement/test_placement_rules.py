@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.placement.test_placement_search import MODEL, TANGENTIAL, headline_figures, program_of
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import UnreachableError
@@ -24,7 +24,6 @@ from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path import place
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator
-from toolpath_stiff.placement.fronts import apart
 from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.linear_programmes import least_costs
@@ -183,7 +182,7 @@ def test_a_homing_rapid_that_no_placement_mends_is_named_and_no_constraint(tmp_p
     command = ["place", "home.nc", "--x=-100:100", "--y=-100:100", "--z", "700:1000", "--step", "5", "--out", "out"]
     assert main([*command, "--no-plots"]) == 0
     summary = json.loads(Path("out/placement.json").read_text())
-    assert [rapid["line"] for rapid in summary["search"]["rapids_left_out"]] == [9]
+    assert summary["search"]["rapids_left_out"] == [9]
     assert any(
         text.startswith("line 9: no placement within the bounds keeps this rapid") for text in summary["warnings"]
     )
@@ -197,7 +196,7 @@ def test_a_reference_point_below_reach_is_named_and_left_out(tmp_path):
     command = ["place", str(Path(__file__).with_name("bracket.nc")), "--tools", str(tools), "--out", str(tmp_path)]
     assert main([*command, "--x=-50:50", "--y=-50:50", "--z", "700:900", "--no-plots"]) == 0
     summary = json.loads((tmp_path / "placement.json").read_text())
-    assert [rapid["line"] for rapid in summary["search"]["rapids_left_out"]] == [14, 149, 150]
+    assert summary["search"]["rapids_left_out"] == [14, 149, 150]
 
 
 def test_where_two_rapids_exclude_each_other_the_error_names_what_failed():
@@ -312,7 +311,7 @@ def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt
     tried = np.random.default_rng(21).uniform(size=(6000, len(bounds.free)))
     value = worth(bounds.placements(tried))
     ranked = tried[np.argsort(-np.nan_to_num(value, neginf=-1e12), kind="stable")]
-    firsts = ranked[apart(bounds, bounds.placements(ranked), 3)]
+    firsts = ranked[bounds.apart(bounds.placements(ranked), 3)]
     polished = [
         -minimize(
             lambda u: -worth(bounds.placements(u[None]))[0] / 1e6, first, method="Nelder-Mead", options={"maxfev": 150}
@@ -472,7 +471,7 @@ def test_effects_are_placed_by_the_plain_analysis(tmp_path):
 
 @pytest.mark.parametrize("load", ["normal", "softest", "radial", "axial", "x", "1,1,0.5"])
 def test_other_loads_are_those_of_the_plain_analysis(load):
-    from toolpath_stiff.analysis import parse_load
+    from toolpath_stiff.analysis.loads import parse_load
 
     program, direction = program_of("tilted_five_axis"), parse_load(load)
     placements = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7], [0.0, 0.05, 0.8, 0.05, -0.03, 0.2]])
@@ -484,4 +483,4 @@ def test_other_loads_are_those_of_the_plain_analysis(load):
         assert found.mean[i] == pytest.approx(
             np.average(k, weights=analysis.samples.weight[analysis.counted]), rel=1e-9
         )
-        assert found.margin[i] == pytest.approx(analysis.at.margin[analysis.samples.cutting].min(), rel=1e-9)
+        assert found.margin[i] == pytest.approx(analysis.at.reach.margin[analysis.samples.cutting].min(), rel=1e-9)

@@ -16,7 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.stats import qmc
 
-from toolpath_stiff.analysis import analyze, parse_load
+from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
@@ -24,12 +25,11 @@ from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
-from toolpath_stiff.placement.fronts import front_rows, thin
 from toolpath_stiff.placement.goals import Bounds, Goal, SearchRules
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import placed_path, representative_path, work_path
 from toolpath_stiff.placement.result import nothing_better_words
-from toolpath_stiff.placement.search import search_placements
+from toolpath_stiff.placement.search import front_rows, search_placements, thin
 from toolpath_stiff.placement.task import SearchRecord
 from toolpath_stiff.placement.working import Search
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -67,8 +67,8 @@ def headline_figures(analysis) -> dict:
         "range_N_per_mm": np.ptp(k),
         "min_N_per_mm": k.min(),
         "mean_deflection_um": np.average(1e6 / k, weights=weight),  # of 1000 N
-        "min_margin": analysis.at.margin[samples.cutting].min(),
-        "rapid_margin": analysis.at.margin[~samples.cutting].min(),
+        "min_margin": analysis.at.reach.margin[samples.cutting].min(),
+        "rapid_margin": analysis.at.reach.margin[~samples.cutting].min(),
         "extrapolated_share": analysis.at.extrapolated[samples.cutting].mean(),
     }
 
@@ -338,7 +338,7 @@ def test_nothing_better_is_said_first_with_how_hard_it_was_looked_for():
     close = Bounds(at, at + np.array([0, 0, 1e-9, 0, 0, 0]))
     found = search_placements(Search(MODEL, path, TANGENTIAL, close, present=at))
     assert found.alone and found.searches == 3
-    told = nothing_better_words(SearchRecord("", "", {}, 1, (), found.pose_evaluations, found.searches))
+    told = nothing_better_words(SearchRecord({}, 1, (), found.pose_evaluations, found.searches, True))
     assert f"3 searches from the beginning, {found.pose_evaluations} poses" in told
 
 

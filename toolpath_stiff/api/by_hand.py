@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from toolpath_stiff.api.diagnosis import Data, Noise, Question
+import numpy as np
+
 from toolpath_stiff.api.machines import Machine
-
-if TYPE_CHECKING:
-    from toolpath_stiff.inference.evidence import Fit
-    from toolpath_stiff.machine.model import EffectEntry, StrutLaw
+from toolpath_stiff.api.measurements import Data, Noise, Question
+from toolpath_stiff.inference.candidates import Candidate, Component
+from toolpath_stiff.inference.errors import deviation_percent, error_figures
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import fit_effects
+from toolpath_stiff.inference.noise import noise_models
+from toolpath_stiff.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.machine.model import EffectEntry, StrutLaw
+from toolpath_stiff.stiffness.catalogue import find_effect
+from toolpath_stiff.stiffness.model import build_model
+from toolpath_stiff.stiffness.parameters import read_parameters
+from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 
 class Preview:
@@ -28,9 +38,6 @@ class Preview:
     """
 
     def __init__(self, question: Question) -> None:
-        from toolpath_stiff.inference.evidence import Problem
-        from toolpath_stiff.inference.noise import noise_models
-        from toolpath_stiff.inference.prediction import Predictor
 
         data = question.readings
         # Under the noise that a diagnosis writes out in full.
@@ -41,8 +48,6 @@ class Preview:
 
     def machine(self, effects: Mapping[str, Mapping[str, Any]]) -> Machine:
         """The machine with these effects and the strut law refitted beside them; arguments and errors as of `at`."""
-        from toolpath_stiff.inference.prediction import scaled_law
-
         given = self._on.model.given or self._on.model.machine
         return with_effects(self._on, effects, scaled_law(given.strut_law, self._fit(effects).law))
 
@@ -76,11 +81,6 @@ class Preview:
         InputError
             An effect is unknown, or cannot have such values.
         """
-        import numpy as np
-
-        from toolpath_stiff.inference.errors import deviation_percent, error_figures
-        from toolpath_stiff.units import n_per_mm_from_n_per_m
-
         fit = self._fit(effects or {}, strut_law, None if near is None else self._fit_near(near))
         modelled = n_per_mm_from_n_per_m(np.exp(self._problem.observed - fit.residual))
         return {
@@ -102,13 +102,6 @@ class Preview:
         With `near`, a fit of other sizes, from its law on and with the readings wild that are wild there: to find out
         which are takes most of the time where readings are many.
         """
-        import numpy as np
-
-        from toolpath_stiff.inference.candidates import Candidate, Component
-        from toolpath_stiff.inference.fits import fit_effects
-        from toolpath_stiff.stiffness.catalogue import find_effect
-        from toolpath_stiff.stiffness.parameters import read_parameters
-
         candidates, sizes = [], []
         for entry in _entries(effects):
             effect = find_effect(entry.name, self._problem.predictor.effect_files)
@@ -133,11 +126,6 @@ def with_effects(
     machine: Machine, effects: Mapping[str, Mapping[str, Any]], strut_law: StrutLaw | None = None
 ) -> Machine:
     """A machine with further effects, name -> the keys of its entry in a machine file, and with another strut law."""
-    from dataclasses import replace
-
-    from toolpath_stiff.stiffness.catalogue import find_effect
-    from toolpath_stiff.stiffness.model import build_model
-
     entries, given = _entries(effects), machine.model.given or machine.model.machine
     read = [entry for entry in entries if find_effect(entry.name, machine.effect_files).is_instrument]
     added = given.with_changes(
@@ -151,8 +139,6 @@ def with_effects(
 
 def _entries(effects: Mapping[str, Mapping[str, Any]]) -> list[EffectEntry]:
     """Effects as a machine file would have them."""
-    from toolpath_stiff.machine.model import EffectEntry
-
     return [EffectEntry(name, dict(keys)) for name, keys in effects.items()]
 
 

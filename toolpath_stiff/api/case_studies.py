@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from toolpath_stiff.api.inputs import Step, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import checked
+from toolpath_stiff.placement.case_study import MOST_REGIONS, CaseStudy, Region, read_regions, run_case_study
 from toolpath_stiff.units import m_from_mm
-
-if TYPE_CHECKING:
-    from toolpath_stiff.placement.case_study import CaseStudy, Region
 
 
 @checked
@@ -55,8 +52,6 @@ def case_study(
     >>> tps.case_study(slot, "nist", {"left": (-200, 0, 800), "right": (200, 0, 800, 90)}, step_mm=10)
     <CaseStudy: slot.nc on nist, 1 of 1 conclusion of the paper holds>
     """
-    from toolpath_stiff.placement.case_study import run_case_study
-
     on = machine_from(machine)
     part = None if program is None else program_from(program)
     model = on.running(part)
@@ -68,8 +63,6 @@ def case_study(
 
 def _regions(given: Mapping[str, Sequence[float]] | str | Path) -> dict[str, Region]:
     """Regions by name in mm and degrees, checked."""
-    from toolpath_stiff.placement.case_study import MOST_REGIONS, read_regions
-
     file = "" if isinstance(given, Mapping) else str(given)
     named: Mapping[str, Sequence[float]] = given if isinstance(given, Mapping) else read_regions(file)
     if not 0 < len(named) <= MOST_REGIONS:

@@ -1,28 +1,28 @@
-"""About a diagnosis: what to measure (plan), raw records reduced (reduce), the model corrected (update)."""
+"""The model corrected: effects fitted (update), what no effect explains written as one (draft)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from toolpath_stiff.api.diagnosis import Data, NoisePercent, Question, Seed, StrutSpread
+from toolpath_stiff.api.effects import effect_name
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.measurements import Data, NoisePercent, Question, Seed, StrutSpread
 from toolpath_stiff.column_names import Mapped
+from toolpath_stiff.correction.draft import EffectDraft, draft
+from toolpath_stiff.correction.result import Update
+from toolpath_stiff.correction.task import UpdateTask
+from toolpath_stiff.correction.update import update as update_machine
+from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import options
-from toolpath_stiff.options import Option, checked, distinct_numbers, finite_number, names
-from toolpath_stiff.results import Progress, one_of, teller
-from toolpath_stiff.units import m_from_mm, rad_from_deg
-
-if TYPE_CHECKING:
-    from toolpath_stiff.correction.result import Update
-    from toolpath_stiff.diagnosis.result import Diagnosis
-    from toolpath_stiff.machine.model import Hexapod
-    from toolpath_stiff.planning.result import Plan
-
-COSTS = ("reading", "pose", "tool", "setup", "indicator")
+from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.options import Option, checked
+from toolpath_stiff.results import Progress, teller
+from toolpath_stiff.stiffness.catalogue import known_effects
+from toolpath_stiff.stiffness.model import build_model
 
 
 @checked
@@ -83,9 +83,6 @@ def update(
     >>> update.to_frame()["name"].tolist()
     ['as given', 'strut law refitted']
     """
-    from toolpath_stiff.correction.update import update as update_machine
-    from toolpath_stiff.stiffness.model import build_model
-
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     on = question.on
 
@@ -93,136 +90,59 @@ def update(
         model = replace(build_model(corrected, on.effect_files), unchecked=on.model.unchecked)
         return Machine(model, on.asked, on.effect_files, allow_unchecked_effects=on.allow_unchecked_effects)
 
-    corrected = update_machine(
+    task = UpdateTask(
         question.model, question.readings, [add] if isinstance(add, str) else list(add), strut_law=strut_law,
         keep_strut_law=keep_strut_law, auto=auto, force=force, objective=objective, files=question.files,
         machine_file=str(machine_file), asked=question.request, progress=teller(progress), **question.common,
     )  # fmt: skip
-    return replace(corrected, inputs=question.inputs, opened=opened)
+    return replace(update_machine(task), inputs=question.inputs, opened=opened)
 
 
 @checked
-def plan(
-    data: Data | None = None,
+def draft_effect(
+    data: Data,
     machine: Machine | str | Path = "nist",
+    file: str | Path = "missing.toml",
     *,
-    between: Annotated[Sequence[str], Option("--between", "A,B", read=names)] = (),
-    n: Annotated[int | None, Option("--n")] = None,
-    radius_mm: Annotated[float | None, Option("--radius", "mm", above=0, at_most=1e5)] = None,
-    heights_mm: Annotated[Sequence[float] | None, Option("--heights", "Z,Z,...", read=distinct_numbers)] = None,
-    max_tilt_deg: Annotated[float | None, Option("--max-tilt", "deg", at_least=0, below=90)] = None,
-    loads_N: Annotated[Sequence[float] | None, Option("--loads", "N,N,...", read=distinct_numbers)] = None,
-    tool_extensions_mm: Annotated[Sequence[float] | None, Option("--tools", "MM,MM,...", read=distinct_numbers)] = None,
-    setups: Annotated[Sequence[str] | None, Option("--setups", "NAME,...", read=names)] = None,
-    indicators: Annotated[bool, Option("--indicators")] = False,
-    minutes: Annotated[Mapping[str, float] | None, Option("--cost", "WHAT=MINUTES", read=_cost, count="append")] = None,
-    columns: Mapped = None,
     noise_percent: NoisePercent = None,
     strut_spread_percent: StrutSpread = 1.0,
     seed: Seed = 0,
-    diagnosis: Diagnosis | None = None,
-) -> Plan:
-    """What to measure next to tell explanations apart; without data, what to measure first.
+    progress: Progress | None = None,
+) -> EffectDraft:
+    """Describe what a diagnosis leaves unexplained as an effect file to read, edit and put to the test.
 
     Parameters
     ----------
     data, machine
-        The machine; measurements, or the files that hold them; None before the first campaign.
-    between
-        Effects to tell apart, or "none"; unless given, what a diagnosis of the data leaves standing.
-    n
-        Poses; unless given 6, or 24 of a first campaign.
-    radius_mm
-        How far poses may lie from the axis; unless given, 300 mm.
-    heights_mm
-        Of the tool tip; unless given, five levels.
-    max_tilt_deg
-        Of the spindle; unless given, 25 degrees.
-    loads_N
-        Unless given, 500, 1000, 4000 and those of the data.
-    tool_extensions_mm
-        Tools, longer than the reference tool by; the first is in the spindle. Unless given, as last, and 150.
-    setups
-        The first is on the table; unless given, those of the data.
-    indicators
-        Take a second indicator across a link of the load path where that tells more.
-    minutes
-        What work costs: of a "reading" (1), a "pose" (15), another "tool" (10), another "setup" (45), a second
-        "indicator" (10).
-    columns
-        As of `compare`.
-    noise_percent, strut_spread_percent, seed
-        As of `compare`.
-    diagnosis
-        A diagnosis of the same data; it is not made again then.
+        The machine, whose effect files take part; measurements, or the files that hold them.
+    file
+        Where it will be saved: the effect is named after it. Nothing is written yet.
+    noise_percent, strut_spread_percent, seed, progress
+        As of `diagnose`.
 
     Raises
     ------
     InputError, InputErrors
-        A file cannot be read; an unknown effect, no reachable pose, a number that cannot be.
+        A file cannot be read; too few readings; there is an effect of that name.
 
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.plan(machine="nist", between=("spindle_compliance", "none"), n=2)
-    >>> found
-    <Plan: rivals, 2 clampings>
-    >>> len(found.to_dict()["visits"]), found.to_frame().columns.tolist()[:6]
-    (2, ['x_mm', 'y_mm', 'z_mm', 'a_deg', 'b_deg', 'c_deg'])
-    >>> list(found.files(plots=False)), len(found.rows) == len(found.to_frame())
-    (['plan.csv', 'plan.json', 'plan_tables.npz'], True)
+    >>> drafted = tps.draft_effect("nist-table1", "nist", noise_percent=20)
+    >>> drafted.reason
+    'Nothing is missing that these data could show: there is nothing to describe.'
+    >>> drafted.to_dict()["effect"] is None, drafted.text  # `drafted.save(FILE)` raises InputError then
+    (True, '')
     """
-    from toolpath_stiff.planning.menu import Costs
-    from toolpath_stiff.planning.result import plan as plan_visits
-    from toolpath_stiff.planning.result import usual_menu
-
-    question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
-    minutes = {name: float(value) for name, value in (minutes or {}).items()}
-    for name, value in minutes.items():
-        one_of("minutes", name, COSTS)
-        if not value >= 0.0:
-            raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
-    line = question.request.command(
-        "plan",
-        *options(
-            between=_word(between or None), n=n, radius=_word(radius_mm), heights=_word(heights_mm),
-            max_tilt=_word(max_tilt_deg), loads=_word(loads_N), tools=_word(tool_extensions_mm), setups=_word(setups),
-            cost=[f"{name}={_word(value)}" for name, value in minutes.items()], seed=seed or None,
-            indicators=indicators,
-        ),
-    )  # fmt: skip
-    readings = None if question.data is None else question.readings
-    menu = usual_menu(readings).with_options(
-        radius=None if radius_mm is None else m_from_mm(radius_mm),
-        heights=_in_metres(heights_mm),
-        max_tilt=None if max_tilt_deg is None else rad_from_deg(max_tilt_deg),
-        loads=loads_N,
-        tool_extensions=_in_metres(tool_extensions_mm),
-        setups=setups,
-        indicators=indicators,
-        costs=Costs(**minutes),
+    question = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    name = effect_name(file, ".toml")
+    if name in known_effects(question.on.effect_files):
+        raise InputError(f"effect {name} exists already", hint="give the draft another file name")
+    diagnosis = replace(
+        diagnose(question.model, question.readings, progress=teller(progress), **question.common),
+        names=question.files,
+        line=question.request.command("diagnose", *options(seed=seed or None)),
+        asked=question.request,
+        inputs=question.inputs,
     )
-    judgement = None if diagnosis is None else diagnosis.main
-    proposal = plan_visits(
-        question.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **question.common
-    )
-    return replace(proposal, names=question.files, line=line, inputs=question.inputs)
-
-
-def _cost(text: str) -> tuple[str, float]:
-    """`pose=15`."""
-    name, _, value = text.partition("=")
-    return name, finite_number(value)
-
-
-def _in_metres(values_mm: Sequence[float] | None) -> tuple[float, ...] | None:
-    return None if values_mm is None else tuple(m_from_mm(float(value)) for value in values_mm)
-
-
-def _word(value: object) -> str | None:
-    """A value as an option takes it: a number as it is typed, several with commas."""
-    if value is None:
-        return None
-    if isinstance(value, list | tuple):
-        return ",".join(str(_word(part)) for part in value)
-    return f"{value:.10g}" if isinstance(value, int | float) else str(value)
+    return draft(diagnosis, str(file))

@@ -22,7 +22,7 @@ from toolpath_stiff.nc.program import Program
 from toolpath_stiff.processes import ProcessPool, death
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, figures_of
 from toolpath_stiff.report.batch.programs import Listed
-from toolpath_stiff.results_folder import Rules, clear_up
+from toolpath_stiff.results_folder import Rules
 
 _ALONE = threading.Lock()  # a process analyzes one program at a time, however many threads an executor has
 
@@ -39,8 +39,8 @@ class BatchRun:
         The machine and the one to compare with, pickled: a process unpacks them once.
     options
         Of `analyze`.
-    plots, table, show_plunges, replace
-        Of `Analysis.save`.
+    saved, replace
+        Of `Analysis.save`: plots, table, show_plunges; and whether what is in the way is kept beside.
     version, name
         Of the package; a name that no other run has, for executors that know a call again by its arguments.
     """
@@ -49,9 +49,7 @@ class BatchRun:
     shown: str
     machines: bytes
     options: dict[str, Any]
-    plots: bool
-    table: str
-    show_plunges: bool
+    saved: dict[str, Any]
     replace: bool
     version: str = VERSION
     name: str = field(default_factory=lambda: uuid.uuid4().hex)
@@ -59,7 +57,7 @@ class BatchRun:
 
 @dataclass(frozen=True)
 class Task:
-    """One program: what is read (paths absolute), its name and report's folder, inputs that lie there, the run."""
+    """One program: what is read (paths absolute), its name and report's folder, what else the run reads, the run."""
 
     program: Program
     listed: Listed
@@ -73,12 +71,10 @@ class Task:
 
     def failed(self, reason: str) -> ProgramOutcome:
         """A failure: a sentence in one line that begins with the file as named; errors know its last name alone."""
-        file = self.listed.file
-        line = "; ".join(reason.splitlines())
+        file, line = self.listed.file, "; ".join(reason.splitlines())
         line = line.replace(self.program.file or file, file).replace(str(self.run.out), self.run.shown)
-        last = Path(file).name
-        if line.startswith(f"{last}:"):
-            line = file + line[len(last) :]
+        last = f"{Path(file).name}:"
+        line = f"{file}:{line.removeprefix(last)}" if line.startswith(last) else line
         return ProgramOutcome(self.listed.name, file, line if file in line else f"{file}: {line}")
 
 
@@ -86,33 +82,29 @@ def answers(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> Iter
     """Position and outcome of each task, as they come; of no executor, from so many processes, one being this one."""
     if executor is None and jobs == 1:
         yield from enumerate(map(analyze_task, tasks))
-        return
-    try:
-        if executor is not None:
-            yield from _from_executor(tasks, executor)
-        else:
-            with ProcessPool(jobs) as pool:
-                yield from _from_executor(tasks, pool)
-    finally:  # of processes that died, wherever they were
-        clear_up(task.folder for task in tasks)
+    elif executor is not None:
+        yield from _from_executor(tasks, executor)
+    else:
+        with ProcessPool(jobs) as pool:
+            yield from _from_executor(tasks, pool)
 
 
 def _from_executor(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[int, ProgramOutcome]]:
     # The largest first, so that no process is left alone with one at the end.
     order = sorted(range(len(tasks)), key=lambda i: -_size(tasks[i].program))
-    futures = {_submit(executor, tasks[i]): i for i in order}
+    futures = {executor.submit(analyze_task, tasks[i]): i for i in order}
     suspects = []
     try:
         for future in as_completed(futures):
-            place = futures[future]
             if _worker_died(future):
-                suspects.append(place)
+                suspects.append(futures[future])
             else:
-                yield place, _answer(tasks[place], future)
+                yield futures[future], _answer(tasks[futures[future]], future)
         # Dask gives a worker its next tasks early and, when it dies, cannot tell which of them it died of: each alone.
         for place in suspects:
-            futures = {_submit(executor, tasks[place]): place}
-            yield place, _answer(tasks[place], next(as_completed(futures)))
+            future = executor.submit(analyze_task, tasks[place])
+            futures[future] = place
+            yield place, _answer(tasks[place], next(as_completed([future])))
     finally:
         for future in futures:
             future.cancel()
@@ -121,15 +113,6 @@ def _from_executor(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[
 def _worker_died(future: Future[ProgramOutcome]) -> bool:
     """True where a Dask cluster gave a call up because its workers died; by name, as Dask need not be installed."""
     return not future.cancelled() and type(future.exception()).__name__ == "KilledWorker"
-
-
-def _submit(executor: Executor, task: Task) -> Future[ProgramOutcome]:
-    try:
-        return executor.submit(analyze_task, task)
-    except RuntimeError as error:  # it has been shut down, or it broke
-        failed: Future[ProgramOutcome] = Future()
-        failed.set_exception(error)
-        return failed
 
 
 def _size(program: Program) -> int:
@@ -170,14 +153,14 @@ def analyze_task(task: Task) -> ProgramOutcome:
             machine, other = _unpacked(run.machines)
             analysis = analyze(task.program, machine, compare_with=other, **run.options)
             rules = Rules(inputs=task.inputs, replace=run.replace)
-            analysis.save(task.folder, plots=run.plots, rules=rules, table=run.table, show_plunges=run.show_plunges)
+            analysis.save(task.folder, rules=rules, **run.saved)
     except TpsError as error:
         return task.failed(str(error))
     except MemoryError:
         return task.failed("out of memory; try fewer --jobs")
     except Exception as error:  # a defect of ours: it must not stop the other programs
         return task.failed(f"{_named(error)} (a defect; analyze it alone to see where)")
-    report = (listed.folder / ("report.html" if run.plots else "summary.json")).as_posix()
+    report = (listed.folder / ("report.html" if run.saved["plots"] else "summary.json")).as_posix()
     return ProgramOutcome(listed.name, listed.file, "", report, figures_of(analysis.to_dict()))
 
 

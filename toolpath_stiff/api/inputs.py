@@ -44,6 +44,8 @@ Origin = Annotated[
         "G10 says, else the machine's default.",
     ),
 ]
+# Coarser than 0.01 mm is not machining; beyond nine decimals a double has no more digits.
+Decimals = Annotated[int | None, Option("--decimals", at_least=2, at_most=9)]
 Linearised = Annotated[
     float | None,
     Option(

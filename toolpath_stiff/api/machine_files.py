@@ -7,8 +7,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from toolpath_stiff.correction.geometry import recover_geometry as recover
+from toolpath_stiff.correction.geometry import recovery_text
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_bytes
+from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
+from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text
 from toolpath_stiff.options import Option, checked
 from toolpath_stiff.results import TextFile, TextResult
 
@@ -54,8 +58,6 @@ def machine_template(file: str | Path = "mine.toml") -> MachineFile:
     >>> tps.machine_template("mill.toml").name
     'mill'
     """
-    from toolpath_stiff.machine.writer import TEMPLATE_REMARK, toml_text
-
     target = Path(file)
     text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")
     text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
@@ -87,9 +89,6 @@ def machine_from_linuxcnc(
     Traceback (most recent call last):
     toolpath_stiff.errors.FileError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
     """
-    from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
-    from toolpath_stiff.machine.writer import machine_toml
-
     path = Path(file)
     text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
     unit = units or units_of(path)
@@ -123,8 +122,5 @@ def recover_geometry(
     >>> found.to_dict()["starts"]
     1
     """
-    from toolpath_stiff.correction.geometry import recover_geometry as recover
-    from toolpath_stiff.correction.geometry import recovery_text
-
     recovery = recover(starts=starts, seed=seed)
     return TextResult(recovery_text(recovery), recovery, f"the NIST geometry from {starts} starts")

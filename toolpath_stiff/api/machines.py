@@ -7,24 +7,31 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+
+from toolpath_stiff.analysis.machine_check import MachineCheck
+from toolpath_stiff.analysis.machine_check import check_machine as look
+from toolpath_stiff.analysis.poses import reach_along
 from toolpath_stiff.api.inputs import pose_si
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.files import write_atomically
+from toolpath_stiff.machine.file import load_machine, packaged_machines
+from toolpath_stiff.machine.kinematics import Struts
+from toolpath_stiff.machine.limits import Reach, stand
+from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import Option, checked
 from toolpath_stiff.results import Result
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness.contract import Conditions
+from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup, known_setups
+from toolpath_stiff.stiffness.trial import failures, own_effects, refuse_failing
 from toolpath_stiff.units import mm_from_m, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
-
-    from toolpath_stiff.analysis.machine_check import MachineCheck
-    from toolpath_stiff.arrays import FloatArray
-    from toolpath_stiff.machine.kinematics import Struts
-    from toolpath_stiff.machine.limits import Reach
-    from toolpath_stiff.machine.model import Hexapod
-    from toolpath_stiff.nc.program import Program
-    from toolpath_stiff.stiffness.contract import Conditions
-    from toolpath_stiff.stiffness.model import StiffnessModel
 
 
 def _named(text: str) -> str:
@@ -178,8 +185,6 @@ class Machine(Result):
         >>> tps.Machine.names()
         ['genhexkins', 'nategh_agheli', 'nist']
         """
-        from toolpath_stiff.machine.file import packaged_machines
-
         return list(packaged_machines())
 
     def __repr__(self) -> str:
@@ -214,8 +219,6 @@ class Machine(Result):
     @property
     def setups(self) -> list[str]:
         """The set-ups that its file lists and its effects name."""
-        from toolpath_stiff.stiffness.model import known_setups
-
         return known_setups([self.model])
 
     @property
@@ -235,9 +238,6 @@ class Machine(Result):
         >>> machine.running().machine.name, machine.running().conditions.setup
         ('nist', None)
         """
-        from toolpath_stiff.stiffness.contract import Conditions
-        from toolpath_stiff.stiffness.model import NO_SETUP, check_setup
-
         model, setup, said_by = self.model, self.setup, f"--setup {self.setup}"
         if setup is None and program is not None:
             setup, said_by = program.controller.setup, str(program.given.get("controller"))
@@ -316,8 +316,6 @@ class Machine(Result):
         >>> pose.tolist(), struts.lengths.shape, bool(reach.reachable[0])
         ([0.0, 0.0, 0.8, 0.0, 0.0, 0.0], (1, 6), True)
         """
-        from toolpath_stiff.machine.limits import stand
-
         machine = self.model.machine
         if pose_mm_deg is None:
             return stand(machine, pose_in_si(FIGURE_2_MM_DEG) if self.name == "nist" else machine.default_origin)
@@ -347,11 +345,6 @@ class Machine(Result):
         >>> tps.Machine.load("nist").reach_mm((0, 0, 800), [(1, 0, 0), (0, 0, -1)]).round().tolist()
         [750.0, 946.0]
         """
-        import numpy as np
-
-        from toolpath_stiff.analysis.poses import reach_along
-        from toolpath_stiff.rotations import rotation_matrices
-
         pose, rays = np.array(pose_si("pose", from_mm_deg)), np.asarray(directions, dtype=float)
         rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
         return mm_from_m(reach_along(self.model.machine, pose[:3], rays, rotation_matrices(pose[3:])))
@@ -414,8 +407,6 @@ class Machine(Result):
         ...     tps.Machine.load(file).name
         'nist'
         """
-        from toolpath_stiff.machine.writer import machine_toml
-
         return write_atomically(file, machine_toml(self.model.given or self.model.machine))
 
 
@@ -423,17 +414,11 @@ def _machine_again(
     given: Hexapod, conditions: Conditions, unchecked: tuple[str, ...], fields: tuple[Any, ...]
 ) -> Machine:
     """A machine in another process."""
-    from toolpath_stiff.stiffness.model import build_model
-
     return Machine(replace(build_model(given, fields[1], conditions=conditions), unchecked=unchecked), *fields)
 
 
 def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects: bool) -> StiffnessModel:
     """The model of a machine; raises `InputError` for effects that fail, unless they are allowed."""
-    from toolpath_stiff.machine.file import load_machine
-    from toolpath_stiff.stiffness.model import build_model
-    from toolpath_stiff.stiffness.trial import failures, own_effects, refuse_failing
-
     given = load_machine(machine)
     model = build_model(given, files)
     effects = own_effects(model, files)
@@ -461,7 +446,5 @@ def check_machine(machine: Machine | str | Path) -> MachineCheck:
     >>> tps.Machine.load("nist").check().good
     True
     """
-    from toolpath_stiff.analysis.machine_check import check_machine as look
-
     on = machine_from(machine)
     return look(on.running(), on.asked)

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import pickle
-import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager, suppress
-from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.hand_out import BatchRun, Task, answers
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.programs import JOBS, ShowPlunges, Table, analyze, check_options
+from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table, analyze, check_options
 from toolpath_stiff.defaults import job_count
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import writing_errors
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import arguments_of, checked
 from toolpath_stiff.report.analysis import other_samples
 from toolpath_stiff.report.batch.index import files
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, columns_of, terminal_summary
-from toolpath_stiff.report.batch.programs import RESERVED, Found, Listed, find_programs, report_folders
+from toolpath_stiff.report.batch.programs import RESERVED, Found, find_programs, report_folders
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, Result
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
@@ -65,13 +63,9 @@ class ManyAnalyses(Result):
         """The programs with a cut below what was required."""
         return [outcome for outcome in self.outcomes if outcome.figure("lines_below_required")]
 
-    @cached_property
-    def _document(self) -> list[dict[str, Any]]:
-        return [self._entry(outcome) for outcome in self.outcomes]
-
     def to_dict(self) -> list[dict[str, Any]]:  # type: ignore[override]  # the command prints a list
         """The JSON document of the command, a list: each program's summary, its file and its report; or the error."""
-        return self._document
+        return [self._entry(outcome) for outcome in self.outcomes]
 
     def _entry(self, outcome: ProgramOutcome) -> dict[str, Any]:
         if outcome.reason:
@@ -80,16 +74,9 @@ class ManyAnalyses(Result):
         summary = json.loads((report.parent / "summary.json").read_text(encoding="utf-8"))
         return {**summary, "file": outcome.file, "report": str(report)}
 
-    def json_pieces(self) -> Iterator[str]:
-        """`to_dict()` as text, one program a piece: together they may be large."""
-        for i, outcome in enumerate(self.outcomes):
-            entry = json.dumps(self._entry(outcome), indent=2)  # names need not be UTF-8, so escaped
-            yield ("[\n" if i == 0 else ",\n") + textwrap.indent(entry, "  ")
-        yield "\n]\n"
-
     def to_json(self) -> str:
         """`to_dict()` as text, as the command prints it."""
-        return "".join(self.json_pieces())
+        return json.dumps(self.to_dict(), indent=2) + "\n"  # names need not be UTF-8, so escaped
 
     def to_frame(self) -> pd.DataFrame:
         """One row a program, the columns of `summary.csv`."""
@@ -111,7 +98,7 @@ def analyze_many(
     folder: str | Path,
     *,
     executor: Executor | None = None,
-    jobs: Annotated[int | None, JOBS] = None,
+    jobs: Jobs = None,
     plots: bool = True,
     table: Table = "csv",
     show_plunges: ShowPlunges = False,
@@ -162,8 +149,6 @@ def analyze_many(
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     found = tps.analyze_many(parts, "nist", folder, jobs=1, plots=False, require_N_per_mm=60000)
     ...     programs = [entry["program"] for entry in found.to_dict()]
-    ...     "".join(found.json_pieces()) == found.to_json()
-    True
     >>> found, programs
     (<ManyAnalyses: 2 programs, 1 failed>, ['slot.nc', 'bad.nc'])
     >>> [one.status for one in found.outcomes], found.complete
@@ -181,30 +166,43 @@ def analyze_many(
     other_samples(table)
     listed, given = _listed(programs)
     example = Program.from_text("", **options)
-    each = [example, *given.values()]
-    _check_shared(on, other, each)
+    each = [given.get(program.file) or _named(example, program.file) for program in listed]
+    for program in (example, *given.values()):
+        on.running(program, [other] if other else [])
     count = job_count(jobs, len(listed))
-    files_read = (*(program.file for program in listed), *(file for program in each for file in program.inputs))
-    rules = Rules(inputs=(*files_read, *on.inputs, *(other.inputs if other else ())), replace=replace)
+    shared = (*on.inputs, *(other.inputs if other else ()))
+    rules = Rules(inputs=(*(file for program in each for file in program.inputs), *shared), replace=replace)
     out = Path(folder)
     check_folder(out, RESERVED, rules)
-    run = BatchRun(
-        out.absolute(), str(out), pickle.dumps((on, other)), path_options, plots, table, show_plunges, replace
-    )
-    reports = report_folders(listed)
-    with _folders_for(out, reports):
-        # The overview of an earlier run goes, as its reports do from now on, one after the other.
-        write_folder(out, {}, command="analyze", rules=rules, unfinished=True)
-        tasks = _tasks(run, reports, given, example, _file_ids(rules.inputs))
-        outcomes = dict.fromkeys(range(len(tasks)), ProgramOutcome("", ""))
-        if progress is not None:
-            progress(f"{count} at a time" if executor is None else type(executor).__name__, 0, len(tasks))
-        for done, (place, outcome) in enumerate(answers(tasks, executor, count), 1):
-            outcomes[place] = outcome
-            if progress is not None:
-                progress(f"{outcome.name}{': failed' if outcome.reason else ''}", done, len(tasks))
-        written = write_folder(out, files([*outcomes.values()]), command="analyze", rules=rules)
+    saved = {"plots": plots, "table": table, "show_plunges": show_plunges}
+    run = BatchRun(out.absolute(), str(out), pickle.dumps((on, other)), path_options, saved, replace)
+    # The overview of an earlier run goes, as its reports do from now on, one after the other.
+    write_folder(out, {}, command="analyze", rules=rules, unfinished=True)
+    tasks = [
+        Task(_absolute(program), report, (*program.inputs, *shared), run)
+        for program, report in zip(each, report_folders(listed), strict=True)
+    ]
+    with writing_errors(out, "write to"):
+        for task in tasks:  # before the processes, which would take each other's away
+            task.folder.parent.mkdir(parents=True, exist_ok=True)
+    outcomes = dict.fromkeys(range(len(tasks)), ProgramOutcome("", ""))
+    told = progress or (lambda text, done, total: None)
+    told(f"{count} at a time" if executor is None else type(executor).__name__, 0, len(tasks))
+    for done, (place, outcome) in enumerate(answers(tasks, executor, count), 1):
+        outcomes[place] = outcome
+        told(f"{outcome.name}{': failed' if outcome.reason else ''}", done, len(tasks))
+    written = write_folder(out, files([*outcomes.values()]), command="analyze", rules=rules)
     return ManyAnalyses(out, [*outcomes.values()], written)
+
+
+def _named(example: Program, file: str) -> Program:
+    """A program in a file, read as the example."""
+    return dataclasses.replace(example, name=Path(file).name, file=file, text=None, _last={})
+
+
+def _absolute(program: Program) -> Program:
+    """The same for another process."""
+    return dataclasses.replace(program, file=program.file and str(Path(program.file).absolute()), _last={})
 
 
 def _listed(programs: Iterable[str | Path | Program | Found]) -> tuple[list[Found], dict[str, Program]]:
@@ -227,62 +225,3 @@ def _listed(programs: Iterable[str | Path | Program | Found]) -> tuple[list[Foun
     if not listed:
         raise InputError("no programs", expected="files, folders or Program objects")
     return listed, given
-
-
-def _check_shared(on: Machine, other: Machine | None, programs: Iterable[Program]) -> None:
-    """What all programs share, so that a mistake in it is one error. Raises `InputError`."""
-    from toolpath_stiff.nc.linuxcnc.runner import find_rs274
-
-    for program in programs:
-        on.running(program, [other] if other else [])
-        if program.options["interpreter"] == "linuxcnc":
-            find_rs274(program.options["rs274"], program.options["unconfined"])
-
-
-def _tasks(
-    run: BatchRun,
-    reports: Sequence[Listed],
-    given: dict[str, Program],
-    example: Program,
-    inputs: dict[tuple[int, int], str],
-) -> list[Task]:
-    """A task for each program; with it the inputs of any that lie in its folder: of thousands, hardly ever one."""
-    tasks = []
-    for listed in reports:
-        program = given.get(listed.file) or replace(example, name=Path(listed.file).name, file=listed.file, text=None)
-        file = program.file and str(Path(program.file).absolute())
-        there: dict[tuple[int, int], str] = {}
-        with suppress(OSError):  # no such folder yet, the usual case
-            there = _file_ids((run.out / listed.folder).iterdir())
-        within = tuple(inputs[key] for key in there if key in inputs)
-        tasks.append(Task(replace(program, file=file, _last={}), listed, within, run))
-    return tasks
-
-
-def _file_ids(files: Iterable[str | Path]) -> dict[tuple[int, int], str]:
-    """Device and inode of each file that is there."""
-    ids = {}
-    for file in map(Path, files):
-        with suppress(OSError):
-            state = file.stat()
-            ids[state.st_dev, state.st_ino] = str(file.absolute())
-    return ids
-
-
-@contextmanager
-def _folders_for(out: Path, programs: Sequence[Listed]) -> Iterator[None]:
-    """Make the folders above the reports, for all processes; those that stay empty are taken away at the end."""
-    wanted = {out, *((out / program.folder).parent for program in programs)}
-    above = {folder for place in wanted for folder in (place, *place.parents)}
-    made = sorted((folder for folder in above if not folder.exists()), key=lambda folder: len(folder.parts))
-    try:
-        for folder in made:
-            try:
-                folder.mkdir(exist_ok=True)
-            except OSError as error:
-                raise InputError(f"cannot write to {str(folder)!r}: {error.strerror}") from None
-        yield
-    finally:
-        for folder in reversed(made):
-            with suppress(OSError):  # not empty, the usual case
-                folder.rmdir()

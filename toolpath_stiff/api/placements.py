@@ -5,26 +5,39 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-from toolpath_stiff.api.inputs import FARTHEST_MM, Force, Linearised, LoadDirection, Origin, Step, origin_si, pose_si
+import numpy as np
+
+from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.api.inputs import (
+    FARTHEST_MM,
+    Decimals,
+    Force,
+    Linearised,
+    LoadDirection,
+    Origin,
+    Step,
+    origin_si,
+    pose_si,
+)
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, low_high, numbers
+from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.goals import Bounds, SearchRules
+from toolpath_stiff.placement.keep_out import KeepOut
+from toolpath_stiff.placement.paths import work_path
+from toolpath_stiff.placement.placing import place_again, place_program
+from toolpath_stiff.placement.result import Placement
+from toolpath_stiff.placement.task import PlacementTask, Rewriting
 from toolpath_stiff.results import Progress, counter
-from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
-
-if TYPE_CHECKING:
-    from toolpath_stiff.machine.model import Hexapod
-    from toolpath_stiff.nc.moves import ReadProgram
-    from toolpath_stiff.placement.evaluator import Evaluator
-    from toolpath_stiff.placement.goals import Bounds
-    from toolpath_stiff.placement.keep_out import KeepOut
-    from toolpath_stiff.placement.result import Placement
-    from toolpath_stiff.placement.task import Rewriting
-    from toolpath_stiff.rewriting.program import RewrittenProgram
+from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
+from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
 FARTHEST_TURN_DEG = 720.0
 MOST_FRONT_POINTS = 1000
@@ -58,7 +71,7 @@ def place(
     step_mm: Step = 1.0,
     force_N: Force = FORCE,
     write: Annotated[str | Path | None, Option("--write", "FILE")] = None,
-    decimals: Annotated[int | None, Option("--decimals")] = None,
+    decimals: Decimals = None,
     linearise_mm: Linearised = None,
     progress: Progress | None = None,
 ) -> Placement:
@@ -119,11 +132,6 @@ def place(
     >>> found.worse
     []
     """
-    from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.placement.goals import SearchRules
-    from toolpath_stiff.placement.placing import place_again, place_program
-    from toolpath_stiff.placement.task import PlacementTask, SearchedFront
-
     on, part = machine_from(machine), program_from(program)
     model = on.running(part)
     default = model.machine.default_origin
@@ -144,14 +152,13 @@ def place(
     if pick is None:
         placed = place_program(task, counter(progress, f"{part.name}: search"))
     else:
-        placed = place_again(task, SearchedFront.of(earlier), pick)
+        placed = place_again(task, earlier, pick)
     return replace(placed, inputs=(*part.inputs, *on.inputs))
 
 
 def _rewriting(
     part: Program, write: str | Path | None, decimals: int | None, linearise_mm: float | None
 ) -> Rewriting | None:
-    from toolpath_stiff.placement.task import Rewriting
 
     if write is not None:
         chord = None if linearise_mm is None else m_from_mm(linearise_mm)
@@ -164,8 +171,6 @@ def _rewriting(
 
 def _keep_out(text: str) -> KeepOut:
     """`NAME:X0,Y0,Z0,X1,Y1,Z1`."""
-    from toolpath_stiff.placement.keep_out import KeepOut
-
     name, _, corners = text.rpartition(":")
     values = numbers(corners)
     if not name or len(values) != 6:
@@ -177,10 +182,6 @@ def _bounds(
     machine: Hexapod, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
 ) -> Bounds:
     """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
-    import numpy as np
-
-    from toolpath_stiff.placement.goals import Bounds
-
     heights = sorted(set(map(float, heights_mm)))
     sides = [None if side is None else _pair(side) for side in box]
     if heights:
@@ -226,10 +227,6 @@ class PlacementTrial:
 
     def at(self, origin_mm_deg: Sequence[float]) -> dict[str, float | None]:
         """Mean, range and weakest in N/mm, margins as shares of a limit's span; None where a cut is out of reach."""
-        import numpy as np
-
-        from toolpath_stiff.units import n_per_mm_from_n_per_m
-
         figures = self._evaluator.figures(np.array([pose_si("origin", origin_mm_deg)]))
         names = {"mean_N_per_mm": figures.mean, "range_N_per_mm": figures.spread, "min_N_per_mm": figures.lowest}
         values = {name: float(n_per_mm_from_n_per_m(value[0])) for name, value in names.items()}
@@ -257,10 +254,6 @@ def try_placement(
     >>> round(tps.try_placement(slot, "nist").at((0, 0, 800))["mean_N_per_mm"])
     54353
     """
-    from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.placement.evaluator import Evaluator
-    from toolpath_stiff.placement.paths import work_path
-
     on, part = machine_from(machine), program_from(program)
     model, direction = on.running(part), parse_load(load)
     default = model.machine.default_origin
@@ -270,12 +263,13 @@ def try_placement(
     return PlacementTrial(read, Evaluator(model, path, direction, force_N))
 
 
+@checked
 def rewrite(
     program: Program | str | Path,
     *,
     to_mm_deg: Sequence[float],
     from_mm_deg: Sequence[float] = (0.0, 0.0, 0.0),
-    decimals: int | None = None,
+    decimals: Decimals = None,
     linearise_mm: Linearised = None,
 ) -> RewrittenProgram:
     r"""Write a program so that, run where its zero sits now, it does what it would do untouched at another placement.
@@ -307,8 +301,6 @@ def rewrite(
     G1 X50
     M2
     """
-    from toolpath_stiff.rewriting.program import rewrite_program
-
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)

@@ -5,24 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from toolpath_stiff.analysis.grid import StiffnessMap
+from toolpath_stiff.analysis.grid import map_stiffness as evaluate_grid
+from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.analysis.poses import POSE_COLUMNS, PoseStiffness, evaluate_poses
 from toolpath_stiff.api.inputs import FARTHEST_MM, Force
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import FORCE
 from toolpath_stiff.errors import InputError, InputErrors, UnreachableError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.options import Option, checked, finite_number, low_high, numbers
 from toolpath_stiff.results import Progress, counter
+from toolpath_stiff.tables import Columns, read_table
 from toolpath_stiff.toml_reader import shortened
 from toolpath_stiff.units import m_from_mm, rad_from_deg
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from toolpath_stiff.analysis.grid import StiffnessMap
-    from toolpath_stiff.analysis.poses import PoseStiffness
-    from toolpath_stiff.arrays import FloatArray
 
 FARTHEST = FARTHEST_MM  # mm and degrees of a pose
 MOST_POINTS = 2001  # along a side of a map
@@ -49,11 +51,6 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
     >>> poses.shape, poses[1].tolist(), notes
     ((2, 6), [100.0, 0.0, 800.0, 10.0, 0.0, 0.0], ())
     """
-    import numpy as np
-
-    from toolpath_stiff.analysis.poses import POSE_COLUMNS
-    from toolpath_stiff.tables import Columns, read_table
-
     name = str(file)
     table = read_table(name, "poses", Columns(POSE_COLUMNS))
     missing = [column for column in POSE_COLUMNS[:3] if column not in table.heading]
@@ -115,10 +112,6 @@ def pose(pose_mm_deg: ArrayLike, machine: Machine | str | Path = "nist", *, forc
     >>> tps.pose([(0, 0, 800), (0, 0, 5000)], "nist").reachable.tolist()
     [True, False]
     """
-    import numpy as np
-
-    from toolpath_stiff.analysis.poses import evaluate_poses
-
     on = machine_from(machine)
     try:
         given = np.asarray(pose_mm_deg, dtype=float)
@@ -198,9 +191,6 @@ def map_stiffness(
     >>> found.to_dict()["slices"][0]["circle"]["maxima_deg"]
     [60.27, 180.27, 300.27]
     """
-    from toolpath_stiff.analysis.grid import map_stiffness as evaluate_grid
-    from toolpath_stiff.analysis.loads import parse_load
-
     on = machine_from(machine)
     heights = sorted([float(z_mm)] if isinstance(z_mm, int | float) else [float(z) for z in z_mm])
     if len(set(heights)) < len(heights):

@@ -5,22 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
+from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.analysis.program_check import ProgramCheck, check_program
+from toolpath_stiff.analysis.results import Analysis
+from toolpath_stiff.analysis.results import analyze as analyze_path
 from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
+from toolpath_stiff.nc.request import ZERO, Request
 from toolpath_stiff.options import Option, arguments_of, checked
+from toolpath_stiff.path import SampledPath, place, sample_moves
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, n_per_m_from_n_per_mm
-
-if TYPE_CHECKING:
-    from toolpath_stiff.analysis import Analysis
-    from toolpath_stiff.analysis.program_check import ProgramCheck
-    from toolpath_stiff.path import SampledPath
 
 RequiredStiffness = Annotated[
     float | None,
@@ -38,19 +39,23 @@ Partial = Annotated[
 Compared = Annotated[
     Machine | str | Path | None, Option("--compare", "MACHINE", help="Another machine to analyze the program on.")
 ]
-JOBS = Option(
-    "--jobs",
-    at_least=1,
-    help="Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each "
-    "available CPU.",
-)
-FORMAT = Option("--format", choices=("csv", "parquet"), help="Format of the samples.")
-SHOW_PLUNGES = Option(
-    "--show-plunges",
-    help="Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).",
-)
-Table = Annotated[str, FORMAT]
-ShowPlunges = Annotated[bool, SHOW_PLUNGES]
+Jobs = Annotated[
+    int | None,
+    Option(
+        "--jobs",
+        at_least=1,
+        help="Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for "
+        "each available CPU.",
+    ),
+]
+Table = Annotated[str, Option("--format", choices=("csv", "parquet"), help="Format of the samples.")]
+ShowPlunges = Annotated[
+    bool,
+    Option(
+        "--show-plunges",
+        help="Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).",
+    ),
+]
 
 
 @checked
@@ -108,8 +113,6 @@ def analyze(
     >>> found.to_frame()[["line", "x_mm", "stiffness_N_per_mm"]].tail(1).round(0).values.tolist()
     [[4.0, 40.0, 53875.0]]
     """
-    from toolpath_stiff.analysis import analyze
-
     first, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
     second = first.like(compare_with) if isinstance(compare_with, str | Path) else compare_with
 
@@ -117,7 +120,7 @@ def analyze(
         model = machine.running(part, [other] if other else [])
         read = part.moves(origin, model.machine.default_origin)
         step = m_from_mm(step_mm)
-        return analyze(
+        return analyze_path(
             model, read, origin=origin, load=load, step=step, force=force_N, partial=partial, progress=progress
         )
 
@@ -131,8 +134,6 @@ def analyze(
 
 def check_options(origin_mm_deg: Sequence[float] | None = None, load: str = LOAD, **others: Any) -> None:
     """Hold options of `analyze` against what they may be, before any program is read. Raises `InputError`."""
-    from toolpath_stiff.analysis.loads import parse_load
-
     origin_si(origin_mm_deg)
     parse_load(load)
     for name, value in others.items():
@@ -165,8 +166,6 @@ def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, 
     >>> tps.sample_path(slot, step_mm=10).to_frame()[["motion", "x_mm", "z_mm"]].tail(2).values.tolist()
     [['feed', 30.0, 0.0], ['feed', 40.0, 0.0]]
     """
-    from toolpath_stiff.path import SampledPath, place, sample_moves
-
     origin = origin_si(origin_mm_deg)
     read = program_from(program).moves(origin)
     origin = origin or read.origin
@@ -208,11 +207,9 @@ def check(
     --------
     >>> import toolpath_stiff as tps
     >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
-    >>> [(one["line"], one["severity"]) for one in found.errors]
+    >>> [(finding.line, finding.severity) for finding in found.errors]
     [(3, 'error')]
     """
-    from toolpath_stiff.analysis.program_check import check_program
-
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
     if on is None and strut_speed_mm_per_min is not None:
@@ -220,13 +217,13 @@ def check(
     speed = None
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
-    return check_program(
+    hexapod = None if on is None else on.model.machine
+    request = Request(
         part.lines,
         part.name,
-        machine=None if on is None else on.model.machine,
         origin=origin_si(origin_mm_deg),
-        step=m_from_mm(step_mm),
-        strut_speed=speed,
+        default_origin=ZERO if hexapod is None else hexapod.default_origin,
         controller=part.controller,
         **part.options,
     )
+    return check_program(request, hexapod, m_from_mm(step_mm), speed)

@@ -18,9 +18,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.inputs import finite, pose_si
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.measurements import Measurements
 from toolpath_stiff.api.programs import analyze
 from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.case.contents import reading_arguments
@@ -42,7 +42,6 @@ from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import FileError, InputError, TpsError
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.hints import command_line
-from toolpath_stiff.locks import reason
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import arguments_of
@@ -120,7 +119,7 @@ class Case(BlindExercise):
         try:
             there = (place / CASE_FILE).is_file()
         except OSError as error:  # a name that is too long, a circle of links
-            raise FileError(f"cannot open the case {str(folder)!r}: {reason(error)}") from None
+            raise FileError(f"cannot open the case {str(folder)!r}: {error.strerror}") from None
         if there:
             case = cls(place, *read_case(place / CASE_FILE))
             case.check_files()

@@ -9,8 +9,8 @@ from types import MappingProxyType
 from typing import Any, cast
 
 from toolpath_stiff.api.by_hand import Preview, preview, with_effects
-from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.measurements import Measurements
 from toolpath_stiff.case.files import used_name
 from toolpath_stiff.case.history import History
 from toolpath_stiff.case.steps import TABLES

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
@@ -12,11 +11,7 @@ from typing import Any, TypeVar, cast
 from toolpath_stiff.api.effects import effects
 from toolpath_stiff.api.trust import is_agreed
 from toolpath_stiff.case.files import (
-    EXERCISE,
-    JOURNAL,
-    ROOMS,
     free_name,
-    room_of,
     sha256,
     used_name,
     without_lines,
@@ -24,9 +19,7 @@ from toolpath_stiff.case.files import (
 )
 from toolpath_stiff.case.steps import CASE_FILE, TABLES, CaseState, Step, case_text
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import is_file, read_text, write_atomically
-from toolpath_stiff.locks import beside, forget, is_left, remove_parts
-from toolpath_stiff.results_folder import clear_up
+from toolpath_stiff.files import is_file, write_atomically
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 
@@ -72,29 +65,6 @@ class History:
 
     def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
         self.folder, self._steps, self._done, self._written = folder, list(steps), done, text
-        self._clear_up()
-
-    def _clear_up(self) -> None:
-        """Take away what a killed step brought, and no step names."""
-        journal = self.folder / JOURNAL
-        if not is_left(journal):
-            return
-        remove_parts(beside(self.folder / CASE_FILE, "part-"))
-        known = {name for step in self._steps for name in (*step.files, step.change.get("exercise"))}
-        here = self.folder.resolve()
-        for name in read_text(journal, "journal").splitlines():
-            file = self.folder / name
-            # A case may come from somebody else: nothing outside its rooms is touched.
-            inside = file.parent.is_dir() and file.parent.resolve().is_relative_to(here) and ".." not in file.parts
-            if not inside or room_of(name) not in ROOMS:
-                continue
-            remove_parts(beside(file, "part-"))
-            if name not in known and file.is_file():
-                file.unlink()
-            elif name not in known and room_of(name) == EXERCISE and file.parent == self.folder:
-                clear_up([file])
-                shutil.rmtree(file, ignore_errors=True)
-        forget(journal)
 
     @property
     def history(self) -> list[Step]:
@@ -209,4 +179,3 @@ class History:
         self._rewrite_used()
         self._written = case_text(self._steps, self._done)
         write_atomically(file, self._written)
-        forget(self.folder / JOURNAL)

@@ -1,25 +1,6 @@
-"""The commands on a machine: pose, map, machine."""
+"""Machines by themselves: listed, shown, checked, made; stiffness at poses and over planes.
 
-from __future__ import annotations
-
-import sys
-from argparse import Namespace
-from collections.abc import Sequence
-from pathlib import Path
-
-import toolpath_stiff as tps
-from toolpath_stiff.api.inputs import pose_si
-from toolpath_stiff.cli.calls import call, given
-from toolpath_stiff.cli.outputs import check_new, check_single, destination, keep, show, tell, write_made, written_text
-from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, Command, own
-from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import command_line, hint
-from toolpath_stiff.options import finite_number, numbers
-
-OUT_OF_REACH = NOT_GOOD = 1  # exit codes
-MOST_NAMED = 10
-EXAMPLES = """\
-examples:
+for example:
   tps machine show nist --out hexapod.png           figures with their origin; the machine at the paper's pose
   tps machine new mine.toml                         a commented template to edit
   tps machine check mine.toml
@@ -27,8 +8,33 @@ examples:
   tps machine recover                               the NIST geometry from the paper's Table 1, fitted anew
 """
 
+from __future__ import annotations
 
-def pose(args: Namespace) -> int:
+import sys
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import toolpath_stiff as tps
+from toolpath_stiff.api.inputs import pose_si
+from toolpath_stiff.cli.calls import call, given, run_to_folder
+from toolpath_stiff.cli.outputs import check_new, check_single, show, tell, write_single, written_text
+from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import command_line, hint
+from toolpath_stiff.options import Option, finite_number, numbers
+
+OUT_OF_REACH = NOT_GOOD = 1  # exit codes
+MOST_NAMED = 10
+
+
+@command("pose", "pose", "Machine.load", "Machine.under", JSON)
+def pose(
+    args: Namespace,
+    pose: Annotated[Sequence[float], Option("X Y Z [A B C]", read=finite_number, count="*")] = (),
+    csv: Annotated[str | None, Option("--csv", "FILE")] = None,
+) -> int:
     """Stiffness, softest and stiffest direction, strut lengths at single poses.
 
     for example:
@@ -38,35 +44,24 @@ def pose(args: Namespace) -> int:
     Angles are roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); the position is the tool tip in mm, machine
     coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg; it writes one row a pose in the
     same order, with empty cells where a pose is out of reach (exit code 1).
+
+    Parameters
+    ----------
+    pose
+        Tool tip in mm, angles in degrees.
+    csv
+        Read poses from a table (CSV, or FILE.xlsx[#SHEET]), write CSV to standard output.
     """
-    if (args.csv is None) == (not args.pose):
-        raise InputError(
-            "give either a pose or --csv FILE" if args.csv is None else "give a pose or --csv FILE, not both",
-            expected="tps pose X Y Z [A B C], or tps pose --csv FILE",
-        )
-    if args.csv is None:
-        return show(args, call(args, tps.pose, pose_mm_deg=args.pose))
-    table, notes = tps.read_poses(args.csv)
+    if (csv is None) == (not pose):
+        raise InputError("give either a pose or --csv FILE", expected="tps pose X Y Z [A B C], or tps pose --csv FILE")
+    if csv is None:
+        return show(args, call(args, tps.pose, pose_mm_deg=pose))
+    table, notes = tps.read_poses(csv)
     tell("note", notes)
     stiffness = call(args, tps.pose, pose_mm_deg=table)
     sys.stdout.write(stiffness.to_json() if args.json else stiffness.csv())
     tell("warning", (*stiffness.warnings, *stiffness.out_of_reach(MOST_NAMED)))
     return 0 if stiffness.reachable.all() else OUT_OF_REACH
-
-
-def map(args: Namespace) -> int:
-    """Stiffness over planes of the workspace: picture, table, 3-D page.
-
-    for example:
-      tps map --z 1200 --x -150:150 --y -150:150 --load radial     the paper's Figure 8
-      tps map --z 1200 --load z                                    its Figure 9
-      tps map --slices 400,800,1200 --x -400:400 --y -400:400 --tilt 15,0,0
-
-    files written to --out: map.csv (x_mm,y_mm,z_mm,stiffness_N_per_mm,reachable), map.json, map.png, map.html (3-D)
-    """
-    target = destination(args, tps.StiffnessMap, [args.machine])
-    stiffness = call(args, tps.map_stiffness, **({"z_mm": args.slices} if args.slices else {}))
-    return show(args, stiffness, written_text(target.write(stiffness, plots=not args.no_plots)))
 
 
 def _heights(text: str) -> list[float]:
@@ -76,6 +71,30 @@ def _heights(text: str) -> list[float]:
     return heights
 
 
+@command("map", "map_stiffness", "Machine.load", "Machine.under", *FOLDER)
+def map(
+    args: Namespace,
+    slices: Annotated[Sequence[float], Option("--slices", "Z,Z,...", read=_heights, instead_of="z_mm")] = (),
+) -> int:
+    """Stiffness over planes of the workspace: picture, table, 3-D page.
+
+    for example:
+      tps map --z 1200 --x -150:150 --y -150:150 --load radial     the paper's Figure 8
+      tps map --z 1200 --load z                                    its Figure 9
+      tps map --slices 400,800,1200 --x -400:400 --y -400:400 --tilt 15,0,0
+
+    files written to --out: map.csv (x_mm,y_mm,z_mm,stiffness_N_per_mm,reachable), map.json, map.png, map.html (3-D)
+
+    Parameters
+    ----------
+    slices
+        Several heights, mm.
+    """
+    heights = {"z_mm": slices} if slices else {}
+    return run_to_folder(args, tps.map_stiffness, tps.StiffnessMap, [args.machine], **heights)
+
+
+@command("machine list", JSON)
 def list_machines(args: Namespace) -> int:
     """Packaged machines."""
     machines = [tps.Machine.load(name) for name in tps.Machine.names()]
@@ -85,110 +104,86 @@ def list_machines(args: Namespace) -> int:
     )
 
 
-def show_machine(args: Namespace) -> int:
-    """Figures of a machine with their origin, and a picture of it."""
-    machine = tps.Machine.load(args.machine)
-    drawn = {_picture_file(args.out, machine.name): machine.picture(args.pose)} if args.out or not args.json else {}
-    written = write_made(args, drawn)
-    show(args, machine.text(args.pose), written_text(written), document=lambda: machine.to_dict()["figures"])
-    return 0 if machine.standing(args.pose)[2].reachable[0] else OUT_OF_REACH
-
-
 def _pose(text: str) -> Sequence[float]:
     pose = numbers(text)
     pose_si("--pose", pose)
     return pose
 
 
+Picture = Annotated[str | None, Option("--out", "FILE.png|DIR", help="the picture, or its folder (default: reports)")]
+
+
+@command("machine show", REPLACE, JSON)
+def show_machine(
+    args: Namespace,
+    machine: Annotated[str, Option("NAME|FILE", count="?")] = "nist",
+    pose: Annotated[
+        Sequence[float] | None,
+        Option("--pose", "X,Y,Z[,A,B,C]", read=_pose, help="pose of the picture, mm and degrees"),
+    ] = None,
+    out: Picture = None,
+) -> int:
+    """Figures of a machine with their origin, and a picture of it."""
+    shown = tps.Machine.load(machine)
+    drawn = {_picture_file(out, shown.name): shown.picture(pose)} if out or not args.json else {}
+    written = write_single(args, drawn)
+    show(args, shown.text(pose), written_text(written), document=lambda: shown.to_dict()["figures"])
+    return 0 if shown.standing(pose)[2].reachable[0] else OUT_OF_REACH
+
+
 def _picture_file(out: str | None, name: str) -> Path:
     """Where a picture goes: the file of --out, or the folder, as of every other command. Raises `InputError`."""
     place = Path(out or "reports")
-    if place.suffix.lower() == ".png" and not place.is_dir():
-        return place
-    if place.suffix and not place.is_dir():
+    if place.is_dir() or not place.suffix:
+        return place / f"{name}.png"
+    if place.suffix.lower() != ".png":
         raise InputError(f"--out {out}: {place.suffix} is no picture's ending here", expected="FILE.png or a folder")
-    return place / f"{name}.png"
+    return place
 
 
-def check_machine(args: Namespace) -> int:
+@command("machine check", "Machine.load", REPLACE, JSON, without=["machine"])
+def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Picture = None) -> int:
     """Check a machine file for mistakes, draw it; exit code 1 if it cannot be right."""
-    if not Path(args.file).is_file():
-        new = command_line("machine", "new", args.file)
-        raise InputError(f"cannot read machine file {args.file!r}", hint=f"`{new}` writes a template")
-    target = _picture_file(args.out, f"{Path(args.file).stem}_machine")
-    check = tps.Machine.load(Path(args.file), **given(args, tps.Machine.load)).check()
-    written = write_made(args, {target: check.picture()} if args.out or not args.json else {})
+    if not Path(file).is_file():
+        new = command_line("machine", "new", file)
+        raise InputError(f"cannot read machine file {file!r}", hint=f"`{new}` writes a template")
+    target = _picture_file(out, f"{Path(file).stem}_machine")
+    check = tps.Machine.load(Path(file), **given(args, tps.Machine.load)).check()
+    written = write_single(args, {target: check.picture()} if out or not args.json else {})
     show(args, check, written_text(written))
     return 0 if check.good else NOT_GOOD
 
 
-def new_machine(args: Namespace) -> int:
+@command("machine new", REPLACE)
+def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
-    target = Path(args.file)
-    keep(check_new(args, args.file))
-    written = tps.machine_template(target).save(target)
-    print(f"{written_text([written])}\n{hint('edit it, then', command_line('machine', 'check', target))}")
+    check_new(args, file)
+    written = write_single(args, {Path(file): tps.machine_template(file).text})
+    print(f"{written_text(written)}\n{hint('edit it, then', command_line('machine', 'check', file))}")
     return 0
 
 
-def from_linuxcnc(args: Namespace) -> int:
+@command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
+def from_linuxcnc(
+    args: Namespace,
+    file: Annotated[str, Option("FILE.hal")],
+    out: Annotated[
+        str | None, Option("-o --out", "FILE", help="machine file to write (default: standard output)")
+    ] = None,
+) -> int:
     """Read the genhexkins pins of a LinuxCNC HAL file."""
-    replaced = check_single(args, args.out)
-    machine_file = tps.machine_from_linuxcnc(args.file, args.units)
-    if args.out:
-        keep(replaced)
-        print(written_text([machine_file.save(args.out)]))
-        print(hint("next", command_line("machine", "check", args.out)))
+    check_single(args, out)
+    machine_file = tps.machine_from_linuxcnc(file, args.units)
+    if out:
+        print(written_text(write_single(args, {Path(out): machine_file.text})))
+        print(hint("next", command_line("machine", "check", out)))
     else:
         sys.stdout.write(str(machine_file))
     tell("note", machine_file.notes)
     return 0
 
 
+@command("machine recover", "recover_geometry", JSON)
 def recover(args: Namespace) -> int:
     """Fit the NIST geometry to the paper's Table 1 anew."""
     return show(args, call(args, tps.recover_geometry))
-
-
-PICTURE = own("--out FILE.png|DIR", "the picture, or its folder (default: reports)")
-FILE = own("FILE")
-COMMANDS = {
-    "pose": Command(
-        pose,
-        own(
-            "X Y Z [A B C]", "tool tip in mm, angles in degrees", name="pose", read=finite_number, count="*", default=()
-        ),
-        own("--csv FILE", "read poses from a table (CSV, or FILE.xlsx[#SHEET]), write CSV to standard output"),
-        tps.pose,
-        tps.Machine.load,
-        tps.Machine.under,
-        JSON,
-    ),
-    "map": Command(
-        map,
-        own("--slices Z,Z,...", "several heights, mm", read=_heights, instead_of="z_mm"),
-        tps.map_stiffness,
-        tps.Machine.load,
-        tps.Machine.under,
-        *FOLDER,
-    ),
-    "machine list": Command(list_machines, JSON),
-    "machine show": Command(
-        show_machine,
-        own("NAME|FILE", name="machine", count="?", default="nist"),
-        own("--pose X,Y,Z[,A,B,C]", "pose of the picture, mm and degrees", read=_pose),
-        PICTURE,
-        REPLACE,
-        JSON,
-    ),
-    "machine check": Command(check_machine, FILE, tps.Machine.load, PICTURE, REPLACE, JSON, without=["machine"]),
-    "machine new": Command(new_machine, FILE, REPLACE),
-    "machine from-linuxcnc": Command(
-        from_linuxcnc,
-        own("FILE.hal", name="file"),
-        own("-o --out FILE", "machine file to write (default: standard output)"),
-        tps.machine_from_linuxcnc,
-        REPLACE,
-    ),
-    "machine recover": Command(recover, tps.recover_geometry, JSON),
-}

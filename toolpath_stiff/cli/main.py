@@ -1,7 +1,4 @@
-"""The entry point: commands are registered here and imported only when they are asked for.
-
-`tps --help` must not load numpy, so this module and `arguments` import nothing heavy.
-"""
+"""The entry point: commands are listed here and imported when they are asked for, as `tps --help` loads no numpy."""
 
 from __future__ import annotations
 
@@ -74,7 +71,8 @@ def help_text() -> str:
 
 def actions_of(name: str) -> dict[str, Command]:
     """The command under "", or its actions."""
-    commands: dict[str, Command] = importlib.import_module(f"toolpath_stiff.cli.{COMMANDS[name]}").COMMANDS
+    importlib.import_module(f"toolpath_stiff.cli.{COMMANDS[name]}")
+    commands = importlib.import_module("toolpath_stiff.cli.parser").COMMANDS
     return {title.removeprefix(name).strip(): commands[title] for title in commands if title.split()[0] == name}
 
 
@@ -180,9 +178,9 @@ def _nearest(word: str, known: Iterable[str], before: str) -> str:
 
 def actions_help(title: str, actions: Mapping[str, Command]) -> str:
     """The actions of a command, a line each, and its examples."""
-    module = importlib.import_module(next(iter(actions.values())).run.__module__)
+    examples = (sys.modules[next(iter(actions.values())).run.__module__].__doc__ or "").partition("\n\n")[2]
     about = [f"  {name:<14} {(command.run.__doc__ or '').partition(chr(10))[0]}" for name, command in actions.items()]
-    return "\n".join([f"usage: {title} ACTION ...", "", "actions:", *about, "", module.EXAMPLES])
+    return "\n".join([f"usage: {title} ACTION ...", "", "actions:", *about, "", examples])
 
 
 def _ended(error: str, code: int) -> int:
@@ -201,16 +199,11 @@ REPORT = f"if that does not explain it, run the command again with {TRACEBACK}=1
 
 def last_resort(error: Exception) -> str:
     """What no command foresaw, in one line: memory, recursion, the file system, a defect of this package."""
-    words = " ".join(str(error).split()) or "no more is known"
-    if isinstance(error, MemoryError):
-        return f"out of memory ({words}): take a larger --step, fewer --jobs or fewer data; {REPORT}"
-    if isinstance(error, RecursionError):
-        return f"something is nested too deeply ({words}); {REPORT}"
-    if isinstance(error, OSError):
-        files = [repr(str(file)) for file in (error.filename, error.filename2) if file is not None]
-        return f"{': '.join([*files, error.strerror or words])}; {REPORT}"
     frames = traceback.extract_tb(error.__traceback__)
     place = f", {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
+    words = " ".join(str(error).split()) or "no more is known"
+    if isinstance(error, MemoryError):
+        words += ": take a larger --step, fewer --jobs or fewer data"
     return f"an error that should not be ({type(error).__name__}{place}): {words}; {REPORT}"
 
 

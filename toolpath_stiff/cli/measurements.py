@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli.calls import call
-from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell, write_made, written_text
-from toolpath_stiff.cli.parser import DATA, FOLDER, JSON, NO_PLOTS, REPLACE, Command, own
-from toolpath_stiff.results import FolderResult
+from toolpath_stiff.cli.calls import call, run_to_folder
+from toolpath_stiff.cli.outputs import check_single, destination, show, tell, write_single, written_text
+from toolpath_stiff.cli.parser import DATA, FILES, FOLDER, JSON, NO_PLOTS, REPLACE, command
+from toolpath_stiff.options import Option
 from toolpath_stiff.workbooks import split_name
 
 
-def reduce(args: Namespace) -> int:
+@command("reduce", "Measurements.read", REPLACE, NO_PLOTS, JSON)
+def reduce(
+    args: Namespace,
+    raw: Annotated[Sequence[str], Option("RAW", count="+")],
+    compression_positive: Annotated[bool, Option("--compression-positive")] = False,
+    out: Annotated[str | None, Option("--out", "FILE")] = None,
+) -> int:
     """Raw force and displacement records to measured stiffnesses, lost motion, loops.
 
     columns of RAW:
@@ -35,12 +41,21 @@ def reduce(args: Namespace) -> int:
     direction, set-up, clamping and repeat are one loop. Its stiffness is the secant between the extremes (the paper's
     equation 12); on a bench, force over displacement between the extremes of the force, tension and stretch positive.
     Struts measured on several dates: which of them changed, and when.
+
+    Parameters
+    ----------
+    raw
+        Raw records: files, FILE.xlsx[#SHEET], folders of files.
+    compression_positive
+        Forces of struts on a bench count compression positive.
+    out
+        File to write (default: <first RAW>_measurements.csv); loops go beside it.
     """
-    reduction = tps.reduce(*args.raw, columns=args.columns, compression_positive=args.compression_positive)
-    first = Path(split_name(args.raw[0])[0])
+    reduction = tps.reduce(*raw, columns=args.columns, compression_positive=compression_positive)
+    first = Path(split_name(raw[0])[0])
     name = first.stem if first.is_file() else first.resolve().name
-    out = Path(args.out or f"{name or 'raw'}_measurements.csv")
-    written = [str(file) for file in write_made(args, reduction.files(out, plots=not args.no_plots))]
+    target = Path(out or f"{name or 'raw'}_measurements.csv")
+    written = [str(file) for file in write_single(args, reduction.files(target, plots=not args.no_plots))]
     for line in reduction.read_as:
         print(f"tps: {line}", file=sys.stderr)
     tell("note", reduction.notes)
@@ -49,19 +64,7 @@ def reduce(args: Namespace) -> int:
     )
 
 
-def _run(
-    args: Namespace,
-    function: Callable[..., FolderResult],
-    kind: type[FolderResult],
-    sources: Sequence[str],
-    **more: Any,
-) -> int:
-    """Make a result, write its folder, print it."""
-    target = destination(args, kind, sources)
-    result = call(args, function, **more)
-    return show(args, result, written_text(target.write(result, plots=not args.no_plots)))
-
-
+@command("compare", DATA, "Machine.load", "compare", *FOLDER)
 def compare(args: Namespace) -> int:
     """Where the model fails: errors, structure in the residuals, pictures, page.
 
@@ -75,9 +78,10 @@ def compare(args: Namespace) -> int:
     Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, strips.png, planes.png,
     machine.png, variables.png, load_path.png.
     """
-    return _run(args, tps.compare, tps.Comparison, args.data)
+    return run_to_folder(args, tps.compare, tps.Comparison, args.data)
 
 
+@command("diagnose", DATA, "Machine.load", "Machine.under", "diagnose", "Program.read", *FOLDER)
 def diagnose(args: Namespace) -> int:
     """Which physical effect the model lacks, if any. Any verdict is success.
 
@@ -91,10 +95,16 @@ def diagnose(args: Namespace) -> int:
     missing that no effect of the catalogue describes). Files written to --out: diagnose.json, residuals.csv,
     ladder.png, portrait.png, confounding.png, detectable.png, before_after.png, envelope.png, report.html.
     """
-    return _run(args, tps.diagnose, tps.Diagnosis, args.data)
+    return run_to_folder(args, tps.diagnose, tps.Diagnosis, args.data)
 
 
-def update(args: Namespace) -> int:
+@command("update", DATA, "Machine.load", "update", *FOLDER)
+def update(
+    args: Namespace,
+    output: Annotated[
+        str | None, Option("-o --output", "MACHINE.toml", help="the new machine file (default: in --out)")
+    ] = None,
+) -> int:
     """Fit effects to measurements, see how far the error falls, write the machine file.
 
     for example:
@@ -108,18 +118,22 @@ def update(args: Namespace) -> int:
     place), ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
     """
     args.replace |= args.force
-    replaced = check_single(args, args.output, mark=b"# Command: tps update")
-    target = destination(args, tps.Update, args.data, () if args.output is None else ("machine.toml",))
-    fitted = call(args, tps.update, machine_file=args.output or target.folder / "machine.toml")
-    keep(replaced, quiet=args.json)
-    machine = {args.output: fitted.machine_text()} if args.output and fitted.accepted else {}
-    written = target.write(fitted, machine, plots=not args.no_plots, machine=args.output is None)
-    return show(
-        args, fitted, written_text([*map(Path, machine), *written]), *(["", *fitted.next] if fitted.next else [])
-    )
+    check_single(args, output)
+    target = destination(args, tps.Update, args.data, () if output is None else ("machine.toml",))
+    fitted = call(args, tps.update, machine_file=output or target.folder / "machine.toml")
+    after = [target.write(fitted, plots=not args.no_plots, machine=output is None)]
+    if output and fitted.accepted:
+        write_single(args, {Path(output): fitted.machine_text()})
+        after.append(f"  {output}")
+    return show(args, fitted, *after, *(["", *fitted.next] if fitted.next else []))
 
 
-def plan(args: Namespace) -> int:
+@command("plan", "Machine.load", "plan", *FOLDER)
+def plan(
+    args: Namespace,
+    data: Annotated[Sequence[str], Option("DATA", count="*", help=f"{FILES}; none: a first campaign")] = (),
+    next: Annotated[str | None, Option("--next", "FOLDER")] = None,
+) -> int:
     """What to measure next to tell explanations apart, or a first campaign.
 
     for example:
@@ -131,44 +145,14 @@ def plan(args: Namespace) -> int:
 
     Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png, and
     plan_tables.npz, from which --next chooses within a second or two; --next writes next_1.csv (2, 3 ...) beside them.
+
+    Parameters
+    ----------
+    next
+        Of a plan: the next pose after the readings so far (DATA; else its own files as filled in).
     """
-    if args.next is not None:
-        visit = tps.next_visit(args.next, args.data, columns=args.columns)
+    if next is not None:
+        visit = tps.next_visit(next, data, columns=args.columns)
         written = visit.save()
         return show(args, visit, *([written_text(written)] if written else []))
-    return _run(args, tps.plan, tps.Plan, args.data or [args.machine], minutes=dict(args.minutes or ()))
-
-
-COMMANDS = {
-    "reduce": Command(
-        reduce,
-        own("RAW", "raw records: files, FILE.xlsx[#SHEET], folders of files", count="+"),
-        tps.Measurements.read,
-        own("--compression-positive", "forces of struts on a bench count compression positive"),
-        own("--out FILE", "file to write (default: <first RAW>_measurements.csv); loops go beside it"),
-        REPLACE,
-        NO_PLOTS,
-        JSON,
-    ),
-    "compare": Command(compare, DATA, tps.Machine.load, tps.compare, *FOLDER),
-    "diagnose": Command(diagnose, DATA, tps.Machine.load, tps.Machine.under, tps.diagnose, tps.Program.read, *FOLDER),
-    "update": Command(
-        update,
-        DATA,
-        tps.Machine.load,
-        tps.update,
-        own("-o --output MACHINE.toml", "the new machine file (default: in --out)"),
-        *FOLDER,
-    ),
-    "plan": Command(
-        plan,
-        own("DATA", f"{DATA.help}; none: a first campaign", count="*", default=()),
-        own(
-            "--next FOLDER",
-            "of a plan: the next pose after the readings so far (DATA; else its own files as filled in)",
-        ),
-        tps.Machine.load,
-        tps.plan,
-        *FOLDER,
-    ),
-}
+    return run_to_folder(args, tps.plan, tps.Plan, data or [args.machine], minutes=dict(args.minutes or ()))

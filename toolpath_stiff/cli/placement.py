@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli.calls import call
-from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell_incomplete, written_text
-from toolpath_stiff.cli.parser import FOLDER, PROGRAM, Command, own
+from toolpath_stiff.cli.calls import call, run_to_folder
+from toolpath_stiff.cli.outputs import check_single, destination, show, tell, write_single
+from toolpath_stiff.cli.parser import FOLDER, PROGRAM, command
 from toolpath_stiff.cli.program import READ
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.options import arguments_of, numbers
+from toolpath_stiff.options import Option, numbers
+from toolpath_stiff.results_folder import incomplete
 
 
+@command("place", PROGRAM, "place", *READ, *FOLDER)
 def place(args: Namespace) -> int:
     """Where the work should sit: Pareto front and one recommended placement.
 
@@ -32,15 +36,16 @@ def place(args: Namespace) -> int:
     to --out: placements.csv (the front), placement.json, front.png, profiles.png, map.png, setup.pdf, report.html
     (click a placement of the front, see the path there).
     """
-    replaced = check_single(args, args.write)
+    check_single(args, args.write)
     target = destination(args, tps.Placement, [args.program])
     if args.pick is not None:
-        tell_incomplete([target.folder])
+        tell("warning", filter(None, [incomplete(target.folder)]))
     placement = call(args, tps.place, earlier=Path(target.folder, "placement.json"))
-    keep(replaced, quiet=args.json)
-    program = {args.write: placement.program_bytes} if args.write and not placement.refusal else {}
-    written = target.write(placement, program, plots=not args.no_plots)
-    show(args, placement, written_text([*written, *map(Path, program)]))
+    written = [target.write(placement, plots=not args.no_plots)]
+    if args.write and not placement.refusal:
+        write_single(args, {Path(args.write): placement.program_bytes})
+        written.append(f"  {args.write}")
+    show(args, placement, *written)
     if placement.refusal:
         raise InputError(
             f"{args.write} was not written; the search is kept in {target.folder} "
@@ -49,7 +54,24 @@ def place(args: Namespace) -> int:
     return 0
 
 
-def case_study(args: Namespace) -> int:
+def _region(text: str) -> tuple[str, tuple[float, ...]]:
+    name, _, place = text.rpartition(":")
+    values = numbers(place)
+    if not name or len(values) not in (3, 4):
+        raise ValueError("NAME:X,Y,Z or NAME:X,Y,Z,TURN")
+    return name, values
+
+
+Region = tuple[str, tuple[float, ...]]
+
+
+@command("case-study", "case_study", *READ, *FOLDER)
+def case_study(
+    args: Namespace,
+    program: Annotated[str | None, Option("PROGRAM")] = None,
+    region: Annotated[Sequence[Region], Option("--region", "NAME:X,Y,Z[,TURN]", read=_region, count="append")] = (),
+    regions: Annotated[str | None, Option("--regions", "FILE", instead_of="region")] = None,
+) -> int:
     """The paper's four regions: one path at two heights, displaced and turned.
 
     for example:
@@ -61,39 +83,18 @@ def case_study(args: Namespace) -> int:
     Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
     displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
     A file of regions has the columns region, x_mm, y_mm, z_mm, rotation_deg (CSV or FILE.xlsx[#SHEET]).
+
+    Parameters
+    ----------
+    program
+        NC program or cutter-location file (default: the contour of a 200 mm square).
+    region
+        Where program zero sits, mm, and how far the path is turned about it, degrees; once for each region (default:
+        four of the reference machine).
+    regions
+        The same as a table.
     """
-    regions = dict(args.region)
-    if len(regions) < len(args.region):
+    named = dict(region)
+    if len(named) < len(region):
         raise InputError("--region: a name is given twice", expected="a name of its own for each region")
-    target = destination(args, tps.CaseStudy, [args.program or args.machine])
-    study = call(args, tps.case_study, regions=regions or args.regions)
-    return show(args, study, written_text(target.write(study, plots=not args.no_plots)))
-
-
-def _region(text: str) -> tuple[str, tuple[float, ...]]:
-    name, _, place = text.rpartition(":")
-    values = numbers(place)
-    if not name or len(values) not in (3, 4):
-        raise ValueError("NAME:X,Y,Z or NAME:X,Y,Z,TURN")
-    return name, values
-
-
-REGION = own(
-    "--region NAME:X,Y,Z[,TURN]",
-    "where program zero sits, mm, and how far the path is turned about it, degrees; once for each region (default: "
-    "four of the reference machine)",
-    read=_region, count="append", default=(),
-)  # fmt: skip
-COMMANDS = {
-    "place": Command(place, PROGRAM, tps.place, *READ, *FOLDER),
-    "case-study": Command(
-        case_study,
-        own("PROGRAM", f"{PROGRAM.help} (default: the contour of a 200 mm square)", count="?"),
-        REGION,
-        own("--regions FILE", "the same as a table", instead_of="region"),
-        tps.case_study,
-        arguments_of(tps.analyze)["force_N"],
-        *READ,
-        *FOLDER,
-    ),
-}
+    return run_to_folder(args, tps.case_study, tps.CaseStudy, [program or args.machine], regions=named or regions)

@@ -2,35 +2,41 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from argparse import Namespace
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from itertools import takewhile
+from pathlib import Path
+from typing import Annotated, Any
 
 import toolpath_stiff as tps
-from toolpath_stiff.api import programs
-from toolpath_stiff.cli.calls import call, given, machine_for, program_for
-from toolpath_stiff.cli.outputs import check_single, destination, keep, show, tell, written_text
-from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, Command, own
+from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table
+from toolpath_stiff.cli.calls import call, given, machine_for
+from toolpath_stiff.cli.outputs import check_single, destination, show, tell, write_single, written_text
+from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, command
 from toolpath_stiff.cli.progress import say
-from toolpath_stiff.defaults import one_thread
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.options import Argument
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
-    from toolpath_stiff.report.batch.programs import FolderCount, Found
+from toolpath_stiff.options import Option
+from toolpath_stiff.report.batch.programs import FolderCount, Found, find_programs
 
 BELOW_REQUIRED = 3  # exit code
 INCOMPLETE = 1  # exit code: samples were left out, or of several programs one failed
 CONNECT_SECONDS = 10  # for a scheduler to answer
 NO_MACHINE = "none"
+READ = ("Program.read", "Machine.load", "Machine.under")
 
 
-def analyze(args: Namespace) -> int:
+@command("analyze", "analyze", *READ, *FOLDER)
+def analyze(
+    args: Namespace,
+    programs: Annotated[Sequence[str], Option("PROGRAM", count="+")],
+    table: Table = "csv",
+    show_plunges: ShowPlunges = False,
+    jobs: Jobs = None,
+    cluster: Annotated[str | None, Option("--cluster", "ADDRESS")] = None,
+) -> int:
     """Stiffness along the path of NC programs.
 
     for example:
@@ -63,14 +69,18 @@ def analyze(args: Namespace) -> int:
       several: 0 done; 1 a program failed, or --partial left samples out; 2 the arguments are wrong, nothing was
       started;
       3 a cutting move is below --require and no program failed
-    """
-    one_thread()  # before numpy is loaded
-    if len(args.programs) == 1 and os.path.isfile(args.programs[0]) and not args.cluster:  # noqa: PTH113  (false for a name that none can have)
-        return _analyze_one(args, args.programs[0])  # without loading what lists many
-    from toolpath_stiff.report.batch.programs import find_programs
 
-    files, counts = find_programs(args.programs)
-    if counts or len(files) > 1 or args.cluster:
+    Parameters
+    ----------
+    programs
+        NC program or cutter-location file, or a folder of them.
+    cluster
+        Hand the programs to the workers of a Dask cluster instead, one program a task; ADDRESS is its scheduler's, as
+        tcp://10.0.0.5:8786. Workers must see the programs and --out by the same paths (pip install
+        'toolpath-stiff[cluster]').
+    """
+    files, counts = find_programs(programs)
+    if counts or len(files) > 1 or cluster:
         return _analyze_many(args, files, counts)
     return _analyze_one(args, files[0].file)
 
@@ -79,22 +89,20 @@ def _analyze_one(args: Namespace, file: str) -> int:
     from toolpath_stiff.report.analysis import other_samples
 
     target = destination(args, tps.Analysis, [file], other_samples(args.table))
-    analysis = call(args, tps.analyze, program=program_for(args, file))
+    analysis = call(args, tps.analyze, program=tps.Program.read(file, **given(args, tps.Program.read)))
     saving = {"plots": not args.no_plots, "table": args.table, "show_plunges": args.show_plunges}
-    show(args, analysis, written_text(target.write(analysis, **saving)))
+    show(args, analysis, target.write(analysis, **saving))
     if analysis.below_required:
         return BELOW_REQUIRED
     return 0 if analysis.complete else INCOMPLETE
 
 
 def _analyze_many(args: Namespace, files: Sequence[Found], counts: Sequence[FolderCount]) -> int:
-    from toolpath_stiff.report.words import plain
-
     def progress(text: str, done: int, total: int) -> None:
         if done == 0 and not args.json:  # all arguments have been found right
             for count in counts:
-                print(plain(str(count)), flush=True)
-        say(f"{done}/{total} programs, {plain(text)}")
+                print(count, flush=True)
+        say(f"{done}/{total} programs, {text}")
 
     try:
         with _executor(args) as executor:
@@ -106,14 +114,14 @@ def _analyze_many(args: Namespace, files: Sequence[Found], counts: Sequence[Fold
                 plots=not args.no_plots,
                 replace=args.replace,
                 progress=progress,
-                **given(args, tps.analyze, tps.analyze_many, tps.Program.read),
+                table=args.table,
+                show_plunges=args.show_plunges,
+                jobs=args.jobs,
+                **given(args, tps.analyze, tps.Program.read),
             )
     finally:
         say("")
-    if args.json:
-        _write_pieces(analyses.json_pieces())
-    else:
-        show(args, analyses, written_text(analyses.written))
+    show(args, analyses, written_text(analyses.written))
     if not analyses.complete:
         return INCOMPLETE
     return BELOW_REQUIRED if analyses.below_required else 0
@@ -145,15 +153,12 @@ def _executor(args: Namespace) -> Iterator[Executor | None]:
         yield client.get_executor(pure=False)
 
 
-def _write_pieces(pieces: Iterable[str | bytes]) -> None:
-    """Text in pieces on standard output, as long as somebody reads it."""
-    for piece in pieces:
-        sys.stdout.write(piece if isinstance(piece, str) else piece.decode())
-        if getattr(sys.stdout, "gone", False):
-            return
-
-
-def path(args: Namespace) -> int:
+@command("path", PROGRAM, "sample_path", "Program.read", REPLACE)
+def path(
+    args: Namespace,
+    csv: Annotated[bool, Option("--csv", help="write CSV to standard output (the default)")] = False,
+    out: Annotated[str | None, Option("--out", "FILE", instead_of="csv", help="write CSV to a file")] = None,
+) -> int:
     """The sampled path alone, without a machine.
 
     for example:
@@ -163,19 +168,26 @@ def path(args: Namespace) -> int:
     the rotary axes a_deg,b_deg,c_deg in machine coordinates, feed_mm_per_min (empty for rapids). Program zero lies at
     0,0,0 unless --origin or the program's own G10 says otherwise. Every move has samples at both of its ends.
     """
-    replaced = check_single(args, args.out, mark=b"line,motion,tool,s_mm")
+    check_single(args, out)
     sampled = call(args, tps.sample_path)
-    if args.out:
-        keep(replaced)
-        sampled.save(args.out)
+    if out:
+        write_single(args, {Path(out): sampled.csv()})
     else:
-        _write_pieces(sampled.csv())
+        for piece in takewhile(lambda _: not getattr(sys.stdout, "gone", False), sampled.csv()):
+            sys.stdout.write(piece.decode())
     tell("warning", (f"{sampled.name}: {warning}" for warning in sampled.warnings))
     tell("note", sampled.unsupported)
     return 0
 
 
-def check(args: Namespace) -> int:
+@command("check", PROGRAM, "check", "Program.read", JSON)
+def check(
+    args: Namespace,
+    machine: Annotated[
+        str,
+        Option("--machine", "NAME|FILE", help="machine whose reach and strut speeds are checked; none: no machine"),
+    ] = "nist",
+) -> int:
     """What a program uses, what is not understood, extents, times, reach.
 
     for example:
@@ -189,47 +201,6 @@ def check(args: Namespace) -> int:
     extents, lengths and times is then that of the blocks that could be read. Extents are those of the tool tip in
     program coordinates of G54, mm and degrees. Exit code 1 if there is any error.
     """
-    findings = call(args, tps.check, **({"machine": None} if args.machine == NO_MACHINE else {}))
+    findings = call(args, tps.check, machine=None if machine == NO_MACHINE else machine)
     show(args, findings)
     return 1 if findings.errors else 0
-
-
-READ = (tps.Program.read, tps.Machine.load, tps.Machine.under)
-CLUSTER = own(
-    "--cluster ADDRESS",
-    "hand the programs to the workers of a Dask cluster instead, one program a task; ADDRESS is its scheduler's, as "
-    "tcp://10.0.0.5:8786. Workers must see the programs and --out by the same paths "
-    "(pip install 'toolpath-stiff[cluster]')",
-)
-COMMANDS = {
-    "analyze": Command(
-        analyze,
-        own("PROGRAM", "NC program or cutter-location file, or a folder of them", name="programs", count="+"),
-        tps.analyze,
-        Argument("table", programs.FORMAT, default="csv"),
-        Argument("show_plunges", programs.SHOW_PLUNGES, kind=bool, default=False),
-        Argument("jobs", programs.JOBS, kind=int),
-        CLUSTER,
-        *READ,
-        *FOLDER,
-    ),
-    "path": Command(
-        path,
-        PROGRAM,
-        tps.sample_path,
-        tps.Program.read,
-        own("--csv", "write CSV to standard output (the default)"),
-        own("--out FILE", "write CSV to a file", instead_of="csv"),
-        REPLACE,
-    ),
-    "check": Command(
-        check,
-        PROGRAM,
-        own(
-            "--machine NAME|FILE", "machine whose reach and strut speeds are checked; none: no machine", default="nist"
-        ),
-        tps.check,
-        tps.Program.read,
-        JSON,
-    ),
-}

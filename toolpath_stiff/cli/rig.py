@@ -1,19 +1,6 @@
-"""The command on blind exercises."""
+"""Blind exercises: a simulated machine that hides an effect.
 
-from __future__ import annotations
-
-from argparse import Namespace
-from pathlib import Path
-from typing import Any
-
-from toolpath_stiff.cli.outputs import inputs_of, show, tell_kept, write_made
-from toolpath_stiff.cli.parser import JSON, REPLACE, Command, own
-from toolpath_stiff.hints import Asked, hint
-from toolpath_stiff.results_folder import Rules
-
-FILES = ("measurements.csv", "machine.toml", "sealed.bin")  # of an exercise
-EXAMPLES = """\
-examples:
+for example:
   tps rig new --seed 7 --out blind                    measurements.csv, machine.toml, sealed.bin in blind/
   tps rig new --seed 8 --out two --layout paper --hidden two
   tps rig measure blind --at plan.csv --out more.csv  the same hidden machine again
@@ -22,36 +9,97 @@ examples:
 The rig shares no stiffness code with the model that it tests. The seal is a blindfold, not cryptography.
 """
 
+from __future__ import annotations
 
-def new(args: Namespace) -> int:
-    """Make a blind exercise."""
-    from toolpath_stiff.rig.exercise import new_exercise
+from argparse import Namespace
+from pathlib import Path
+from typing import Annotated, Any
 
+from toolpath_stiff.cli.outputs import inputs_of, show, tell_kept, write_single
+from toolpath_stiff.cli.parser import JSON, REPLACE, command
+from toolpath_stiff.hints import Asked, hint
+from toolpath_stiff.options import Option
+from toolpath_stiff.results_folder import Rules
+from toolpath_stiff.rig.exercise import FILES, blind_case, measured_again, new_exercise, reveal
+
+LAYOUTS = ("paper", "tilted", "campaign")
+Exercise = Annotated[str, Option("DIR", help="folder that `tps rig new` wrote")]
+
+
+@command("rig new", REPLACE)
+def new(
+    args: Namespace,
+    seed: Annotated[int, Option("--seed")],
+    out: Annotated[str, Option("--out", "DIR")],
+    layout: Annotated[str, Option("--layout", choices=LAYOUTS)] = "tilted",
+    at: Annotated[str | None, Option("--at", "PLAN.csv")] = None,
+    hidden: Annotated[str | None, Option("--hidden", "WHAT")] = None,
+    noise: Annotated[float, Option("--noise", "%")] = 2.0,
+    machine: Annotated[str, Option("--machine", "NAME|FILE")] = "nist",
+) -> int:
+    """Make a blind exercise.
+
+    Parameters
+    ----------
+    seed
+        Of every random draw, 0 or more.
+    out
+        Folder to write to.
+    layout
+        Paper: its 14 points along X, Y, Z; tilted: 24 tilted poses, two loads, two repeats; campaign: the rows of --at.
+    at
+        Poses of layout campaign: measurement file without stiffness.
+    hidden
+        None, one, two, three, outside, unknown, or NAME[,NAME]; default: drawn blindly from the seed, unknowns left
+        out.
+    noise
+        Repeat noise of a reading.
+    machine
+        Nominal machine.
+    """
     rules = Rules(inputs=tuple(inputs_of(args)), fresh=True, replace=args.replace, kept=tell_kept)
-    count = new_exercise(
-        args.out, args.seed, args.layout, args.hidden, args.noise / 100.0, args.machine, args.at, rules
-    )
-    print(f"{args.out}: {count} measurements, the nominal machine and the sealed truth")
-    print(hint("next", _diagnose(args.out)))
+    count = new_exercise(out, blind_case(seed, layout, hidden, noise / 100.0, machine, at), rules)
+    print(f"{out}: {count} measurements, the nominal machine and the sealed truth")
+    print(hint("next", _diagnose(out)))
     return 0
 
 
-def measure(args: Namespace) -> int:
-    """Measure the same hidden machine again."""
-    from toolpath_stiff.rig.exercise import measured_again
+@command("rig measure", REPLACE)
+def measure(
+    args: Namespace,
+    folder: Exercise,
+    at: Annotated[str, Option("--at", "PLAN.csv")],
+    out: Annotated[str, Option("--out", "FILE.csv")],
+    visit: Annotated[int, Option("--visit")] = 1,
+) -> int:
+    """Measure the same hidden machine again.
 
-    text, count = measured_again(args.folder, args.at, args.visit)
-    write_made(args, {Path(args.out): text}, (Path(args.folder) / name for name in FILES))
-    print(f"{args.out}: {count} measurements")
-    print(hint("next", _diagnose(args.folder, args.out)))
+    Parameters
+    ----------
+    at
+        Measurement file with the stiffness empty.
+    out
+        File to write.
+    visit
+        Another number draws clamping and noise anew.
+    """
+    text, count = measured_again(folder, at, visit)
+    write_single(args, {Path(out): text}, *(Path(folder) / name for name in FILES))
+    print(f"{out}: {count} measurements")
+    print(hint("next", _diagnose(folder, out)))
     return 0
 
 
-def reveal_truth(args: Namespace) -> int:
-    """Open the seal and score a claim."""
-    from toolpath_stiff.rig.exercise import reveal
+@command("rig reveal", JSON)
+def reveal_truth(args: Namespace, folder: Exercise, claim: Annotated[str, Option("--claim", "EFFECT[,EFFECT]")]) -> int:
+    """Open the seal and score a claim.
 
-    truth = reveal(args.folder, args.claim)
+    Parameters
+    ----------
+    claim
+        What is hidden; `none`, or `outside` the catalogue.
+    """
+    truth = reveal(folder, claim)
     return show(args, _wording(truth), document=lambda: truth)
 
 
@@ -72,50 +120,8 @@ def _wording(truth: dict[str, Any]) -> str:
             f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
             for key, value in effect["parameters"].items()
         )
-        lines.append(
-            f"hidden: {effect['effect']} ({values}); changes the readings by {100 * effect['size']:.1f} % (rms)"
-        )
+        size = 100 * effect["size"]
+        lines.append(f"hidden: {effect['effect']} ({values}); changes the readings by {size:.1f} % (rms)")
         if "links" in effect:
             lines.append(f"it is in: {' or '.join(effect['links'])}; varies with: {' or '.join(effect['variables'])}")
     return "\n".join(lines)
-
-
-FOLDER = own("DIR", "folder that `tps rig new` wrote", name="folder")
-COMMANDS = {
-    "rig new": Command(
-        new,
-        own("--seed N", "of every random draw, 0 or more", kind=int, required=True),
-        own("--out DIR", "folder to write to", required=True),
-        own(
-            "--layout",
-            "paper: its 14 points along X, Y, Z; tilted: 24 tilted poses, two loads, two repeats; campaign: the rows "
-            "of --at",
-            kind=str,
-            choices=("paper", "tilted", "campaign"),
-            default="tilted",
-        ),
-        own("--at PLAN.csv", "poses of layout campaign: measurement file without stiffness"),
-        own(
-            "--hidden WHAT",
-            "none, one, two, three, outside, unknown, or NAME[,NAME]; default: drawn blindly from the seed, unknowns "
-            "left out",
-        ),
-        own("--noise %", "repeat noise of a reading", kind=float, default=2.0),
-        own("--machine NAME|FILE", "nominal machine", default="nist"),
-        REPLACE,
-    ),
-    "rig measure": Command(
-        measure,
-        FOLDER,
-        own("--at PLAN.csv", "measurement file with the stiffness empty", required=True),
-        own("--out FILE.csv", "file to write", required=True),
-        own("--visit N", "another number draws clamping and noise anew", kind=int, default=1),
-        REPLACE,
-    ),
-    "rig reveal": Command(
-        reveal_truth,
-        FOLDER,
-        own("--claim EFFECT[,EFFECT]", "what is hidden; `none`, or `outside` the catalogue", required=True),
-        JSON,
-    ),
-}

@@ -3,17 +3,34 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import cast
+from collections.abc import Sequence
+from typing import Annotated, cast
 
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.cli.calls import given
-from toolpath_stiff.cli.parser import Command, own
-from toolpath_stiff.defaults import MACHINE
+from toolpath_stiff.cli.parser import FILES, command
 from toolpath_stiff.nc.program import Program, Reading
-from toolpath_stiff.options import arguments_of
+from toolpath_stiff.options import Option, arguments_of
+from toolpath_stiff.studio.run import ask_for_effects, opened_case, serve
 
 
-def studio(args: Namespace) -> int:
+@command(
+    "studio",
+    arguments_of(Machine.load)["effects"],
+    "Program.read",
+    without=["interpreter", "rs274", "subprograms", "unconfined"],
+)
+def studio(
+    args: Namespace,
+    data: Annotated[Sequence[str], Option("DATA", count="*", help=f"{FILES}, to add to the case")] = (),
+    machine: Annotated[str | None, Option("--machine", "NAME|FILE")] = None,
+    program: Annotated[str | None, Option("--program", "FILE")] = None,
+    trust: Annotated[Sequence[str], Option("--trust", "effects/FILE.py", count="append")] = (),
+    case: Annotated[str, Option("--case", "DIR")] = "tps-case",
+    exercise: Annotated[int | None, Option("--exercise", "SEED")] = None,
+    port: Annotated[int, Option("--port")] = 0,
+    no_browser: Annotated[bool, Option("--no-browser")] = False,
+) -> int:
     """Measure, see where the model fails, add what is missing: a case in the browser.
 
     for example:
@@ -23,42 +40,33 @@ def studio(args: Namespace) -> int:
       tps studio --program part.nc --tools my.tbl         a program with tool lengths (G43)
 
     It serves 127.0.0.1 alone; the address holds a token. Ctrl-C ends it, nothing is lost.
+
+    Parameters
+    ----------
+    machine
+        Machine of a new case (default: nist).
+    program
+        NC program to add.
+    trust
+        Code that came with the case, which you have read and agree to run.
+    case
+        Folder of the case.
+    exercise
+        Start a blind exercise in a new case.
+    port
+        Port (default: one that is free).
+    no_browser
+        Print the address, open nothing.
     """
-    from toolpath_stiff.studio.run import ask_for_effects, opened_case, serve
-
     reading = {name: value for name, value in given(args, Program.read).items() if value not in (None, False)}
-    case = opened_case(
-        args.case,
-        args.data,
-        machine=args.machine,
-        program=args.program,
-        effects=args.effects,
-        exercise=args.exercise,
-        trust=args.trust,
-        reading=cast("Reading", reading),
-    )
-    ask_for_effects(case, args.case)
-    return serve(case, args.port, browser=not args.no_browser)
-
-
-COMMANDS = {
-    "studio": Command(
-        studio,
-        own("DATA", "measurement files to add to the case", count="*", default=()),
-        own("--machine NAME|FILE", f"machine of a new case (default: {MACHINE})"),
-        own("--program FILE", "NC program to add"),
-        arguments_of(Machine.load)["effects"],
-        own(
-            "--trust effects/FILE.py",
-            "code that came with the case, which you have read and agree to run",
-            count="append",
-            default=(),
-        ),
-        Program.read,
-        own("--case DIR", "folder of the case", default="tps-case"),
-        own("--exercise SEED", "start a blind exercise in a new case", kind=int),
-        own("--port N", "port (default: one that is free)", kind=int, default=0),
-        own("--no-browser", "print the address, open nothing"),
-        without=["interpreter", "rs274", "subprograms", "unconfined"],
-    )
-}
+    opened = opened_case(case, trust, machine, exercise)
+    for file in args.effects:
+        opened.add_effects(file)
+    if data:
+        opened.add_data(*data)
+    if program:
+        opened.add_program(program, **cast("Reading", reading))
+    elif reading:
+        opened.read_programs(**cast("Reading", reading))
+    ask_for_effects(opened, case)
+    return serve(opened, port, browser=not no_browser)

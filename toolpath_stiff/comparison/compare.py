@@ -47,9 +47,6 @@ DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
 
 
-TELLS_LAW = 0.01  # smallest over largest singular value from which data tell the law's two constants apart
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(FolderResult):
     """How far the model is from n readings of the tip, where, and how much of it is more than scatter.
@@ -220,14 +217,10 @@ def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int,
     spread = covariance(noise, predictor)
     scattering = Scattering(noise, spread, predictor.data.clamp, residuals.places, draws, seed)
     structure = find_structure(values, residuals.patterns, scattering)
-    refitted = law = None
     problem = Problem(predictor, Scatter.of(noise, spread))
-    if len(values) >= FEWEST_TO_REFIT:
-        law = base_fit(problem, law_free=True)
-        if np.linalg.cond(residuals.law_columns) < 1.0 / TELLS_LAW:
-            refitted = find_structure(values, residuals.patterns, scattering, residuals.law_columns.T, most=0)
+    law = base_fit(problem, law_free=True) if len(values) >= FEWEST_TO_REFIT else None
     model_free = assess(checks, predictor.data, spread, scattering.draws(0.0))
-    return Answer(noise, scattering, structure, refitted, law, model_free, problem)
+    return Answer(noise, scattering, structure, law, model_free, problem)
 
 
 def _beside_tip(

@@ -12,14 +12,15 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis import Analysis, analyze
+from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import ReadProgram
@@ -44,7 +45,6 @@ REGIONS: dict[str, Region] = {
 HEIGHTS_MM = tuple(float(z) for z in range(300, 1401, 25))
 STEP_MM, MOST_STEPS, ROOM_MM = 25.0, 50, 500.0  # of other heights; where no workspace is bounded, above and below
 FIGURES = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")
-Row = Mapping[str, Any]  # a region as case_study.csv has it
 REGION_COLUMNS = ("x_mm", "y_mm", "z_mm", "rotation_deg")
 MOST_REGIONS = 50
 MEANS_AGREE = 0.01  # the paper: "stiffnesses of the same magnitude"; we ask for one per cent
@@ -175,8 +175,6 @@ def run_case_study(
         try:
             analyses[name] = at(place)
         except UnreachableError as error:
-            if not custom:
-                raise
             hint = f"give regions that the machine reaches: {both_names('--region', 'NAME:X,Y,Z[,TURN]')}"
             raise UnreachableError(
                 f"region {name}: {error.found}", hint=hint, file=error.file, line=error.line
@@ -225,32 +223,25 @@ def read_regions(file: str) -> dict[str, Region]:
     Raises
     ------
     InputError
-        A column is missing, a cell is no number, a name stands twice, or there is no region or too many; with line.
+        A column is missing, a cell is no number, or a name stands twice; with line.
     """
     table = read_table(file, "regions", Columns(REGION_COLUMNS, ("region",)))
-    missing = [name for name in REGION_COLUMNS[:3] if name not in table.heading]
-    if missing:
-        raise TableError(
-            f"column {missing[0]} is missing", expected=",".join(REGION_COLUMNS), file=file, line=table.heading_line
-        )
     regions: dict[str, Region] = {}
     for row_number, (line, cells) in enumerate(table.rows, 1):
-        row = dict(zip(table.heading, cells, strict=False))
+        row = {"rotation_deg": "0", **table.record(cells)}
         name = row.get("region") or str(row_number)
-        if name in regions:
-            raise TableError(f"region {name} stands twice", file=file, line=line)
         try:
-            x, y, z, turn = (float(row.get(column) or 0.0) for column in REGION_COLUMNS)
-            if not np.isfinite((x, y, z, turn)).all():
-                raise ValueError("a cell is no finite number")
-        except ValueError as error:
-            expected = "numbers in mm and degrees"
-            raise TableError(f"region {name}: {error}", expected=expected, file=file, line=line) from None
+            x, y, z, turn = (float(row[column]) for column in REGION_COLUMNS)
+        except (KeyError, ValueError):
+            x = y = z = turn = math.nan
+        if name in regions or not math.isfinite(x + y + z + turn):
+            expected = f"a name once, and finite numbers: {', '.join(REGION_COLUMNS)}"
+            raise TableError(f"region {name}: {', '.join(cells)}", expected=expected, file=file, line=line)
         regions[name] = (x, y, z, turn)
     return regions
 
 
-def _row(name: str, place: Region, analysis: Analysis) -> Row:
+def _row(name: str, place: Region, analysis: Analysis) -> Document:
     return {"region": name, **dict(zip(REGION_COLUMNS, place, strict=True)), **_figures(analysis)}
 
 
@@ -261,13 +252,13 @@ def _figures(analysis: Analysis) -> dict[str, float]:
     return {key: round(float(figures[key]), DECIMALS) for key in FIGURES}
 
 
-def conclusions(regions: Sequence[Row]) -> list[dict[str, Any]]:
+def conclusions(regions: Sequence[Document]) -> list[Document]:
     """The paper's three statements, each with the numbers that decide it; None where no two regions can."""
-    above: dict[tuple[float, ...], list[Row]] = {}
+    above: dict[tuple[float, ...], list[Document]] = {}
     for row in regions:
         above.setdefault((row["x_mm"], row["y_mm"], row["rotation_deg"]), []).append(row)
     steps = [pair for rows in above.values() for pair in pairwise(sorted(rows, key=lambda row: row["z_mm"]))]
-    statements: list[dict[str, Any]] = []
+    statements: list[Document] = []
     for figure in ("mean", "range"):
         key = f"{figure}_N_per_mm"
         words = "; ".join(
@@ -294,23 +285,22 @@ def conclusions(regions: Sequence[Row]) -> list[dict[str, Any]]:
     return statements
 
 
-def _in_plane(regions: Sequence[Row]) -> list[tuple[Row, Row]]:
+def _in_plane(regions: Sequence[Document]) -> list[tuple[Document, Document]]:
     """The two regions of each height whose means are farthest apart."""
-    beside: dict[float, list[Row]] = {}
-    for row in regions:
-        beside.setdefault(row["z_mm"], []).append(row)
-    return [
-        max(combinations(rows, 2), key=lambda pair: abs(math.log(pair[1]["mean_N_per_mm"] / pair[0]["mean_N_per_mm"])))
-        for _, rows in sorted(beside.items())
-        if len(rows) > 1
-    ]
+    pairs = []
+    for z in sorted({row["z_mm"] for row in regions}):
+        rows = sorted((row for row in regions if row["z_mm"] == z), key=lambda row: float(row["mean_N_per_mm"]))
+        if len(rows) > 1:
+            first, second = sorted((rows[0], rows[-1]), key=regions.index)
+            pairs.append((first, second))
+    return pairs
 
 
-def _apart(a: Row, b: Row) -> float:
+def _apart(a: Document, b: Document) -> float:
     return abs(float(b["mean_N_per_mm"]) / float(a["mean_N_per_mm"]) - 1.0)
 
 
-def _wave(model: StiffnessModel, amplitude: float, step: float) -> dict[str, Any]:
+def _wave(model: StiffnessModel, amplitude: float, step: float) -> Document:
     """The wavy square in the four regions, and whether its mean still does not depend on where it lies."""
     program = wavy_program(amplitude)
     rows = [

@@ -9,7 +9,6 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.keep_out import KeepOut
 
@@ -52,6 +51,22 @@ class Bounds:
         """Points (k, free) of the unit cube of placements (k, 6)."""
         free = self.free
         return np.asarray((placements[:, free] - self.low[free]) / (self.high - self.low)[free])
+
+    def apart(self, placements: FloatArray, count: int, distance: float = 0.1) -> list[int]:
+        """Rows of ranked placements: the first, and the best of the others that are not beside one chosen.
+
+        `distance` in shares of the ranges.
+        """
+        unit, whole_turn = self.unit(placements), self.round[self.free]
+        chosen: list[int] = []
+        for i in range(len(unit)):
+            away = np.abs(unit[chosen] - unit[i])
+            away = np.where(whole_turn, np.minimum(away, 1.0 - away), away)
+            if (away.max(axis=1, initial=0.0) > distance).all():
+                chosen.append(i)
+            if len(chosen) == count:
+                break
+        return chosen
 
     def holds(self, placement: FloatArray) -> bool:
         """True for a placement (6,) within; the turn counts modulo a whole one."""
@@ -136,7 +151,3 @@ class SearchRules:
     keepouts: tuple[KeepOut, ...] = ()
     seed: int = defaults.PLACEMENT_SEED
     points: int = defaults.FRONT_POINTS
-
-    def __post_init__(self) -> None:
-        if self.objective not in defaults.OBJECTIVES:
-            raise InputError(f"objective {self.objective!r}", expected=f"one of {', '.join(defaults.OBJECTIVES)}")

@@ -6,8 +6,9 @@ anything has changed since that search.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,11 @@ import numpy as np
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError, UnreachableError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
 from toolpath_stiff.placement.paths import work_path
-from toolpath_stiff.placement.result import NotWritten, Placement, Written
+from toolpath_stiff.placement.result import Placement, Written
 from toolpath_stiff.placement.rows import (
     FIGURES,
     PLACEMENT,
@@ -30,13 +30,12 @@ from toolpath_stiff.placement.rows import (
     placement_mm_deg,
 )
 from toolpath_stiff.placement.search import search_placements
-from toolpath_stiff.placement.task import PlacementTask, Rewriting, SearchedFront, SearchRecord
+from toolpath_stiff.placement.task import PlacementTask, Rewriting, SearchRecord
 from toolpath_stiff.placement.working import Search
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
-from toolpath_stiff.units import Pose, m_from_mm
+from toolpath_stiff.units import Pose
 
-COMPARED = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "min": "min_N_per_mm"}
-USUAL_CHORD_MM = 0.01  # tried where a program cannot be written without chords
+AGAIN = "search again, without --pick"
 
 
 def place_program(task: PlacementTask, progress: Callable[[int, int], None] | None = None) -> Placement:
@@ -74,20 +73,16 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
     search.report = progress or search.report
     front = search_placements(search)
-    record = SearchRecord(
-        **vars(task.fingerprint()),
-        recommended=front.best + 1,
-        rapids_left_out=front.rapids_left_out,
-        pose_evaluations=front.pose_evaluations,
-        searches=front.searches,
-        nothing_better=front.alone,
-    )
-    assert front.present is not None
+    number, left_out = front.best + 1, front.rapids_left_out
+    record = SearchRecord(task.options(), number, left_out, search.poses, front.searches, front.alone)
+    assert search.now is not None
     rows = numbered_rows(task.model, path, task.load, front, task.force)
-    return _placed(task, rows, record, front.best + 1, front.present)
+    return _placed(task, rows, record, number, search.now)
 
 
-def place_again(task: PlacementTask, earlier: SearchedFront, number: int) -> Placement:
+def place_again(
+    task: PlacementTask, earlier: Placement | Mapping[str, Any] | str | Path | None, number: int
+) -> Placement:
     """Place the program at point `number` (from 1) of the front of an earlier search, without a search.
 
     Raises
@@ -96,22 +91,41 @@ def place_again(task: PlacementTask, earlier: SearchedFront, number: int) -> Pla
         The earlier search was another one's (program, machine or options differ), or has no such point.
     """
     task.check()
-    task.refuse_other_search(earlier.search)
-    if not 1 <= number <= len(earlier.front):
+    front, search = _earlier_search(earlier)
+    differ = [name for name, value in task.options().items() if search.options.get(name) != value]
+    if differ:
         raise InputError(
-            f"--pick {number}", expected=f"1 to {len(earlier.front)}, the points of the front in placements.csv"
+            f"--pick: the earlier search differs in {', '.join(differ)}",
+            expected="the same program, machine and options as in the search",
+            hint="repeat the search's own command with --pick added, or search again without it",
         )
+    if not 1 <= number <= len(front):
+        raise InputError(f"--pick {number}", expected=f"1 to {len(front)}, the points of the front in placements.csv")
     path = work_path(task.program, task.step, task.load, task.present, task.read)
-    evaluator = Evaluator(task.model, path, task.load, task.force, task.rules.keepouts)
-    present = evaluator.figures(np.array([task.present]))
-    placed, row = _placed(task, earlier.front, earlier.search, number, present), earlier.front[number - 1]
+    present = Evaluator(task.model, path, task.load, task.force, task.rules.keepouts).figures(np.array([task.present]))
+    placed, row = _placed(task, front, search, number, present), front[number - 1]
     changes = [getattr(row, key) - getattr(placed.chosen, key) for key in FIGURES.values()]
     if max(map(abs, changes)) > 1e-6 * abs(row.mean_N_per_mm):
         raise InputError(
             f"--pick {number}: the figures of this point have changed since the search (the model is another one)",
-            hint="search again, without --pick",
+            hint=AGAIN,
         )
     return placed
+
+
+def _earlier_search(
+    earlier: Placement | Mapping[str, Any] | str | Path | None,
+) -> tuple[list[PlacementRow], SearchRecord]:
+    """Front and search of a result, of the content of `placement.json`, or of that file. Raises `InputError`."""
+    if isinstance(earlier, Placement):
+        return earlier.front, earlier.search
+    where = f" in {earlier}" if isinstance(earlier, str | Path) else ""
+    try:
+        document = earlier if isinstance(earlier, Mapping) else json.loads(Path(earlier or "").read_text("utf-8"))
+        search = {**document["search"], "rapids_left_out": tuple(document["search"]["rapids_left_out"])}
+        return [PlacementRow(**row) for row in document["front"]], SearchRecord(**search)
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"--pick: there is no earlier search of this version{where}", hint=AGAIN) from None
 
 
 def _placed(
@@ -124,7 +138,7 @@ def _placed(
     best, beyond = _analyzed(task, program, origin)
     if best is None:
         raise UnreachableError(f"placement {number} of the front: {beyond}", hint="search again")
-    rewritten, written = (None, None) if task.rewriting is None else _rewritten(task, task.rewriting, program, best)
+    rewritten, written = (None, None) if task.rewriting is None else _rewritten(task.rewriting, best, task.present)
     return Placement(
         task=task,
         front=list(rows),
@@ -135,7 +149,6 @@ def _placed(
         present_reason=reason,
         best=best,
         before=before,
-        program=program,
         rewritten=rewritten,
         written=written,
     )
@@ -149,33 +162,22 @@ def _analyzed(task: PlacementTask, program: ReadProgram, origin: Pose) -> tuple[
         return None, str(error)
 
 
-def _rewritten(
-    task: PlacementTask, writing: Rewriting, program: ReadProgram, best: Analysis
-) -> tuple[bytes | None, Written | NotWritten]:
-    """The transformed program's bytes, and how it compares; or why there is none, and what chords would bring."""
-
-    def at_chord(chord: float | None) -> tuple[RewrittenProgram, dict[str, float]]:
-        """The program with arcs as chords of this tolerance, and its relative differences."""
-        options = {"decimals": writing.decimals, "linearise": chord, **writing.reading}
-        rewritten = rewrite_program(program, best.origin, task.present, **options)
-        return rewritten, rewriting_differences(best, rewritten, task.present, **writing.reading)
-
+def _rewritten(writing: Rewriting, best: Analysis, present: Pose) -> tuple[bytes | None, Written]:
+    """The transformed program's bytes, and how it compares; or why there are none."""
     try:
-        rewritten, differences = at_chord(writing.linearise)
+        rewritten = rewrite_program(
+            best.program,
+            best.origin,
+            present,
+            decimals=writing.decimals,
+            linearise=writing.linearise,
+            **writing.reading,
+        )
+        differences = rewriting_differences(best, rewritten, present, **writing.reading)
     except InputError as error:
-        reason = str(error)
-    else:
-        zero = dict(zip(PLACEMENT, placement_mm_deg(task.present), strict=True))
-        return rewritten.content, Written(writing.file, zero, differences, tuple(rewritten.notes))
-    if writing.linearise is None:
-        with suppress(InputError):
-            rewritten, differences = at_chord(m_from_mm(USUAL_CHORD_MM))
-            reason += (
-                f". {both_names('--linearise', f'{USUAL_CHORD_MM:g}')} would write it in "
-                f"{len(rewritten.text.splitlines())} lines instead of {len(program.source)}; its mean would differ by "
-                f"{differences['mean']:.1e}, its range by {differences['range']:.1e} (relative)"
-            )
-    return None, NotWritten(writing.file, reason)
+        return None, Written(writing.file, refused=str(error))
+    zero = dict(zip(PLACEMENT, placement_mm_deg(present), strict=True))
+    return rewritten.content, Written(writing.file, zero, differences, tuple(rewritten.notes))
 
 
 def rewriting_differences(
@@ -200,4 +202,4 @@ def rewriting_differences(
     )
     wanted, now = (stiffness_figures(analysis, analysis.counted) for analysis in (placed, again))
     scale = {"range": wanted["range_N_per_mm"] or wanted["mean_N_per_mm"]}  # a path of one point has no range
-    return {name: abs(now[key] - wanted[key]) / scale.get(name, wanted[key]) for name, key in COMPARED.items()}
+    return {name: abs(now[key] - wanted[key]) / scale.get(name, wanted[key]) for name, key in FIGURES.items()}

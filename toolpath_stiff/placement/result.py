@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -14,15 +14,14 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
-from toolpath_stiff.placement.task import PlacementTask, SearchedFront, SearchRecord
+from toolpath_stiff.placement.task import VARIED, PlacementTask, SearchRecord
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
 from toolpath_stiff.stiffness.model import effects_stated
-from toolpath_stiff.units import ShopPose, deg_from_rad, mm_from_m, number
+from toolpath_stiff.units import ShopPose, mm_from_m, number, pose_in_mm
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +30,6 @@ WORSE = {"mean": "the mean is lower", "range": "the range is wider", "weakest": 
 ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
 AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
 OFFSETS = ("linuxcnc", "linuxcnc_reason", "fanuc", "fanuc_reason")  # as placement.json has them
-NAMES = ("x", "y", "z", "tilt-a", "tilt-b", "rotate")
 
 
 @dataclass(frozen=True)
@@ -46,24 +44,17 @@ class Worsening:
 
 @dataclass(frozen=True)
 class Written:
-    """The program written for the placement: its file, where it was analysed again, and how far that differs."""
+    """The program written for the placement: its file, where it was analysed again, how it differs; or why not."""
 
     file: str
-    analysed_at: Mapping[str, float]
-    relative_difference: Mapping[str, float]
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class NotWritten:
-    """The reason why the program could not be written for the placement."""
-
-    file: str
-    refused: str
+    analysed_at: Mapping[str, float] = field(default_factory=dict)
+    relative_difference: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    refused: str = ""
 
 
 @dataclass(frozen=True, repr=False)
-class Placement(FolderResult, SearchedFront):
+class Placement(FolderResult):
     r"""A program at the placement that was chosen for it, and the others of the front.
 
     Attributes
@@ -80,8 +71,6 @@ class Placement(FolderResult, SearchedFront):
         What the present placement keeps, in SI; why it is out of reach.
     best, before
         Analyses at the chosen and at the present placement.
-    program
-        As read for the chosen placement.
     rewritten, written
         Bytes of the program written for the placement, and what `placement.json` says of it; None unless asked for.
     inputs
@@ -112,15 +101,16 @@ class Placement(FolderResult, SearchedFront):
     shown_by: ClassVar[str] = "place"
 
     task: PlacementTask
+    front: list[PlacementRow]
+    search: SearchRecord
     chosen: PlacementRow
     present: PlacementRow | None
     present_figures: PlacementFigures
     present_reason: str
     best: Analysis
     before: Analysis | None
-    program: ReadProgram
     rewritten: bytes | None
-    written: Written | NotWritten | None
+    written: Written | None
     inputs: tuple[str, ...] = ()
 
     @property
@@ -158,25 +148,22 @@ class Placement(FolderResult, SearchedFront):
         warnings += [self._worse_words(worse) for worse in self.worse]
         if self.worse and not self.picked:
             warnings.append("no placement was found within the bounds that is as good as the present one in all three")
-        if self.present is None:
-            warnings.append(
-                "the present placement is out of reach, so nothing says what must not get worse: "
-                f"{self.present_reason or 'no figures'}"
-            )
         warnings += [
-            f"line {rapid.line}: no placement within the bounds keeps this rapid within reach ({rapid.reason}); "
-            "it does not follow the work, and was left out of the search"
-            for rapid in self.search.rapids_left_out
+            f"line {line}: no placement within the bounds keeps this rapid within reach; it does not follow the work, "
+            "and was left out of the search"
+            for line in self.search.rapids_left_out
         ]
-        warnings += [] if self.present is None else _present_words(self.task.rules.margin, self.present_figures)
+        if self.present is None:
+            nothing = "the present placement is out of reach, so nothing says what must not get worse"
+            warnings.append(f"{nothing}: {self.present_reason}")
+        else:
+            warnings += _present_words(self.task.rules.margin, self.present_figures)
         if self.chosen.extrapolated_share:
-            share = "" if self.present is None else f" (at present at {100.0 * self.present.extrapolated_share:.0f} %)"
             warnings.append(
-                f"the strut law is extrapolated at {100.0 * self.chosen.extrapolated_share:.0f} % of the samples"
-                f"{share}: outside the lengths that it was measured at"
+                f"the strut law is extrapolated at {100.0 * self.chosen.extrapolated_share:.0f} % of the samples: "
+                "outside the lengths that it was measured at"
             )
-        origin = np.array(self.chosen.origin)
-        warnings += bound_warnings(self.task.bounds, origin, self.best.machine.limits.workspace)
+        warnings += bound_warnings(self.task.bounds, self.origin_mm_deg, self.best.machine.limits.workspace)
         if self.best.plunging[self.best.counted].all():
             warnings.append(
                 "the program only plunges along the tool axis: mean, range and weakest are those of plunges"
@@ -197,21 +184,19 @@ class Placement(FolderResult, SearchedFront):
 
         Raises `InputError` where it cannot be written there; the rest of the result stands.
         """
-        if self.refusal:
-            raise InputError(self.refusal)
         if self.rewritten is None:
-            raise InputError("the program was not written for the placement", hint="ask for it with write=FILE")
+            raise InputError(self.refusal or "the program was not written for the placement: ask with write=FILE")
         return self.rewritten
 
     @property
     def refusal(self) -> str:
         """The reason why the program could not be written for the placement, "" unless that is so."""
-        return self.written.refused if isinstance(self.written, NotWritten) else ""
+        return "" if self.written is None else self.written.refused
 
     @property
     def offsets(self) -> OffsetBlocks:
         """Offsets to key in at the control."""
-        return offset_blocks(self.program, self.best.origin)
+        return offset_blocks(self.best.program, self.best.origin)
 
     @property
     def trade_offs(self) -> dict[str, dict[str, float]]:
@@ -231,13 +216,12 @@ class Placement(FolderResult, SearchedFront):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
-        offsets, (first, *others) = self.offsets, self._binding_limits()
-        smallest = float(self.best.at.margin[self.best.samples.cutting].min())
+        offsets = self.offsets
         document: dict[str, Any] = to_dict(
             {
                 "warnings": self.warnings,
                 "worse": self.worse,
-                "program": self.program.name,
+                "program": self.best.program.name,
                 **self.machine_stated,
                 "load": str(self.best.load),
                 "force_N": self.best.force,
@@ -249,23 +233,13 @@ class Placement(FolderResult, SearchedFront):
                 "before_reason": self.present_reason or None,
                 "trade_offs": self.trade_offs,
                 "front": self.front,
-                "binding_limits": [
-                    {"limit": first, "smallest_margin": smallest},
-                    *({"limit": name} for name in others),
-                ],
                 "offset_blocks": {name: getattr(offsets, name) or None for name in OFFSETS},
                 "written": self.written,
                 "search": self.search,
-                "assumptions": self.best.assumptions,
+                "assumptions": self.best.to_dict()["assumptions"],
             }
         )
         return document
-
-    def _binding_limits(self) -> list[str]:
-        """The limits that the cuts come nearest to, at most three."""
-        poses, cutting = self.best.at, self.best.samples.cutting
-        near = np.argsort(poses.margin + np.where(cutting, 0.0, np.inf), kind="stable")[:200]
-        return list(dict.fromkeys(poses.limits[int(poses.limit[i])].name for i in near))[:3]
 
     def to_frame(self) -> pd.DataFrame:
         """The front, one placement a row, as in `placements.csv`."""
@@ -275,7 +249,7 @@ class Placement(FolderResult, SearchedFront):
 
     def _short(self) -> str:
         words = [f"{axis}{value:.6g}" for axis, value in zip("XYZABC", self.origin_mm_deg, strict=True)]
-        return f"{self.program.name}, {' '.join(words)} of {len(self.front)} placements"
+        return f"{self.best.program.name}, {' '.join(words)} of {len(self.front)} placements"
 
 
 def nothing_better_words(search: SearchRecord) -> str:
@@ -288,45 +262,36 @@ def nothing_better_words(search: SearchRecord) -> str:
 
 def _present_words(margin: float, present: PlacementFigures) -> list[str]:
     """Rules that the present placement itself does not keep, in sentences."""
-    words = []
-    if present.rapid_margin[0] < 0.0:
-        words.append("at the present placement a rapid is out of reach")
-    least = float(min(present.margin[0], present.rapid_margin[0]))
-    if 0.0 <= least < margin:
+    words, least = [], float(min(present.margin[0], present.rapid_margin[0]))
+    if least < margin:
         words.append(
             f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
             f"{100.0 * margin:g} % asked for with {both_names('--margin')}"
         )
     if present.clearance[0] < 0.0:
-        words.append(
-            f"the present placement runs {mm_from_m(-float(present.clearance[0])):.1f} mm deep into a keep-out"
-        )
+        depth = mm_from_m(-float(present.clearance[0]))
+        words.append(f"the present placement runs {depth:.1f} mm deep into a keep-out")
     return words
 
 
-def bound_warnings(bounds: Bounds, placement: FloatArray, workspace: FloatArray) -> list[str]:
-    """Bounds of the search that a placement (6,) lies on, with the options that widen them by half."""
+def bound_warnings(bounds: Bounds, placement: ShopPose, workspace: FloatArray) -> list[str]:
+    """Bounds of the search that a placement lies on, with the options that widen them by half."""
     words = []
+    lows, highs = (pose_in_mm(ends.tolist()) for ends in (bounds.low, bounds.high))
+    reach = [*mm_from_m(workspace).T.tolist(), *[(-np.inf, np.inf)] * 3]
     for i in bounds.free:
         if bounds.round[i] or (i == 2 and bounds.heights):
             continue
-        low, high = float(bounds.low[i]), float(bounds.high[i])
-        # The file's rotation is within 0 to 360 degrees, the bounds may lie elsewhere.
-        value = low + float(np.mod(placement[i] - low + 1e-9, 2.0 * np.pi)) - 1e-9 if i == 5 else float(placement[i])
-        span, (least, most) = high - low, workspace[:, i].tolist() if i < 3 else (-np.inf, np.inf)
-        unit, shown = ("mm", mm_from_m) if i < 3 else ("degrees", deg_from_rad)
-        for end, limit, side in ((low, least, -1), (high, most, 1)):
-            if (end - value) * side > AT_BOUND * span or (limit - end) * side <= 1e-9:
-                continue  # not there, or the end is the machine's own and cannot be widened
-            wider = max(low - 0.5 * span * (side < 0), least), min(high + 0.5 * span * (side > 0), most)
-            words.append(
-                f"the search ended on its own bound of {NAMES[i]}, {round(shown(end), 3):g} {unit}: widen it with "
-                f"--{NAMES[i]}={round(shown(wider[0]), 3):g}:{round(shown(wider[1]), 3):g}"
-            )
-    ends = {min(bounds.heights): "lowest", max(bounds.heights): "highest"} if len(bounds.heights) > 1 else {}
-    words += [
-        f"the search took the {which} height, {mm_from_m(end):g} mm, of {both_names('--z-values')}: try one beyond it"
-        for end, which in ends.items()
-        if abs(placement[2] - end) < 1e-9
-    ]
+        low, high, (least, most), value = lows[i], highs[i], reach[i], placement[i]
+        value = low + (value - low + 1e-6) % 360.0 - 1e-6 if i == 5 else value  # the file's is within 0 to 360
+        half = 0.5 * (high - low)
+        for end, at_end, wider in (
+            (low, value - low, (max(low - half, least), high)),
+            (high, high - value, (low, min(high + half, most))),
+        ):
+            if at_end <= AT_BOUND * (high - low) and wider != (low, high):  # else the machine's own end
+                words.append(
+                    f"the search ended on its own bound of {VARIED[i][2:]}, {round(end, 3):g} "
+                    f"{'mm' if i < 3 else 'degrees'}: widen it with {VARIED[i]}={wider[0]:.6g}:{wider[1]:.6g}"
+                )
     return words

@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.placement.ascents import climbed
 from toolpath_stiff.placement.evaluator import PlacementFigures
-from toolpath_stiff.placement.fronts import front_rows, thin
 from toolpath_stiff.placement.goals import Goal, PlacementRules
-from toolpath_stiff.placement.unreachable import LeftOutRapid, infeasible, let_go
+from toolpath_stiff.placement.unreachable import infeasible, let_go
 from toolpath_stiff.placement.working import ENDS, NO_FLOORS, Search
 
 SCOUTS = 250  # placements tried at random before the evolution, for each that is free of x, y, z, A, B, C
@@ -60,7 +59,7 @@ class PlacementResult:
     best: int
     present: PlacementFigures | None
     rules: PlacementRules
-    rapids_left_out: tuple[LeftOutRapid, ...] = ()
+    rapids_left_out: tuple[int, ...] = ()
     pose_evaluations: int = 0
     searches: int = 1
     alone: bool = False
@@ -80,7 +79,7 @@ def search_placements(search: Search) -> PlacementResult:
         No placement keeps the rules; says which one binds at the least bad placement, at which line, by how much.
     """
     now, start = search.now, search.start
-    rapids_left_out: tuple[LeftOutRapid, ...] = ()
+    rapids_left_out: tuple[int, ...] = ()
     for searches in range(1, SEARCHES + 1):
         candidates, left_out = _candidates(search, np.random.default_rng(search.wanted.seed + searches - 1))
         rapids_left_out += left_out
@@ -94,7 +93,7 @@ def search_placements(search: Search) -> PlacementResult:
     return replace(result, searches=searches, alone=alone)
 
 
-def _candidates(search: Search, rng: np.random.Generator) -> tuple[FloatArray, tuple[LeftOutRapid, ...]]:
+def _candidates(search: Search, rng: np.random.Generator) -> tuple[FloatArray, tuple[int, ...]]:
     """Candidates for the front (k, 6), the present placement first where it may be one; rapids that were left out."""
     bounds = search.bounds
     unit = rng.uniform(size=(max(SCOUTS * len(bounds.free), 1), len(bounds.free)))
@@ -114,7 +113,7 @@ def _candidates(search: Search, rng: np.random.Generator) -> tuple[FloatArray, t
     return np.vstack([search.start, archive, ends]), rapids_left_out
 
 
-def _result(search: Search, candidates: FloatArray, rapids_left_out: tuple[LeftOutRapid, ...]) -> PlacementResult:
+def _result(search: Search, candidates: FloatArray, rapids_left_out: tuple[int, ...]) -> PlacementResult:
     """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
     candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]  # of equals the first stands
     figures = search.whole.figures(candidates)
@@ -135,6 +134,32 @@ def _result(search: Search, candidates: FloatArray, rapids_left_out: tuple[LeftO
         rapids_left_out=rapids_left_out,
         pose_evaluations=search.poses,
     )
+
+
+def front_rows(figures: PlacementFigures, kept: BoolArray) -> IntArray:
+    """Rows of those kept that no other beats in all of mean, range and weakest, by rising mean; equals stand once."""
+    rows = np.flatnonzero(kept & np.isfinite(figures.mean))
+    values, first = np.unique(figures.objectives[rows], axis=0, return_index=True)
+    rows = rows[first]
+    no_worse = np.asarray((values[:, None] >= values[None]).all(axis=2))  # [i, j]: i is at least as good as j in all
+    no_worse[np.diag_indices(len(rows))] = False
+    return np.asarray(rows[~no_worse.any(axis=0)], dtype=np.int64)
+
+
+def thin(objectives: FloatArray, rows: IntArray, points: int, best: int = -1) -> IntArray:
+    """At most `points` of rows (n,) with objectives (n, 3), spread over the front by farthest-point choice.
+
+    Its ends and the row `best` come first.
+    """
+    if len(rows) <= points:
+        return rows
+    scaled = (objectives - objectives.min(axis=0)) / np.maximum(np.ptp(objectives, axis=0), 1e-12)
+    chosen = list(dict.fromkeys([*np.flatnonzero(rows == best), *scaled.argmax(axis=0)]))[:points]
+    distance = np.min([((scaled - scaled[i]) ** 2).sum(axis=1) for i in chosen], axis=0)
+    while len(chosen) < points:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, ((scaled - scaled[chosen[-1]]) ** 2).sum(axis=1))
+    return np.asarray(rows[np.sort(np.array(chosen))])
 
 
 def _extrapolation_allowed(search: Search, scouts: FloatArray, few: PlacementFigures) -> float:

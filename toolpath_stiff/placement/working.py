@@ -12,7 +12,6 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
-from toolpath_stiff.placement.fronts import apart
 from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
 from toolpath_stiff.placement.paths import WorkPath, representative_path, with_rows
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -127,4 +126,4 @@ class Search:
     ) -> FloatArray:
         """The best of some placements for a goal that are not beside each other."""
         ranked = placements[self.ranked(goal, figures)]
-        return ranked[apart(self.bounds, ranked, count, distance)]
+        return ranked[self.bounds.apart(ranked, count, distance)]

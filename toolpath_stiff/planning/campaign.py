@@ -9,17 +9,16 @@ so that the scatter is known; random order, so that a drift looks like nothing e
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.evidence import LAW_PRIOR
 from toolpath_stiff.inference.judgement import NONE
@@ -34,24 +33,13 @@ from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.units import RAD_PER_DEG
 
 FEWEST, MOST = 8, 200  # poses
-
-
 LEAST_TILT = 15.0 * RAD_PER_DEG
-
-
 IMAGES = 3
-
-
-LONG_TOOL_SHARE, RECLAMPED, CLAMPINGS = 6, 2, 3  # every sixth pose with a longer tool; 2 poses clamped 3 times a set-up
-
-
+LONG_TOOL_SHARE, CLAMPINGS = 6, 3  # every sixth pose with a longer tool; two poses clamped three times a set-up
 TABLE, RISER = "table", "riser"
-
-
 TRIES = 600  # poses to choose from
-
-
 SHOWS = 3.0  # standard deviations from which on an effect is said to show
+Stop = tuple[int, float, str, str]  # number of the pose, tool's extension, set-up, purpose
 
 
 @dataclass(frozen=True)
@@ -65,15 +53,16 @@ class Campaign:
     kinds
         What each is for.
     noise
-        Relative sd of a reading, or (repeat, clamping).
+        Relative sd of a reading, re-clamping included.
     sees
         Effect -> gap in standard deviations between it, at its usual size, and nothing.
     """
 
     visits: Visits
     kinds: tuple[str, ...]
-    noise: float | tuple[float, float]
+    noise: float
     sees: Mapping[str, float]
+    notes: tuple[str, ...] = ()
 
     @property
     def chosen(self) -> Sequence[int]:
@@ -107,22 +96,12 @@ class Campaign:
             f"{self.poses} poses at {len(np.unique(np.round(self.visits.pose[:, 2], 9)))} heights, {len(self.visits)} "
             f"clampings, {len(self.visits.readings)} readings: about {self.minutes / 60.0:.0f} hours"
         ]
-        return lines + (
-            [f"of usual size and alone, these would not show at {self._noise_words} noise: {hidden}"] if hidden else []
-        )
+        if hidden:
+            noise = f"{100.0 * self.noise:.3g} % noise"
+            lines.append(f"of usual size and alone, these would not show at {noise}: {hidden}")
+        return lines
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Assumptions."""
-        return (f"seen or not: at a noise of {self._noise_words}, each effect alone at its usual size",)
-
-    @property
-    def _noise_words(self) -> str:
-        """The noise, "2 %"; of a reading and of a clamping, "2 % and 1 %"."""
-        parts = self.noise if isinstance(self.noise, tuple) else (self.noise,)
-        return " and ".join(f"{100 * part:g} %" for part in parts)
-
-    def head(self) -> dict[str, Any]:
+    def head(self) -> Document:
         """The first entries of plan.json."""
         return {
             "kind": "campaign",
@@ -133,19 +112,9 @@ class Campaign:
         }
 
 
-@dataclass(frozen=True)
-class _Stop:
-    pose: FloatArray
-    extension: float
-    setup: str
-    repeat: int
-    purpose: str
-
-
 def first_campaign(
     machine: Hexapod,
     n: int = 24,
-    *,
     menu: Menu | None = None,
     seed: int = 0,
     effects: Mapping[str, Effect] | None = None,
@@ -181,10 +150,14 @@ def first_campaign(
     menu = menu or Menu(setups=(TABLE, RISER))
     rng = np.random.default_rng(seed)
     poses = _poses(machine, menu, n, rng)
-    stops = _ordered(_stops(machine, poses, menu), rng)
-    visits = _visits(stops, menu, rng)
-    sees = {} if effects is None else _sees(machine, visits, effects, noise, effect_files)
-    return Campaign(visits, tuple(stop.purpose for stop in stops), noise, sees)
+    stops = _stops(machine, poses, menu)
+    first = {stop[1:3]: k for k, stop in reversed(list(enumerate(stops)))}
+    # At random within a set-up and a tool, which are changed as seldom as can be.
+    stops = sorted((stops[k] for k in rng.permutation(len(stops))), key=lambda stop: first[stop[1:3]])
+    visits = _visits(poses, stops, menu, rng)
+    repeat_clamping = repeat_and_clamping(noise)
+    sees = {} if effects is None else _sees(machine, visits, effects, repeat_clamping, effect_files)
+    return Campaign(visits, tuple(purpose for _, _, _, purpose in stops), float(np.hypot(*repeat_clamping)), sees)
 
 
 def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
@@ -238,56 +211,37 @@ def _spread(chosen: FloatArray, pool: FloatArray, count: int, scale: FloatArray)
     return chosen
 
 
-def _stops(machine: Hexapod, poses: FloatArray, menu: Menu) -> list[_Stop]:
+def _stops(machine: Hexapod, poses: FloatArray, menu: Menu) -> list[Stop]:
     """Stops at the poses: with longer tools, in other set-ups, clamped anew."""
     n, tool, setup = len(poses), menu.tool_extensions[0], menu.setups[0]
     stops = []
     for k, pose in enumerate(poses):
-        purpose = "image" if k < IMAGES else "tilted" if pose[3:].any() else "vertical"
-        stops.append(_Stop(pose, tool, setup, 1, purpose))
+        stops.append((k, tool, setup, "image" if k < IMAGES else "tilted" if pose[3:].any() else "vertical"))
     for extension in menu.tool_extensions[1:]:
-        fits = np.flatnonzero(reachable(machine, poses, extension))
+        fits = np.flatnonzero(reachable(machine, poses, extension)).tolist()
         spread = np.unique(np.linspace(0, max(len(fits) - 1, 0), max(n // LONG_TOOL_SHARE, 2)).astype(int))
-        stops += [_Stop(poses[fits[k]], extension, setup, 1, "longer tool") for k in spread[: len(fits)]]
-    # Clamped anew: the first image and the last pose, which is tilted.
-    again = (0, n - 1)[:RECLAMPED]
-    for other in menu.setups[1:]:
-        stops += [_Stop(poses[k], tool, other, 1, f"set-up {other}") for k in again]
-    stops += [
-        _Stop(poses[k], tool, name, repeat, "clamped anew")
-        for name, k, repeat in product(menu.setups, again, range(2, CLAMPINGS + 1))
-    ]
-    return stops
+        stops += [(fits[k], extension, setup, "longer tool") for k in spread[: len(fits)]]
+    again = (0, n - 1)  # the first image and the last pose, which is tilted
+    stops += [(k, tool, other, f"set-up {other}") for other in menu.setups[1:] for k in again]
+    return stops + [(k, tool, name, "clamped anew") for name, k, _ in product(menu.setups, again, range(1, CLAMPINGS))]
 
 
-def _ordered(stops: list[_Stop], rng: Generator) -> list[_Stop]:
-    """At random within a set-up and a tool, which are changed as seldom as can be; repeats in their order."""
-    shuffled = [stops[k] for k in rng.permutation(len(stops))]
-    first = {(stop.setup, stop.extension): k for k, stop in reversed(list(enumerate(stops)))}
-    shuffled.sort(key=lambda stop: first[(stop.setup, stop.extension)])
-    visited: Counter[tuple[bytes, float, str]] = Counter()
-    ordered = []
-    for stop in shuffled:
-        place = (stop.pose.tobytes(), stop.extension, stop.setup)
-        visited[place] += 1
-        ordered.append(replace(stop, repeat=visited[place]))
-    return ordered
-
-
-def _visits(stops: Sequence[_Stop], menu: Menu, rng: Generator) -> Visits:
+def _visits(poses: FloatArray, stops: Sequence[Stop], menu: Menu, rng: Generator) -> Visits:
     loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads))))
     names, forces = (np.array(column) for column in zip(*product(AXES, loads), strict=True))
     orders = np.array([rng.permutation(len(names)) for _ in stops])
-    pose, extension, setup, repeat, _ = (np.array(column) for column in zip(*map(astuple, stops), strict=True))
+    pose, extension, setup, _ = (np.array(column) for column in zip(*stops, strict=True))
+    places = [stop[:3] for stop in stops]
+    repeat = np.array([places[: k + 1].count(place) for k, place in enumerate(places)])
     time = READING_EVERY * np.arange(1.0, len(names) + 1.0)
-    return visits_of(menu, (pose, extension, setup), names[orders], forces[orders], time, rounds=repeat[:, None])
+    return visits_of(menu, (poses[pose], extension, setup), names[orders], forces[orders], time, repeat[:, None])
 
 
 def _sees(
     machine: Hexapod,
     visits: Visits,
     effects: Mapping[str, Effect],
-    noise: float | tuple[float, float],
+    noise: tuple[float, float],
     effect_files: Sequence[str | Path],
 ) -> dict[str, float]:
     """Gap between each effect at its usual size and nothing, the strut law refitted."""
@@ -296,7 +250,7 @@ def _sees(
     rivals = unfitted_rivals([NONE, *names], effects, setup=visits.menu.setups[-1])
     rivals = [replace(rival, covariance=LAW_PRIOR**2 * np.eye(2), free=()) for rival in rivals]
     forecasts, _, scatter = forecast_all(machine, rivals, visits.readings, effect_files)
-    reading_noise = ReadingNoise(*repeat_and_clamping(noise), scatter)
+    reading_noise = ReadingNoise(*noise, scatter)
     everywhere = np.arange(len(visits))
     return {
         forecast.name: pair_shares(visits, forecasts[0], forecast, reading_noise).gap(everywhere)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,11 +16,10 @@ from toolpath_stiff.inference.hypotheses import score_family
 from toolpath_stiff.inference.judgement import NONE, Judgement
 from toolpath_stiff.planning.forecasts import Rival
 from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect
 
 LEAST_WEIGHT = 0.02  # probability below which an explanation is no rival
-
-
 UNKNOWN_SIZE = 0.5  # relative sd of a size that nothing has been measured of; assumed
 
 
@@ -152,9 +150,4 @@ def _check(names: Sequence[str], effects: Mapping[str, Effect]) -> None:
         raise InputError(f"--between {','.join(names)}", expected="two or more different effects, or none")
     for name in names:
         if name != NONE and name not in effects:
-            near = difflib.get_close_matches(name, [*effects, NONE], n=1)
-            raise InputError(
-                f"unknown effect {name!r}",
-                expected=f"{NONE}, {', '.join(effects)}",
-                hint=f"did you mean {near[0]}?" if near else "",
-            )
+            find_effect(name)  # says what there is

@@ -9,7 +9,7 @@ import numpy as np
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import Variable, directions, planes
-from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors, RefittedHint
+from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report import history
 from toolpath_stiff.report.history import history_section, history_text
@@ -101,17 +101,12 @@ def _by_noise(figures: Mapping[str, float], form: str) -> str:
 
 def _findings(summary: ComparisonSummary) -> Table:
     """Findings with their probabilities, or the strongest hints."""
-    rows, hints = [], summary.findings or summary.hints
-    for hint in hints:
-        after = hint.after_strut_law_refit if isinstance(hint, RefittedHint) else None
-        refitted = f"{after.p_adjusted:.2g}" if after else "-"
-        alike = ", ".join(hint.indistinguishable_from) or "-"
-        rows.append((hint.text, f"{hint.statistic:+.1f}", f"{hint.p_adjusted:.2g}", refitted, alike))
-    head = (">t", ">p, corrected", ">p if the strut law is refitted", "looks the same in these data")
-    if summary.findings:
-        return Table(("finding", *head), rows, ["finding"] * len(rows))
-    listed = Table(("the strongest hints", *head), rows, ["out"] * len(rows))
-    return listed.columns(*(title for title in listed.titles if "refitted" not in title))
+    rows = [
+        (hint.text, f"{hint.statistic:+.1f}", f"{hint.p_adjusted:.2g}", ", ".join(hint.indistinguishable_from) or "-")
+        for hint in summary.findings or summary.hints
+    ]
+    first, kind = ("finding", "finding") if summary.findings else ("the strongest hints", "out")
+    return Table((first, ">t", ">p, corrected", "looks the same in these data"), rows, [kind] * len(rows))
 
 
 def groups(summary: ComparisonSummary) -> list[tuple[str, GroupErrors]]:
@@ -231,7 +226,7 @@ def _refitted(summary: ComparisonSummary) -> list[str]:
     if refit is None:
         return []
     gain = round(base.mean_abs_error_percent - refit.mean_abs_error_percent, 2)
-    law = " / ".join(f"{stiffness:.1f}" for stiffness in refit.strut_law.N_per_um)
+    law = " / ".join(f"{stiffness:.1f}" for stiffness in refit.N_per_um)
     return [
         "",
         f"strut law refitted: {refit.mean_abs_error_percent:.2f} % mean error, {refit.bias_percent:+.1f} % bias, rms "

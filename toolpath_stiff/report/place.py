@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.placement.result import NotWritten, Placement, Written
+from toolpath_stiff.placement.result import Placement, Written
 from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
 from toolpath_stiff.report.pages import Drawing
 from toolpath_stiff.report.place_page import page_pieces
@@ -21,7 +21,7 @@ def text(placed: Placement) -> str:
     which = f"placement {best.number} of {count}, picked" if placed.picked else f"objective {placed.objective}"
     lines = [
         *(f"warning         {warning}" for warning in placed.warnings[:first]),
-        f"program         {placed.program.name} on {machine_text(placed.machine_stated)}, load {placed.best.load}",
+        f"program         {placed.best.program.name} on {machine_text(placed.machine_stated)}, load {placed.best.load}",
         f"{label:<16}X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees "
         f"({which})",
     ]
@@ -58,9 +58,9 @@ def _figures_words(row: PlacementRow) -> str:
     )
 
 
-def _written(written: Written | NotWritten) -> list[str]:
+def _written(written: Written) -> list[str]:
     """Lines on the transformed program."""
-    if isinstance(written, NotWritten):
+    if written.refused:
         return [f"not rewritten   {written.file}: {written.refused}"]
     zero, apart = written.analysed_at, written.relative_difference
     figures = ", ".join(f"{name} {value:.1e}" for name, value in apart.items())

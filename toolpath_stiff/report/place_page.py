@@ -54,7 +54,7 @@ def page_pieces(placed: Placement) -> Iterator[str]:
         styles=["viewer.css", "place.css"],
         scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
         data=data,
-        title=f"Placements of {placed.program.name}",
+        title=f"Placements of {placed.best.program.name}",
         about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
         objective=placed.objective,
         load=str(best.load),
@@ -70,7 +70,7 @@ def _corners(corners: FloatArray) -> list[list[float | None]]:
 
 def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Document, str]:
     """The path in the program's axes and its stiffness at some placements, and what is left out of it, in words."""
-    best, samples = placed.best, sample_moves(placed.program.moves, placed.best.step)
+    best, samples = placed.best, sample_moves(placed.best.program.moves, placed.best.step)
     counted = samples.cutting & (samples.weight > 0.0)
     cuts = np.flatnonzero(counted if counted.any() else samples.cutting)
     cut = np.unique(np.cumsum(~samples.cutting)[cuts], return_inverse=True)[1]

@@ -79,7 +79,7 @@ def _headline(update: Update) -> str:
 
 
 def _figures(update: Update) -> list[tuple[str, str]]:
-    last, by_likelihood = update.steps[-1], update.objective == "likelihood"
+    last, by_likelihood = update.steps[-1], update.task.objective == "likelihood"
     figures = [(_percent(update.steps[0].error), "mean error as given")]
     if by_likelihood:
         figures.append((_percent(update.refitted.error), "mean error, strut law refitted"))
@@ -122,7 +122,7 @@ def _fitted(update: Update) -> Table:
             f"{end.stiffness:.2f} N/um",
             f"sd {end.sd:.2g} N/um",
         )
-        for end in step.law_ends(update.given.strut_law, update.widening)
+        for end in step.law_ends(update.task.machine.strut_law, update.widening)
         if end.sd is not None
     ]
     for effect, entry in step.sizes(update.widening).items():
@@ -176,7 +176,7 @@ def _value(value: float | None) -> str:
 def text(update: Update) -> str:
     """Ladder, errors by direction before and after, parameters, what was turned down."""
     document, fitted = update.document, _fitted(update)
-    data = f"{counted(document['readings'], 'reading')} of {', '.join(map(plain, update.names))}"
+    data = f"{counted(document['readings'], 'reading')} of {', '.join(map(plain, update.task.files))}"
     lines = [
         f"data     {data}, machine {machine_text(document)}",
         fill(f"result   {update.verdict.upper()}. {plain(document['text'])}", WIDTH, subsequent_indent=" " * 9),

@@ -17,43 +17,21 @@ from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import command_line, options
-from toolpath_stiff.nc.program import Reading
 from toolpath_stiff.studio.server import Studio
 from toolpath_stiff.studio.session import Session
 
 LOCK = ".studio.lock"
 
 
-def opened_case(
-    folder: str,
-    data: Sequence[str],
-    *,
-    machine: str | None = None,
-    program: str | None = None,
-    effects: Sequence[str] = (),
-    exercise: int | None = None,
-    trust: Sequence[str] = (),
-    reading: Reading | None = None,
-) -> Case:
-    """The case of a folder with what the command line adds to it.
-
-    Raises `InputError` for files that cannot be used, and for a machine or an exercise where the case has them already.
-    """
+def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise: int | None) -> Case:
+    """The case of a folder, or a new one. Raises `InputError` where machine or exercise are of a case that is there."""
     there = is_file(Path(folder) / CASE_FILE)
     if there and (machine is not None or exercise is not None):
         name = "machine" if machine is not None else "exercise"
         raise InputError(f"--{name}: the case {folder} is there already", hint="name another folder with --case")
     case = Case.open(folder, machine or MACHINE, trust)
-    for file in effects:
-        case.add_effects(file)
     if exercise is not None:
         case.start_exercise(exercise)
-    if data:
-        case.add_data(*data)
-    if program:
-        case.add_program(program, **reading or {})
-    elif reading:
-        case.read_programs(**reading)
     return case
 
 

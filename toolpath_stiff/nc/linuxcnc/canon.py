@@ -4,6 +4,9 @@ Motions are given in program coordinates of the controlled point, in the active 
 it changes. As measured (2.9): world = Rz(rotation) (program + g92) + g5x, spindle nose = world + tool length, and the
 nose stands still when frame or tool length change. ARC_FEED has end 1, end 2, centre 1, centre 2, turns, axis end, a, b
 and c; NURBS moves have no points. mm, degrees, mm/min inside, as in the built-in reader.
+
+A line of the copy carries its number as a comment, which stays in order with the moves; the N word that is printed too
+is that of the line being read, which cutter compensation reads ahead.
 """
 
 from __future__ import annotations
@@ -17,8 +20,8 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
-from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, step_in_words
-from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
+from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line
+from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Jump, Recorder
 from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, tool_table_hint
 from toolpath_stiff.nc.words import AXES
@@ -33,8 +36,8 @@ MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
 HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
-LENGTH_WORD = re.compile(r"H0*(\d+)(?![\d.])")
-DIAMETER_WORD = re.compile(r"D0*(\d+)(?![\d.])")
+LEAVES = re.compile(r"O|.*M0*9[89](?!\d)")  # lines of which rs274 prints no comment: calls, returns, loops, conditions
+FINE_WORD = re.compile(r"[XYZ][-+]?\d*\.\d{4,}[1-9]")  # more decimals than rs274 prints
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
 ROUNDING = 1e-6  # far less than one of them
@@ -54,13 +57,12 @@ class Follower:
     lines: Sequence[Line]
     tools: dict[int, ToolEntry] | None
     posted: PostedKinematics | None
-    tagged: bool  # the copy carries its line numbers as comments
     numbers: Sequence[int]  # of the tools, in the order of their table
     reference: Sequence[float] = (0.0, 0.0, 0.0)
     recorder: Recorder = field(default_factory=Recorder)
     used_tools: list[int] = field(default_factory=list)
+    jumps: list[Jump] = field(default_factory=list)
     first_motion: int | None = None
-    ended: bool = False
 
     scale: float = 1.0
     plane: str = "G17"
@@ -71,9 +73,8 @@ class Follower:
     synchronised: float = 0.0
     speed: float = 0.0
     tool: int = 0
-    renamed: bool = False
     tool_length: float = math.nan
-    line: int = 0
+    line: int = 0  # that moves; 0: one before the program
     reading: int = 0
     cycle: bool = False
     frame_changed: bool = False
@@ -84,36 +85,62 @@ class Follower:
 
     def __post_init__(self) -> None:
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
+        self.fine = any(FINE_WORD.search(line.words) for line in self.lines)
+        self.passed = [0]  # how many of the first lines no run that comes straight on leaves out
+        for line in self.lines:
+            shows = line.words.strip("%") and not line.optional and not LEAVES.match(line.words)
+            self.passed.append(self.passed[-1] + bool(shows))
 
     def follow(self, text: str) -> None:
         """Take every command. Raises `InputError` for what gives no path: probing, splines, tools of unknown length."""
         for match in CALL.finditer(text):
             number, name, inner = match.groups()
             action = getattr(self, f"_on_{name.lower()}", None)
-            if action is None:
-                continue
-            if number is not None:
-                self.reading = int(number)
-                if not self.tagged:
-                    self.line = self.reading
-            action(inner)
+            if action is not None:
+                self.reading = self.reading if number is None else int(number)
+                action(inner)
 
-    def fail(self, line: int, problem: str, expected: str = "", hint: str = "") -> InputError:
-        """An error of a line of the program."""
-        return ProgramError(problem, expected=expected, hint=hint, file=self.name, line=line or None)
+    def fail(self, problem: str, expected: str = "", hint: str = "", line: int | None = None) -> InputError:
+        """An error of a line of the program, unless one is given of that being read."""
+        number = (self.reading if line is None else line) or None
+        return ProgramError(problem, expected=expected, hint=hint, file=self.name, line=number)
+
+    def _words(self, line: int) -> str:
+        return self.lines[line - 1].plain if line else ""
 
     def _point(self, inner: str) -> Vector:
         """X, Y, Z as printed in mm, A, B, C in degrees."""
         return [v * self.scale if i < 3 else v for i, v in enumerate(_numbers(inner)[:6])]
 
+    def _on_comment(self, inner: str) -> None:
+        text = inner.strip('"')
+        if text.isdigit():
+            self._note_jump(int(text))
+            self.line, self.moves_of_line = int(text), 0
+            codes = MOTION_CODE.findall(self._words(self.line))
+            if codes:
+                self.cycle = codes[-1] in CYCLE_CODES
+        elif text.startswith("interpreter: cutter radius compensation on"):
+            self._check_diameter()
+
+    def _note_jump(self, line: int) -> None:
+        """A loop, a condition or a call, from whose line the run left, or after whose line it goes on."""
+        if line > self.line and self.passed[line - 1] == self.passed[self.line]:
+            return
+        left, after = self.line + 1, line - 1
+        while left < len(self.lines) and not self.lines[left - 1].words:
+            left += 1
+        while after > 1 and not self.lines[after - 1].words:
+            after -= 1
+        left = left if LEAVES.match(self.lines[left - 1].words) else self.line
+        after = after if LEAVES.match(self.lines[after - 1].words) else line - 1
+        self.jumps.append(Jump(len(self.recorder), left, after))
+
     def _on_use_length_units(self, inner: str) -> None:
         scale = MM_PER_INCH if "INCH" in inner else 1.0
         if scale != self.scale and self.frames.tool:
-            raise self.fail(
-                self.reading,
-                "G20 or G21 changes the unit while a tool length is in force: LinuxCNC's rs274 loses the length",
-                "G49 before it",
-            )
+            problem = "G20 or G21 changes the unit while a tool length is in force: LinuxCNC's rs274 loses the length"
+            raise self.fail(problem, "G49 before it")
         self.frame_changed = True
         self.scale = scale
         if self.feed_line == self.reading:  # `G20 F20`: rs274 takes F first, controls mean inches
@@ -135,28 +162,46 @@ class Follower:
         offset.rotation = rotation
         self.frame_changed = True
 
-    def _no_length(self, words: str) -> InputError:
-        """The error for a G43 without a length, with its tool unless H is computed."""
-        missing = "and there is no tool table" if self.tools is None else "which the tool table does not give"
-        named, hint = LENGTH_WORD.search(words), "give it in a tool table (--tools FILE)"
-        if self.tools is None and (named or "H" not in words):
-            hint = tool_table_hint(int(named[1] if named else 0) or self.tool)  # H0: that of the spindle
-        return self.fail(self.reading, f"G43 needs a tool's length, {missing}", hint=hint)
+    def _tool_named(self, letter: str) -> int:
+        """The tool of an H or D word; of 0 or none that in the spindle."""
+        named = re.search(rf"{letter}0*(\d+)(?![\d.])", self._words(self.reading))
+        return int(named[1] if named else 0) or self.tool
 
     def _on_use_tool_length_offset(self, inner: str) -> None:
-        words = self._words(self.reading)
         x, y, z, *rest = (v * self.scale for v in _numbers(inner))
         if x or y or any(rest):
-            raise self.fail(self.reading, "a tool offset in other directions than Z", "a length along Z alone")
+            raise self.fail("a tool offset in other directions than Z", "a length along Z alone")
         if z < LENGTH_UNKNOWN_BELOW_MM:
-            raise self._no_length(words)
-        if self.renamed and "G43" in words and "H" not in words and "G43.1" not in words:
-            raise self.fail(self.reading, "G43 after M61: LinuxCNC's rs274 takes the length of the tool before", "H")
+            missing = "and there is no tool table" if self.tools is None else "which the tool table does not give"
+            named = tool_table_hint(self._tool_named("H"))
+            hint = named if self.tools is None else "give it in a tool table (--tools FILE)"
+            raise self.fail(f"G43 needs a tool's length, {missing}", hint=hint)
         self.raised += self.frames.tool - z
         self.frames.set_tool(z)
-        cancelled = z == 0.0 and "G49" in words
+        cancelled = z == 0.0 and "G49" in self._words(self.reading)
         self.tool_length = math.nan if cancelled or not self.reading else z
         self.frame_changed = True
+
+    def _check_diameter(self) -> None:
+        """rs274 takes 0 for a diameter that its table does not give, and would compensate by zero."""
+        words = self._words(self.reading)
+        if "G41.1" in words or "G42.1" in words:
+            return
+        if "D" in words and not re.search(r"D\d+(?![\d.])", words):
+            raise self.fail("the tool of G41 or G42 is computed", "D with a tool's number, or G41.1")
+        number = self._tool_named("D")
+        tool = (self.tools or {}).get(number)
+        if tool is None or math.isnan(tool.diameter):
+            hint = "give it in a tool table (--tools FILE)"
+            raise self.fail(f"cutter compensation needs the diameter of tool {number}", hint=hint)
+
+    def _on_change_tool(self, inner: str) -> None:
+        place = int(_numbers(inner)[0])
+        self.tool = self.numbers[place - 1] if place else 0
+        self.lost, self.raised = self.lost + self.raised, 0.0
+
+    def _on_change_tool_number(self, _: str) -> None:
+        raise self.fail("M61: LinuxCNC's rs274 goes on with length and diameter of the tool before", "T and M6")
 
     def _on_select_plane(self, inner: str) -> None:
         name = inner.removeprefix("CANON_PLANE_")
@@ -181,63 +226,18 @@ class Follower:
         """mm/min, or deg/min of a move of the rotary axes alone."""
         if self.synchronised or self.per_revolution:
             if self.speed == 0.0:
-                raise self.fail(self.line, "a feed per revolution with the spindle at S0", "S above 0")
+                raise self.fail("a feed per revolution with the spindle at S0", "S above 0", line=self.line)
             return (self.synchronised or self.feed * self.feed_scale) * self.speed
         return self.feed * (1.0 if not arc and start[:3] == end[:3] else self.feed_scale)
-
-    def _on_change_tool(self, inner: str) -> None:
-        place = int(_numbers(inner)[0])
-        self.tool = self.numbers[place - 1] if place else 0
-        self.renamed = False
-        self.lost, self.raised = self.lost + self.raised, 0.0
-
-    def _on_change_tool_number(self, inner: str) -> None:
-        self._on_change_tool(inner)
-        self.renamed = True  # and rs274 goes on with the old one's length and diameter
 
     def _on_dwell(self, inner: str) -> None:
         self.recorder.add_dwell(_numbers(inner)[0])
 
-    def _words(self, line: int) -> str:
-        return self.lines[line - 1].plain if line else ""
-
-    def _on_comment(self, inner: str) -> None:
-        text = inner.strip('"')
-        if text.isdigit():
-            self.line, self.moves_of_line = int(text), 0
-            codes = MOTION_CODE.findall(self._words(self.line))
-            if codes:
-                self.cycle = codes[-1] in CYCLE_CODES
-        elif text.startswith("interpreter: cutter radius compensation on"):
-            self._check_diameter()
-
-    def _check_diameter(self) -> None:
-        """rs274 takes 0 for a diameter that its table does not give, and would compensate by zero."""
-        words = self._words(self.reading)
-        if "G41.1" in words or "G42.1" in words:
-            return
-        named = DIAMETER_WORD.search(words)
-        if named is None and "D" in words:
-            raise self.fail(self.reading, "the tool of G41 or G42 is computed", "D with a tool's number, or G41.1")
-        number = int(named[1]) if named and int(named[1]) else self.tool
-        if self.renamed and number == self.tool:
-            raise self.fail(self.reading, "G41 or G42 after M61: LinuxCNC's rs274 takes the tool before", "T and M6")
-        tool = (self.tools or {}).get(number)
-        if tool is None or math.isnan(tool.diameter):
-            raise self.fail(
-                self.reading,
-                f"cutter compensation needs the diameter of tool {number}",
-                hint="give it in a tool table (--tools FILE)",
-            )
-
     def _on_nurbs_feed(self, _: str) -> None:
-        raise self.fail(self.reading, "a spline, whose points LinuxCNC does not print", hint="post arcs and lines")
+        raise self.fail("a spline, whose points LinuxCNC does not print", hint="post arcs and lines")
 
     def _on_straight_probe(self, _: str) -> None:
-        raise self.fail(self.reading, "probing: what follows depends on what is met", hint="leave probing out")
-
-    def _on_program_end(self, _: str) -> None:
-        self.ended = True
+        raise self.fail("probing: what follows depends on what is met", hint="leave probing out")
 
     def _on_straight_traverse(self, inner: str) -> None:
         self._move(RAPID, self._point(inner))
@@ -255,7 +255,7 @@ class Follower:
         e1, e2, c1, c2, turns, axis_end, *rotary = _numbers(inner)
         scale = self.scale
         if self.plane not in geometry.PLANES:
-            raise self.fail(self.line, f"an arc in the plane {self.plane}", "G17, G18 or G19")
+            raise self.fail(f"an arc in the plane {self.plane}", "G17, G18 or G19", line=self.line)
         first, second, normal = geometry.PLANES[self.plane]
         end = [0.0, 0.0, 0.0, *rotary]
         end[first], end[second], end[normal] = e1 * scale, e2 * scale, axis_end * scale
@@ -275,10 +275,10 @@ class Follower:
             self.first_motion = self.line
         if self.turned_by and not {"X", "Y"} <= set(self._words(self.line)):
             raise self.fail(
-                self.turned_by,
                 "G10 turns the work offset in force, and the next move does not name both X and Y: "
                 "LinuxCNC's rs274 would take the old numbers for them",
                 "X and Y in the move that follows",
+                line=self.turned_by,
             )
         self.turned_by = 0
         if self.frame_changed:  # the same place in other numbers, up to the digits printed
@@ -299,8 +299,14 @@ class Follower:
         frames, (first, second, _) = self.frames, geometry.PLANES[self.plane]
         # In the plane the sweep is that of program coordinates, before any rotation.
         here, there = frames.to_program(start), frames.to_program(end)
-        if max(abs(here[first] - there[first]), abs(here[second] - there[second])) < SAME_PLACE * self.scale:
-            there = self._end_in_words(here, there, (first, second))
+        apart = max(abs(here[axis] - there[axis]) for axis in (first, second)) / self.scale
+        if apart < SAME_PLACE:
+            named = {AXES[first], AXES[second]} & set(AXIS_WORD.findall(self._words(self.line)))
+            if named and (apart > ROUNDING or self.fine):
+                problem = "an arc that may be a full circle, or shorter than the digits that LinuxCNC's rs274 prints"
+                expected = "numbers of four decimals, and an end that is the start or more than 0.0002 from it"
+                raise self.fail(problem, expected, line=self.line)
+            there = here
         middle = list(here)
         middle[first], middle[second] = c1, c2
         beginning, ending, center = ((point[first], point[second]) for point in (here, there, middle))
@@ -308,26 +314,9 @@ class Follower:
         try:
             geometry.check_bulge(math.dist(beginning, center), sweep)
         except geometry.ArcError as error:
-            raise self.fail(self.line, error.found, error.expected) from None
+            raise self.fail(error.found, error.expected, line=self.line) from None
         x, y, z = (c - r for c, r in zip(frames.to_control(middle), self.reference, strict=False))
         return Arc((x, y, z), frames.turn_direction(geometry.normal_of(self.plane)), sweep)
-
-    def _end_in_words(self, here: Vector, there: Vector, axes: tuple[int, int]) -> Vector:
-        """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
-        incremental = any("G" in line.words and "1" in DISTANCE_MODE.findall(line.plain) for line in self.lines)
-        step = None if incremental else step_in_words(self.lines, self.line, [AXES[axis] for axis in axes])
-        if step is None or max(map(abs, step)) > SAME_PLACE:  # computed, or compensated
-            if max(abs(here[axis] - there[axis]) for axis in axes) > ROUNDING * self.scale:
-                raise self.fail(
-                    self.line,
-                    "an arc that may be a full circle, or shorter than the digits that LinuxCNC's rs274 prints",
-                    "an end that differs from the start by nothing, or by more than 0.0002",
-                )
-            return here
-        end = list(here)
-        for axis, length in zip(axes, step, strict=True):
-            end[axis] += length * self.scale
-        return end
 
     def _find_height(self, end: Vector) -> None:
         """Until a move names Z, rs274 prints the number that Z had before the length changed."""
@@ -335,11 +324,8 @@ class Follower:
         named = "Z" in AXIS_WORD.findall(words)
         modes = [mode for line in self.lines[: self.line] for mode in DISTANCE_MODE.findall(line.plain)]
         if self.cycle or (named and modes and modes[-1] == "1") or (HOME_MOVE.search(words) and not named):
-            raise self.fail(
-                self.line,
-                "a move from a height that rs274 has lost: the tool length changed between the last move and M6",
-                "G90 G0 with Z before it",
-            )
+            problem = "a move from a height that rs274 has lost: the tool length changed between the last move and M6"
+            raise self.fail(problem, "G90 G0 with Z before it", line=self.line)
         if named:
             self.lost = 0.0
         else:
@@ -347,7 +333,7 @@ class Follower:
 
     def _machine_flags(self, start: Vector, end: Vector) -> tuple[bool, bool]:
         """Two flags: start and end were given in machine coordinates (G53, G28, G30), axis by axis as in `Frames`."""
-        if not self.tagged or (self.cycle and start == end):
+        if self.cycle and start == end:
             return (False, False)
         was = self.frames.bound
         words = self._words(self.line)

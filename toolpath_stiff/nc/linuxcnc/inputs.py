@@ -24,6 +24,7 @@ from toolpath_stiff.nc.tables import (
     ToolEntry,
     tool_of,
 )
+from toolpath_stiff.nc.words import without_comments
 from toolpath_stiff.units import MM_PER_INCH
 
 LONGEST_LINE = 250  # rs274 reads at most 255 characters (LINELEN, interp_internal.hh)
@@ -33,87 +34,49 @@ LINE_NUMBER = re.compile(r"N[0-9]+(\.[0-9]+)?")
 BARE_NUMBER = tuple("0123456789.")
 NAMED = re.compile(r"<[^<>]*>")
 EXPRESSION = re.compile(r"\[[^\[\]]*(?:\]|$)")  # one without another in it
-TOKEN = re.compile(r"([A-Z])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
-TOKENS = re.compile(rf"(?:{TOKEN.pattern})++", re.ASCII)
-ABORT = "abort,"
-# Where the line that asks for a move is not the one that rs274 is reading when it prints it (cutter compensation holds
-# moves back), or where more than the move is needed from its line: cycles, machine coordinates, computed G codes.
-NEEDS_TAGS = re.compile(r"G(?:4[12]|7[346]|8[1-9]|0*53|28|30|33|[\[#A-Z])")
+ABORTS = re.compile(r"[(;]\s*a\s*b\s*o\s*r\s*t\s*,", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line of the program: its words without blanks, in upper case, and its comments with their columns."""
+    """A line of the program: its words without blanks, in upper case, and the columns of their characters."""
 
     number: int
+    text: str
     words: str
-    comments: tuple[tuple[int, str], ...] = ()
+    columns: Sequence[int] = ()
     optional: bool = False
-    rest: int | None = None  # how many characters of the words stand before a slash in the middle
 
     @cached_property
     def plain(self) -> str:
-        """The words without names in angle brackets and without bracketed expressions."""
-        words = NAMED.sub("<>", self.words)
+        """The words, names in angle brackets and bracketed expressions struck out."""
+        words = NAMED.sub(_struck_out, self.words)
         while "[" in words:
-            words = EXPRESSION.sub("", words)
+            words = EXPRESSION.sub(_struck_out, words)
         return words
 
 
+def _struck_out(match: re.Match[str]) -> str:
+    return "#" * len(match[0])
+
+
 def split(lines: Iterable[str], name: str) -> list[Line]:
-    """Words and comments of every line. Raises `InputError` for a comment that is not closed, or foreign letters."""
-    return [_split_line(text, Place(name, number)) for number, text in enumerate(lines, 1)]
+    """The words of every line. Raises `InputError` for a comment that is not closed, or foreign letters."""
+    return [_line(text, Place(name, number)) for number, text in enumerate(lines, 1)]
 
 
-def _split_line(text: str, place: Place) -> Line:
-    words, comments = _cut_comments(text, place) if any(mark in text for mark in "(;)") else (text, ())
-    compact = "".join(words.replace("\ufeff", "").split())
-    if not compact.isascii():  # before upper case: of other scripts some letters become ASCII ones
-        foreign = next(c for c in words if not c.isascii() and not c.isspace() and c != "\ufeff")
-        raise place.fail(
-            f"{foreign!r} outside a comment", "letters and digits of the NC language", column=words.index(foreign) + 1
-        )
-    compact = compact.upper()
-    optional = compact.startswith("/")
-    if optional:
-        compact = compact[1:].lstrip("0123456789")
-    compact = LINE_NUMBER.sub("", compact, count=1) if compact.startswith("N") else compact
-    rest = None
-    if "/" in compact and TOKENS.fullmatch(compact.replace("/", "")):  # of a block, no quotient
-        before, _, behind = compact.partition("/")
-        rest, compact = len(before), before + behind.lstrip("0123456789")
-    return Line(place.line, compact, comments, optional, rest)
+def _line(text: str, place: Place) -> Line:
+    words, columns = without_comments(text, place, semicolon=True)
+    if not words.isascii():
+        foreign, column = next((c, column) for c, column in zip(words, columns, strict=True) if not c.isascii())
+        raise place.fail(f"{foreign!r} outside a comment", "letters and digits of the NC language", column=column)
+    optional = words.startswith("/")
+    words = words[1:].lstrip("0123456789") if optional else words
+    words = LINE_NUMBER.sub("", words, count=1) if words.startswith("N") else words
+    return Line(place.line, text, words, columns[len(columns) - len(words) :], optional)
 
 
-def _cut_comments(text: str, place: Place) -> tuple[str, tuple[tuple[int, str], ...]]:
-    """`(` to its `)`, and outside of that `;` to the end; comments become blanks.
-
-    LinuxCNC refuses a comment within a comment, which Haas' controls have; the copy has neither.
-    """
-    words, comments, start, depth = "", list[tuple[int, str]](), 0, 0
-    for column, character in enumerate(text, 1):
-        if character == ";" and not depth:
-            comments.append((column, text[column:]))
-            break
-        depth += (character == "(") - (character == ")")
-        if depth < 0:
-            raise place.fail("`)` without `(`", column=column)
-        start = start or (column if depth else 0)
-        words += " " if start else character
-        if start and not depth:
-            comments.append((start, text[start : column - 1]))
-            start = 0
-    if start:
-        raise place.fail("a comment is not closed", "`)` on the same line", column=start)
-    return words, tuple(comments)
-
-
-def needs_tags(lines: Iterable[Line]) -> bool:
-    """True where the copy must carry its line numbers as comments too, which stay in order with the moves."""
-    return any("G" in line.words and NEEDS_TAGS.search(line.words) for line in lines)
-
-
-def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, tags: bool, prefix: tuple[str, ...] = ()) -> str:
+def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, prefix: Sequence[str] = ()) -> str:
     """The text for `rs274`: after the `prefix`, one line for each of the program's.
 
     Text before a tape mark that follows words, and after it, is treated as by the built-in reader: the second `%`, or
@@ -122,61 +85,29 @@ def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, tags: bool
     copy = list(prefix)
     started = False
     for line in lines:
-        words = line.words
-        if words == "%":
+        if line.words == "%":
             if started:
                 break
             started = True
             copy.append("")
-            continue
-        if block_delete:
-            words = "" if line.optional else words[: line.rest]
-        started = started or bool(line.words)
-        copy.append(_numbered_line(line, words, name, tags))
+        else:
+            started = started or bool(line.words)
+            words = "" if line.optional and block_delete else line.words
+            copy.append(_numbered_line(line, words, Place(name, line.number)))
     return "\n".join([*copy, "M2", ""])
 
 
-def _numbered_line(line: Line, words: str, name: str, tags: bool) -> str:
-    aborts = any("".join(text.split()).lower().startswith(ABORT) for _, text in line.comments)
-    if not words and not aborts:
-        return ""
-    place = Place(name, line.number)
+def _numbered_line(line: Line, words: str, place: Place) -> str:
     if words.startswith(BARE_NUMBER):
         raise place.fail(f"a block that begins with a number: {words[:20]!r}", "a letter before each number")
-    comment = ""
-    if aborts:
-        comment = f"({ABORT}stopped by the program)"
-    elif tags and not words.startswith("O"):  # after an O word some forms take no comment
-        comment = f"({line.number})"
-    text = f"N{line.number}{words}{comment}"
+    comment = "" if words[:1] in ("", "O") else f"({line.number})"  # after an O word some forms take no comment
+    if ABORTS.search(line.text):
+        comment = "(abort,stopped by the program)"
+    text = f"N{line.number}{words}{comment}" if words or comment else ""
     if len(text) > LONGEST_LINE:
         problem = f"a line of {len(text)} characters without blanks and comments"
         raise place.fail(problem, f"at most {LONGEST_LINE}, as LinuxCNC reads")
     return text
-
-
-# A block that moves in program coordinates, in the modes in force, and says where by numbers alone.
-PLAIN_BLOCK = re.compile(r"(?:G0*[0-3](?![\d.])|[XYZABCIJKRFSP][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII)
-COORDINATE = re.compile(r"([XYZ])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
-
-
-def step_in_words(lines: Sequence[Line], number: int, axes: Sequence[str]) -> list[float] | None:
-    """Distances by which a line (from 1) moves along some axes in G90, by the words alone, in program units.
-
-    None where the words do not say it: they are computed, or other codes stand between the two numbers of an axis.
-    """
-    wanted: dict[str, str] = dict(COORDINATE.findall(lines[number - 1].words))
-    steps = {axis: 0.0 for axis in axes if axis not in wanted}
-    for line in reversed(lines[:number]):
-        if line.optional or PLAIN_BLOCK.fullmatch(line.words) is None:
-            return None
-        if line.number < number:
-            for axis, value in COORDINATE.findall(line.words):
-                if axis in axes and axis not in steps:
-                    steps[axis] = float(wanted[axis]) - float(value)
-        if len(steps) == len(axes):
-            return [steps[axis] for axis in axes]
-    return None
 
 
 # LinuxCNC's manual, "Parameters": the persistent ones must all be there, in order.

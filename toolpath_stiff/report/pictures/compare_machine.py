@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.compare import Comparison
-from toolpath_stiff.comparison.residuals import directions, planes
+from toolpath_stiff.comparison.residuals import directions, plane_heights_mm, planes
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.colours import DIRECTIONS, GRID, INK, MUTED
 from toolpath_stiff.report.pictures.style import Look, new_figure, panel
@@ -27,7 +27,8 @@ LEFT, PANEL, WIDEST, NARROWEST = 0.8, 4.2, 15.0, 11.6  # inches: margin, a squar
 def machine(comparison: Comparison) -> Figure:
     """Glyphs on the machine from above, plane by plane, and from the front and the right."""
     data, where = comparison.data, planes(comparison.data)
-    order = [*reversed(comparison.summary.by_plane)]
+    heights = plane_heights_mm(data)
+    order = [*reversed(heights)]
     largest = _largest(comparison)
     width = min(max(LEFT + PANEL * len(order), NARROWEST), WIDEST)
     pitch = min((width - LEFT) / len(order), PANEL)
@@ -39,8 +40,7 @@ def machine(comparison: Comparison) -> Figure:
     for i, plane in enumerate(order):
         axes = panel(figure, LEFT + i * pitch, 4.75, pitch - 0.45, pitch - 0.45)
         _from_above(axes, comparison)
-        z = comparison.summary.by_plane[plane].z_mm
-        axes.set_title("from above" if len(order) == 1 else _plane_title(plane, z), fontsize=10)
+        axes.set_title("from above" if len(order) == 1 else _plane_title(plane, heights[plane]), fontsize=10)
         axes.set_xlabel("X mm", fontsize=9)
         axes.set_ylabel("" if i else "Y mm", fontsize=9)
         _glyphs(axes, comparison, mm_from_m(data.position[:, :2]), where == plane, largest)

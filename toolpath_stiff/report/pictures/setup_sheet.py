@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from toolpath_stiff.placement.result import Placement, Written
+from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.report.colours import BLUE, INK, MUTED, ORANGE
 from toolpath_stiff.report.pictures.style import Look, new_figure
 from toolpath_stiff.report.words import machine_text, plain
@@ -49,7 +49,7 @@ def setup_sheet(placed: Placement) -> Figure:
 
 def _heading(figure: Figure, placed: Placement) -> float:
     """Title and machine; returns how far down the page it reaches."""
-    title = textwrap.wrap(f"Set-up of {plain(placed.program.name)}", 52)
+    title = textwrap.wrap(f"Set-up of {plain(placed.best.program.name)}", 52)
     which = "picked from the front" if placed.picked else f"recommended, objective {placed.objective}"
     machine = f"machine {machine_text(placed.machine_stated)}: {plain(placed.best.machine.title)}"
     about = [*textwrap.wrap(machine, FULL_LETTERS), f"placement {placed.chosen.number} of {len(placed.front)}, {which}"]
@@ -83,7 +83,7 @@ def _rows(placed: Placement) -> list[tuple[str, list[str]]]:
         "heights of the cut": f"Z {heights.min():.3f} to {heights.max():.3f} mm (machine)",
         "LinuxCNC": blocks.linuxcnc or blocks.linuxcnc_reason,
         "Fanuc-style": (blocks.fanuc or blocks.fanuc_reason) + (f"\n{G68_NOTE}" if "G68" in blocks.fanuc else ""),
-        "program written": placed.written.file if isinstance(placed.written, Written) else "",
+        "program written": placed.written.file if placed.written and not placed.refusal else "",
         "mean stiffness": both("mean_N_per_mm"),
         "range": both("range_N_per_mm"),
         "weakest place": both("min_N_per_mm"),

@@ -102,7 +102,7 @@ def fits(update: Update) -> Figure:
     """Where model and measurements differ, before and after."""
     first, last = update.steps[0], update.steps[-1]
     held_out, refitted = update.document["steps"][-1]["held_out_error_percent"], 100.0 * update.refitted.error
-    return before_after(Fits(update.data.of_tip, first.residual, last.residual, last.title, held_out, refitted))
+    return before_after(Fits(update.task.data.of_tip, first.residual, last.residual, last.title, held_out, refitted))
 
 
 PICTURES = {"ladder.png": error_ladder, "before_after.png": fits, "figure3.png": figure3}
