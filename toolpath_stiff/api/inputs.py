@@ -15,45 +15,11 @@ FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0
 
 # Options that several functions share.
-Step = Annotated[float, Option("--step", "mm", above=0, at_most=1000, help="Largest distance of two samples.")]
-Force = Annotated[
-    float,
-    Option(
-        "--force",
-        "N",
-        above=0,
-        at_most=1e6,
-        help="Load at the tool tip: for deflections, and for effects that depend on it.",
-    ),
-]
-LoadDirection = Annotated[
-    str,
-    Option(
-        "--load",
-        "DIRECTION",
-        help="Direction of the load: tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ.",
-    ),
-]
-Origin = Annotated[
-    Sequence[float] | None,
-    Option(
-        "--origin",
-        "X,Y,Z[,A,B,C]",
-        read=numbers,
-        help="Where program zero (G54) sits in machine coordinates, mm and degrees. Unless given, where the program's "
-        "G10 says, else the machine's default.",
-    ),
-]
-Linearised = Annotated[
-    float | None,
-    Option(
-        "--linearise",
-        "mm",
-        above=0,
-        at_most=10,
-        help="Write arcs that the turn takes out of the planes as straight moves within so much; else refuse them.",
-    ),
-]
+Step = Annotated[float, Option("--step", "mm", above=0, at_most=1000)]
+Force = Annotated[float, Option("--force", "N", above=0, at_most=1e6)]
+LoadDirection = Annotated[str, Option("--load", "DIRECTION")]
+Origin = Annotated[Sequence[float] | None, Option("--origin", "X,Y,Z[,A,B,C]", read=numbers)]
+Linearised = Annotated[float | None, Option("--linearise", "mm", above=0, at_most=10)]
 
 
 def finite(name: str, value: Any) -> float:

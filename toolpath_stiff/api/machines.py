@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from toolpath_stiff.analysis.machine_check import MachineCheck
-from toolpath_stiff.analysis.machine_check import check_machine as look
+from toolpath_stiff.analysis.machine_check import MachineCheck, check_machine
 from toolpath_stiff.analysis.poses import reach_along
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
@@ -40,26 +39,6 @@ def _named(text: str) -> str:
     return text.strip()
 
 
-Setup = Annotated[
-    str | None,
-    Option(
-        "--setup",
-        "NAME",
-        read=_named,
-        help="Set-up that is on the machine, for effects that belong to one; none: a set-up without a name. "
-        "Unless given, the controller file's, else the machine file's.",
-    ),
-]
-Temperature = Annotated[
-    float | None,
-    Option(
-        "--temperature",
-        "C",
-        at_least=-50,
-        at_most=200,
-        help="Degrees Celsius, for effects that need it; unless given, the machine file's.",
-    ),
-]
 FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the paper's Figure 2
 
 
@@ -155,10 +134,22 @@ class Machine(Result):
         return loaded
 
     @checked
-    def under(self, setup: Setup = None, temperature_C: Temperature = None) -> Machine:
-        """The same machine under a set-up and a temperature, as of `load`; None: as the files say.
+    def under(
+        self,
+        setup: Annotated[str | None, Option("--setup", "NAME", read=_named)] = None,
+        temperature_C: Annotated[float | None, Option("--temperature", "C", at_least=-50, at_most=200)] = None,
+    ) -> Machine:
+        """The same machine under a set-up and a temperature.
 
         Whether an effect knows the set-up is checked where it matters: beside a second machine one of them has to.
+
+        Parameters
+        ----------
+        setup
+            Set-up that is on the machine, for effects that belong to one; none: a set-up without a name. Unless given,
+            the controller file's, else the machine file's.
+        temperature_C
+            Degrees Celsius, for effects that need it; unless given, the machine file's.
 
         Examples
         --------
@@ -394,7 +385,7 @@ class Machine(Result):
         >>> machine.check()
         <MachineCheck: nist, 0 wrong, 0 doubtful>
         """
-        return check_machine(self)
+        return check_machine(self.running(), self.asked)
 
     def save(self, file: str | Path) -> Path:
         """Write the machine file, effects included, whole or not at all.
@@ -431,21 +422,3 @@ def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects
 def machine_from(machine: Machine | str | Path) -> Machine:
     """A machine, loaded if it is a name or a file."""
     return machine if isinstance(machine, Machine) else Machine.load(machine)
-
-
-def check_machine(machine: Machine | str | Path) -> MachineCheck:
-    """Look for slips in a machine's figures: units, signs, mirrored joints; what its effects wait for.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read as a machine at all.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.Machine.load("nist").check().good
-    True
-    """
-    on = machine_from(machine)
-    return look(on.running(), on.asked)

@@ -13,35 +13,18 @@ from toolpath_stiff.api.measurements import Measurements
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_bytes, write_atomically
-from toolpath_stiff.locks import announce, forget
 from toolpath_stiff.readings.measurements import NIST_TABLE_1
 
-JOURNAL = ".tps-adding"  # what a step is about to bring into these rooms, until case.toml names it
-
-
-EXERCISE = "exercise"  # a folder; the other rooms hold files
-
-
-ROOMS = ("machines", "data", "programs", "effects", EXERCISE)
-
-
 UNSAFE = re.compile(r"[^\w.+-]+", re.ASCII)
-
-
 LONGEST_NAME = 80
 
 
-ENTRY = re.compile(r".+:[0-9]{1,9}")  # a reading that was set aside: file and line
-
-
 def free_name(folder: Path, name: str) -> str:
-    """The name, or the next one with a number that the folder does not have yet; noted, where it is of a room."""
+    """The name, or the next one with a number that the folder does not have yet."""
     path, number = Path(name), 1
     while (folder / name).exists():
         number += 1
         name = str(path.with_name(f"{path.stem}-{number}{path.suffix}"))
-    if room_of(name) in ROOMS:
-        announce(folder / JOURNAL, name)
     return name
 
 
@@ -49,12 +32,6 @@ def drop(folder: Path, *names: str) -> None:
     """Take files away again that turned out to be of no use."""
     for name in names:
         (folder / name).unlink()
-    forget(folder / JOURNAL)
-
-
-def room_of(name: str) -> str:
-    """The room of a case that a file is in; "exercise" and "exercise-2" are one."""
-    return name.partition("/")[0].partition("-")[0]
 
 
 def first_name(name: str) -> str:

@@ -2,44 +2,30 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from toolpath_stiff.api.effects import effects
-from toolpath_stiff.api.trust import is_agreed
-from toolpath_stiff.case.files import (
-    EXERCISE,
-    JOURNAL,
-    ROOMS,
-    free_name,
-    room_of,
-    sha256,
-    used_name,
-    without_lines,
-    write_files,
-)
-from toolpath_stiff.case.steps import CASE_FILE, TABLES, CaseState, Step, case_text
+from toolpath_stiff.case.files import free_name, sha256, used_name, without_lines, write_files
+from toolpath_stiff.case.steps import CASE_FILE, TABLES, CaseState, Keys, Step, case_text
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import is_file, read_text, write_atomically
-from toolpath_stiff.locks import beside, forget, is_left, remove_parts
-from toolpath_stiff.results_folder import clear_up
+from toolpath_stiff.files import write_atomically
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 def python_line(name: str, positional: Sequence[Any], named: Mapping[str, Any]) -> str:
     """A call of a method of the case; without what only watches it."""
-    shown = [_python(value) for value in positional if not callable(value)]
-    shown += [f"{key}={_python(value)}" for key, value in named.items() if not callable(value) and key != "progress"]
+    words = {"": positional, **{f"{key}=": [value] for key, value in named.items() if key != "progress"}}
+    shown = [
+        f"{key}{str(value) if isinstance(value, Path) else value!r}"
+        for key, values in words.items()
+        for value in values
+        if not callable(value)
+    ]
     return f"case.{name}({', '.join(shown)})"
-
-
-def _python(value: Any) -> str:
-    return repr(str(value) if isinstance(value, Path) else value)
 
 
 def recorded(method: Method) -> Method:
@@ -72,29 +58,6 @@ class History:
 
     def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
         self.folder, self._steps, self._done, self._written = folder, list(steps), done, text
-        self._clear_up()
-
-    def _clear_up(self) -> None:
-        """Take away what a killed step brought, and no step names."""
-        journal = self.folder / JOURNAL
-        if not is_left(journal):
-            return
-        remove_parts(beside(self.folder / CASE_FILE, "part-"))
-        known = {name for step in self._steps for name in (*step.files, step.change.get("exercise"))}
-        here = self.folder.resolve()
-        for name in read_text(journal, "journal").splitlines():
-            file = self.folder / name
-            # A case may come from somebody else: nothing outside its rooms is touched.
-            inside = file.parent.is_dir() and file.parent.resolve().is_relative_to(here) and ".." not in file.parts
-            if not inside or room_of(name) not in ROOMS:
-                continue
-            remove_parts(beside(file, "part-"))
-            if name not in known and file.is_file():
-                file.unlink()
-            elif name not in known and room_of(name) == EXERCISE and file.parent == self.folder:
-                clear_up([file])
-                shutil.rmtree(file, ignore_errors=True)
-        forget(journal)
 
     @property
     def history(self) -> list[Step]:
@@ -107,32 +70,12 @@ class History:
         return self._steps[self._done :]
 
     @property
-    def recorded(self) -> CaseState:
-        """What holds now as the steps say it."""
+    def state(self) -> CaseState:
+        """What holds now."""
         state = CaseState()
         for step in self.history:
             state = replace(state, **step.change)
         return state
-
-    @property
-    def state(self) -> CaseState:
-        """What holds now: without the files of own effects that this user has not agreed to run, and their effects."""
-        state, off = self.recorded, self.not_agreed
-        if not off:
-            return state
-        kept = tuple(name for name in state.effects if name not in off)
-        return replace(state, effects=kept, on=self._known(state.on, kept))
-
-    def _known(self, on: Mapping[str, Mapping[str, Any]], files: Iterable[str]) -> dict[str, Mapping[str, Any]]:
-        """Those of the effects that are known with these files of own ones."""
-        known = {effect.name for effect in effects([self.path(name) for name in files]).effects}
-        return {name: keys for name, keys in on.items() if name in known}
-
-    @property
-    def not_agreed(self) -> tuple[str, ...]:
-        """The files of own effects whose code is not run: this user has not agreed to what they hold; see `trust`."""
-        files = {name: self.folder / name for name in self.recorded.effects}
-        return tuple(name for name, file in files.items() if not is_file(file) or not is_agreed(file.read_bytes()))
 
     def path(self, name: str) -> str:
         """A file of the case, as functions and commands take it."""
@@ -160,10 +103,10 @@ class History:
         self,
         kind: str,
         text: str,
-        *,
-        change: Mapping[str, Any] | None = None,
-        files: Sequence[str] = (),
         command: str = "",
+        *,
+        change: Keys | None = None,
+        files: Sequence[str] = (),
         python: str = "",
         result: str = "",
     ) -> None:
@@ -177,7 +120,6 @@ class History:
         step = Step(kind, text, command, python, dict(change or {}), sums, result)
         self._steps = [*self.history, step, *(() if change else self.undone)]
         self._done += 1
-        self._rewrite_used()
         self._save()
 
     def next_result(self, kind: str) -> str:
@@ -186,18 +128,18 @@ class History:
 
     def check_files(self) -> None:
         """Raise `InputError` for a file of the case that is gone, or is not what its step wrote."""
-        state = self.recorded
+        state = self.state
         tables = {str(state.reading[name]) for name in TABLES if name in state.reading}
-        needed = {state.machine, state.program, *state.effects, *state.data, *tables} - {""}
-        for name, known in {n: s for step in self.history for n, s in step.files.items()}.items():
+        needed = {state.machine, state.program, *state.effects, *state.data, *tables}
+        for name, known in {name: known for step in self.history for name, known in step.files.items()}.items():
             file = self.folder / name
             if name in needed and (not file.is_file() or sha256(file.read_bytes()) != known):
                 what = "is not what was put into the case" if file.is_file() else "is gone"
                 raise InputError(f"{name} {what}", hint="bring the file back, or begin another case", file=str(file))
 
-    def _rewrite_used(self, state: CaseState | None = None) -> None:
+    def _rewrite_used(self, state: CaseState) -> None:
         """Files in used/ as the state has them: after undo and redo too."""
-        for file, lines in (state or self.state).lines_aside.items():
+        for file, lines in state.lines_aside.items():
             write_files(self.folder, {used_name(file): without_lines(self.folder / file, lines)})
 
     def _save(self) -> None:
@@ -206,7 +148,6 @@ class History:
             raise InputError(
                 f"{CASE_FILE} was changed by another program since it was opened", hint="open the case again"
             )
-        self._rewrite_used()
+        self._rewrite_used(self.state)
         self._written = case_text(self._steps, self._done)
         write_atomically(file, self._written)
-        forget(self.folder / JOURNAL)

@@ -74,6 +74,13 @@ def analyze(
     ----------
     programs
         NC program or cutter-location file, or a folder of them.
+    table
+        Format of the samples.
+    show_plunges
+        Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).
+    jobs
+        Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each
+        available CPU.
     cluster
         Hand the programs to the workers of a Dask cluster instead, one program a task; ADDRESS is its scheduler's, as
         tcp://10.0.0.5:8786. Workers must see the programs and --out by the same paths (pip install

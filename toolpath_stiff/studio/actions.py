@@ -157,7 +157,6 @@ ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {
     "hand": _by_hand,
     "at": lambda session, origin: session.trial().at(origin),
     "switch": lambda session, effect, values: session.case.switch(str(effect), values),
-    "trust": lambda session, file: session.case.trust(str(file)),
     "aside": _aside,
     "fit": _fit,
     "accept": _accept,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 import webbrowser
 from collections.abc import Sequence
@@ -16,7 +15,6 @@ from toolpath_stiff.case.steps import CASE_FILE
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
-from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.studio.server import Studio
 from toolpath_stiff.studio.session import Session
 
@@ -33,18 +31,6 @@ def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise
     if exercise is not None:
         case.start_exercise(exercise)
     return case
-
-
-def ask_for_effects(case: Case, folder: str) -> None:
-    """Ask on the terminal, by file, whether code that came with the case may be run; say what is off without it."""
-    for name in case.not_agreed:
-        file = case.path(name)
-        print(f"{file} is code that came with the case, and you have not agreed to run it: its effects are off.")
-        if sys.stdin.isatty() and sys.stdout.isatty():
-            if input("Have you read it, and shall it be run? [y/N] ").strip().lower() in ("y", "yes"):
-                case.trust(name)
-        else:
-            print(f"When you have read it: {command_line('studio', *options(case=folder, trust=name))}")
 
 
 def locked(folder: Path) -> IO[str]:

@@ -102,13 +102,6 @@ function ownEffects(state, act) {
     const area = h("textarea", { id: `own-${k}`, rows: 16, spellcheck: "false", "aria-label": `Text of ${own.file}`,
       "aria-describedby": `own-fault-${k}` });
     area.value = drafts.get(own.file) ?? own.text;
-    if (own.off) {
-      Object.assign(area, { value: own.text, readOnly: true });
-      return h("div", { class: "own" }, h("p", { class: "warning", id: `own-off-${k}` }, h("code", {}, own.file),
-        " is code that came with the case, and you have not agreed to run it: its effects are off."), area,
-        h("div", { class: "actions live" }, button("I have read it: run it", () => act({ do: "trust", file: own.file }),
-          { id: `own-trust-${k}` })));
-    }
     area.addEventListener("input", () => drafts.set(own.file, area.value));
     const save = () => { drafts.delete(own.file); act({ do: "save_effect", file: own.file, text: area.value }); };
     return h("div", { class: "own" }, h("code", {}, own.file), own.copy

@@ -287,10 +287,6 @@ function draw() {
   $("sentence").classList.toggle("waiting", Boolean(waiting));
   $("sentence").replaceChildren(waiting || `${v.sentence}.`, v ? h("small", {}, v.text) : "");
   $("gauge").replaceChildren(gaugeOf(state));
-  const off = state.own_effects.filter((one) => one.off).map((one) => one.file);
-  $("off").hidden = !off.length;
-  $("off").textContent =
-    `Off, as it is code that you have not agreed to run: ${off.join(", ")}. It stands under Effects.`;
   for (const [id, many] of [["undo", state.history.length > 1], ["redo", state.undone.length]]) if ($(id)) $(
     id).disabled = !many;
   scene.paths = [];
