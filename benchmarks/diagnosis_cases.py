@@ -113,7 +113,7 @@ def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: 
     file = folder / "measurements.csv"
     file.write_text(exercise.csv_text(rows), encoding="utf-8")
     start = time.process_time()
-    diagnosis = diagnose(machine(), read_measurements(file, machine()), plan_next=False, **stated)
+    diagnosis = diagnose(machine(), read_measurements(file, machine()), **stated)
     found = diagnosis.to_dict()
     cpu = time.process_time() - start
     record = {
@@ -176,7 +176,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
     case = case_module.draw_case(job.seed, job.layout, hidden=job.hidden)
     file = folder / "measurements.csv"
     file.write_text(exercise.csv_text(case.rows), encoding="utf-8")
-    before = diagnose(machine(), read_measurements(file, machine()), plan_next=False)
+    before = diagnose(machine(), read_measurements(file, machine()))
     truth = case.truth["hidden"][0]
     record: Record = {"truth": [truth], "effects": case.truth["effects"], "plausible": list(before.plausible)}
     plans = {n: _plan(before, n) for n in POSES}
@@ -207,7 +207,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
         for label, further, clamps in (("planned", chosen, kept), ("random", random, list(range(n)))):
             more = folder / f"{label}_{n}.csv"
             more.write_text(_rows_of_clamps(further, clamps), encoding="utf-8")
-            after = diagnose(machine(), read_measurements([file, more], machine()), plan_next=False)
+            after = diagnose(machine(), read_measurements([file, more], machine()))
             settled = after.verdict == "identified" and after.plausible == [truth]
             record[f"{label}_{n}"] = [after.verdict, list(after.plausible), settled]
     return record

@@ -70,11 +70,11 @@ def _drafted(job: Job, folder: Path) -> dict[str, Any]:
     tables = {"same": case.rows}
     if job.hidden != NOISE:
         # The same seed: the same poses, struts, joints and scatter.
-        tables["gone"] = case_module.draw_case(job.seed, "tilted", "none", nuisances=Nuisances()).rows
+        tables["gone"] = case_module.draw_case(job.seed, "tilted", "none", noise=Nuisances()).rows
     old = np.asarray(case.rows["clamp"]) % 2 == 0
     file = folder / "old.csv"
     file.write_text(exercise.csv_text({name: np.asarray(values)[old] for name, values in case.rows.items()}))
-    before = diagnose(machine(), read_measurements(file, machine()), noise=noise, plan_next=False)
+    before = diagnose(machine(), read_measurements(file, machine()), noise=noise)
     made = draft(before, "missing.toml")
     links = [] if not made.text or before.portrait is None else [one.term.link for one in before.portrait.terms]
     truth = [link for effect in case.truth["effects"] for link in effect["links"]]

@@ -82,7 +82,7 @@ def _planned(seed: int, hidden: str, folder: Path) -> Record:
     tip = folder / "tip.csv"
     tip.write_text(csv_text(case.rows))
     data = read_measurements(str(tip), machine)
-    before = diagnose(machine, data, plan_next=False)
+    before = diagnose(machine, data)
     if before.verdict != "ambiguous" and hidden != "joint_compliance":
         return {}
     proposal = plan(machine, data, replace(Menu.of(data), indicators=True), n=POSES, judgement=before.main)
@@ -95,7 +95,7 @@ def _planned(seed: int, hidden: str, folder: Path) -> Record:
         files = files or taken
         needed = _needed(folder, taken)
         minutes.append(visits.minutes(some[:needed]))
-    after = diagnose(machine, read_measurements([str(tip), *files], machine), plan_next=False)
+    after = diagnose(machine, read_measurements([str(tip), *files], machine))
     outlook = proposal.choice.after
     rivals = [rival.name for rival in proposal.choice.rivals]
     true = " + ".join(sorted(case.truth["hidden"]))

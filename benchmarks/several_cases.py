@@ -90,7 +90,7 @@ def run(job: Job) -> dict[str, Any]:
 def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     """Draw, disturb, diagnose, and what the document says of noise and rows."""
     nuisances = Nuisances(outliers=job.outliers)
-    case = rig.draw_case(job.seed, job.layout, HIDDEN[job.hidden], size=SIZES[job.hidden], nuisances=nuisances)
+    case = rig.draw_case(job.seed, job.layout, HIDDEN[job.hidden], size=SIZES[job.hidden], noise=nuisances)
     rows, truth, stated = case.rows, dict(case.truth), {}
     more: dict[str, Any] = {}
     if job.way == "column":

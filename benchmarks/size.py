@@ -152,7 +152,7 @@ def writing(report: Report, lines: int, rounds: int) -> None:
     import pyarrow.csv as pc
     import pyarrow.parquet as pq
 
-    from toolpath_stiff.analysis import analyze
+    from toolpath_stiff.analysis.results import analyze
     from toolpath_stiff.analysis.statistics import sample_columns, samples_csv, samples_parquet
     from toolpath_stiff.machine.file import load_machine
 

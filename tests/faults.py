@@ -14,11 +14,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from unittest import mock
 
-from toolpath_stiff import files, locks, results_folder
+from toolpath_stiff import files
 
-# What changes a disk. `os.open` counts where it makes a file.
-CALLS = ("open", "write", "fsync", "rename", "replace", "link", "unlink", "mkdir", "rmdir", "chmod", "ftruncate")
-ON_A_FULL_DISK = ("open", "write", "fsync", "link", "mkdir", "exchange")  # taking away and renaming go on
+CALLS = ("fsync", "rename", "replace", "unlink", "mkdir", "rmdir")  # what changes a disk; a file is flushed once
+ON_A_FULL_DISK = ("fsync", "mkdir")  # taking away and renaming go on
 TRAILING = 5000  # more points than any run has
 
 
@@ -30,17 +29,13 @@ def points(act: Callable[[int, str], None]) -> Iterator[None]:
     def watched(name: str, real: Callable[..., object]) -> Callable[..., object]:
         def call(*args: object, **kwargs: object) -> object:
             nonlocal count
-            if name != "open" or int(args[1]) & os.O_CREAT:  # type: ignore[call-overload]
-                count += 1
-                act(count, name)
+            count += 1
+            act(count, name)
             return real(*args, **kwargs)
 
         return call
 
-    with (
-        mock.patch.multiple(os, **{name: watched(name, getattr(os, name)) for name in CALLS}),
-        mock.patch.object(results_folder, "exchange", watched("exchange", results_folder.exchange)),
-    ):
+    with mock.patch.multiple(os, **{name: watched(name, getattr(os, name)) for name in CALLS}):
         yield
 
 
@@ -84,13 +79,13 @@ _heard: list[list[tuple[str, bool]]] = []  # the list of who listens now; a firs
 
 
 def _listen(event: str, args: tuple[object, ...]) -> None:
-    """An audit hook, which stays for good: what is opened to be written, and whether `files` or `locks` does it."""
+    """An audit hook, which stays for good: what is opened to be written, and whether `files` does it."""
     if len(_heard) < 2 or event != "open" or not isinstance(args[0], str | os.PathLike):
         return
     if isinstance(args[2], int) and args[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
         frame, within = sys._getframe(), False
         while frame is not None and not within:
-            within, frame = frame.f_code.co_filename in (files.__file__, locks.__file__), frame.f_back
+            within, frame = frame.f_code.co_filename == files.__file__, frame.f_back
         _heard[-1].append((os.path.realpath(os.fspath(args[0])), within))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.placement.case_study import LOW_MM, case_study_program, conclusions, origin_of, run_case_study

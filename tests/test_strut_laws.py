@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
+from tests.stiffness import reference
 from toolpath_stiff.analysis.machine_check import check_machine
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.comparison.compare import compare
@@ -28,7 +29,7 @@ from toolpath_stiff.rig import campaigns, case, exercise
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import parse_nominal
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import compiled, core, truss
+from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import build_model, with_parameter_moved
 
 NIST = packaged_machines()["nist"].read_text()
@@ -106,10 +107,8 @@ def test_a_collinear_table_scales_as_the_linear_law():
 
 
 @pytest.mark.parametrize(("machine", "linear"), PAIRS, ids=NAMES)
-@pytest.mark.parametrize("route", ["exact", "closed_form", "compiled"])
+@pytest.mark.parametrize("route", ["exact", "closed_form"])
 def test_equal_laws_give_equal_tip_compliances(machine, linear, route):
-    if route == "compiled" and not compiled.available():
-        pytest.skip("numba is not installed")
     position, rotation = poses(300)
     found, expected = (
         core.tip_compliance(build_model(one), position, rotation, route=route) for one in (machine, linear)
@@ -121,14 +120,12 @@ def test_a_table_by_the_fast_routes_the_exact_one_and_the_assembled_truss():
     position, rotation = poses(300)
     model = build_model(TABLE)
     exact = core.tip_compliance(model, position, rotation, route="exact")
-    for route in ("closed_form", "compiled"):
-        found = core.tip_compliance(model, position, rotation, route=route)
-        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
+    found = core.tip_compliance(model, position, rotation, route="closed_form")
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
     stiff = TABLE.with_changes(platform_bar_stiffness=1e13)
     for i in range(3):
-        np.testing.assert_allclose(
-            truss.tip_compliance(stiff, position[i], rotation[i]), exact[i], rtol=0, atol=1e-4 * np.abs(exact[i]).max()
-        )
+        assembled = reference.tip_compliance(stiff, position[i], rotation[i])
+        np.testing.assert_allclose(assembled, exact[i], rtol=0, atol=1e-4 * np.abs(exact[i]).max())
     assert core.choose_route(model, 10**7) == "closed_form"
     assert np.abs(exact / core.tip_compliance(build_model(LINEAR), position, rotation) - 1.0).max() > 0.01
 
@@ -209,12 +206,12 @@ def test_what_is_said_of_the_law():
     value, unit = {row[0]: row[1:3] for row in machine_figures(TABLE)}["strut stiffness"]
     assert value.startswith("46.5 N/um at 2561.6 mm, 45 N/um at 2700, ") and unit == "mm, linear between"
     run = parse_program(SLOT)
-    said = [analyze(build_model(one), run).assumptions for one in (CONSTANT_MACHINE, TABLE)]
+    said = [analyze(build_model(one), run).to_dict()["assumptions"] for one in (CONSTANT_MACHINE, TABLE)]
     assert any("the same at every length" in line for line in said[0])
     assert any("extrapolated outside 2561.6 to 3213.2 mm" in line for line in said[1])
     assert not check_machine(build_model(CONSTANT_MACHINE)).wrong
     soft = check_machine(build_model(machine_with("stiffness_N_per_um = 0.04"))).wrong
-    assert len(soft) == 1 and "if it is in kN/um" in soft[0]
+    assert len(soft) == 1 and "is it in kN/um?" in soft[0]
 
 
 def test_a_parameter_of_a_constant_law():
@@ -297,6 +294,5 @@ def test_compare_refits_the_law_too(law):
     found = compare(machine_with(law), campaign(law)[1], draws=50)
     figures = found.document["baseline"]["strut_law_refitted"]
     assert figures["mean_abs_error_percent"] < 2.0
-    assert figures["excess_scatter_percent"] is not None
-    assert len(figures["strut_law"]["N_per_um"]) == (1 if law == CONSTANT else 2)
+    assert len(figures["N_per_um"]) == (1 if law == CONSTANT else 2)
     assert "strut law refitted: " in compare_text(found)

@@ -6,25 +6,26 @@ import errno
 import itertools
 import os
 import stat
-import sys
-import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
 from toolpath_stiff.errors import FileError
-from toolpath_stiff.locks import beside, hold, is_at, reason, remove_parts, writing_errors
 
 NOT_WINDOWS = frozenset(b"\x81\x8d\x8f\x90\x9d")  # bytes that Windows' Latin-1 (cp1252) leaves undefined
 LARGEST_BYTES = 1 << 30  # of a file that is read
 BLOCK = 1 << 20  # bytes written at once
-NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)  # the last is Windows'
-# renameat2(2); what says that this file system, or this folder, cannot be exchanged
-AT_FDCWD, RENAME_EXCHANGE = -100, 2
-NOT_EXCHANGED = (errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.EPERM, errno.EACCES, errno.EBUSY, errno.EXDEV)
 
 Content = str | bytes | Iterable[str | bytes]
+
+
+@contextmanager
+def writing_errors(path: str | Path, what: str = "write") -> Iterator[None]:
+    """An error of the system becomes an `InputError`."""
+    try:
+        yield
+    except OSError as error:
+        raise FileError(f"cannot {what} {str(path)!r}: {error.strerror or error}") from None
 
 
 def write_atomically(path: str | Path, content: Content) -> Path:
@@ -37,157 +38,37 @@ def write_atomically(path: str | Path, content: Content) -> Path:
     InputError
         The file cannot be written.
     """
-    with written_beside({path: content}) as put:
-        put()
-    return Path(path)
-
-
-@contextmanager
-def written_beside(contents: Mapping[str | Path, Content]) -> Iterator[Callable[[], None]]:
-    """Write files beside their places; what is yielded puts all of them there. Rules and errors: `write_atomically`."""
-    with ExitStack() as stack:
-        steps = []
-        for path, content in contents.items():
-            with writing_errors(path):
-                steps.append(stack.enter_context(_beside_its_place(Path(path), content)))
-
-        def put() -> None:
-            for path, step in zip(contents, steps, strict=True):
-                with writing_errors(path):
-                    step()
-
-        yield put
-
-
-@contextmanager
-def _beside_its_place(path: Path, content: Content) -> Iterator[Callable[[], None]]:
-    if path.exists() and not path.is_file() and not path.is_dir():
-
-        def to_device() -> None:
-            with path.open("wb") as stream:
+    place, target = Path(path), Path(os.path.realpath(path))
+    with writing_errors(path):
+        if place.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if place.exists() and not place.is_file():
+            with place.open("wb") as stream:
                 stream.writelines(encoded(content))
-
-        yield to_device
-        return
-    target = Path(os.path.realpath(path))
-    if target.is_symlink() or target.is_dir():  # realpath leaves nothing else a link
-        code = errno.ELOOP if target.is_symlink() else errno.EISDIR
-        raise OSError(code, os.strerror(code))
-    target.parent.mkdir(parents=True, exist_ok=True)
-    prefix = beside(target, "part-")
-    remove_parts(prefix)
-    handle, temporary = _new_file(prefix)
-    with os.fdopen(handle, "wb") as held:
+            return place
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part = target.with_name(f".tps-part-{os.urandom(4).hex()}")
         try:
-            _write(handle, content)
-            yield lambda: _put(held, temporary, target)
-        finally:
-            if temporary.exists():
-                with suppress(OSError):  # the next run takes it away
-                    temporary.unlink()
+            write_new(part, content)
+            part.replace(target)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+    return place
 
 
-def _put(held: BinaryIO, temporary: Path, target: Path) -> None:
-    if sys.platform == "win32":  # where an open file cannot be renamed
-        held.close()
-    temporary.replace(target)
-    sync_folder(target.parent)
-
-
-def _new_file(prefix: Path) -> tuple[int, Path]:
-    """An open file of a new name, held by this process."""
-    while True:
-        path = prefix.with_name(prefix.name + os.urandom(4).hex())
-        handle = os.open(path, NEW_FILE, 0o666)
-        hold(handle)
-        if is_at(path, handle):  # not taken away by another run between the two calls
-            return handle, path
-        os.close(handle)
-
-
-def write_file(path: Path, content: Content) -> str:
-    """Write a new file where nobody else looks, and flush it to the disk; its `checksum`."""
-    handle = os.open(path, NEW_FILE, 0o666)
-    try:
-        return _write(handle, content)
-    finally:
-        os.close(handle)
-
-
-def _write(handle: int, content: Content) -> str:
-    crc = size = 0
-    for block in _blocks(encoded(content)):
-        crc, size = zlib.crc32(block, crc), size + len(block)
-        rest = memoryview(block)
-        while rest:
-            rest = rest[os.write(handle, rest) :]
-    os.fsync(handle)
-    return f"{crc:08x}-{size}"
-
-
-def checksum(path: Path) -> str:
-    """CRC-32 and length of a file's content, by which an edit is seen. Raises `OSError`.
-
-    A file that grew or shrank has another length, and CRC-32 misses one in 4e9 of the other changes (none within 32
-    bits; Peterson and Brown, "Cyclic codes for error detection", Proc. IRE 49 (1961) 228). Against somebody who forges
-    a file nothing is to be kept here, and SHA-256 of a table of a million lines takes as long as its pictures.
-    """
-    crc = size = 0
-    with path.open("rb", buffering=0) as stream:
-        while block := stream.read(BLOCK):
-            crc, size = zlib.crc32(block, crc), size + len(block)
-    return f"{crc:08x}-{size}"
-
-
-def _blocks(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """The pieces, small ones together."""
-    held = bytearray()
-    for piece in pieces:
-        if len(piece) >= BLOCK and not held:
-            yield piece
-            continue
-        held += piece
-        if len(held) >= BLOCK:
-            yield bytes(held)
-            held.clear()
-    if held:
-        yield bytes(held)
-
-
-def sync_folder(folder: Path) -> None:
-    """Flush the names in a folder to the disk, where the system can."""
-    with suppress(OSError):  # a folder that may not be read, a file system that knows no such thing
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-
-
-def exchange(new: Path, old: Path) -> bool:
-    """Exchange two folders of one file system in one step; False where that cannot be done."""
-    if sys.platform != "linux":
-        return False
-    import ctypes
-
-    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    if rename is None:
-        return False
-    if rename(AT_FDCWD, os.fsencode(new), AT_FDCWD, os.fsencode(old), RENAME_EXCHANGE) == 0:
-        return True
-    code = ctypes.get_errno()
-    if code in NOT_EXCHANGED:
-        return False
-    raise OSError(code, os.strerror(code), str(old))
+def write_new(path: Path, content: Content) -> None:
+    """Write a new file where nobody else looks, and flush it to the disk. Raises `OSError`."""
+    with path.open("xb", buffering=BLOCK) as stream:
+        stream.writelines(encoded(content))
+        stream.flush()
+        os.fsync(stream.fileno())
 
 
 def encoded(content: Content) -> Iterator[bytes]:
     """The content as bytes, piece by piece: text as UTF-8."""
-    if isinstance(content, bytes):
-        yield content
-    else:
-        for piece in [content] if isinstance(content, str) else content:
-            yield piece.encode("utf-8", "replace") if isinstance(piece, str) else piece
+    for piece in [content] if isinstance(content, str | bytes) else content:
+        yield piece.encode("utf-8", "replace") if isinstance(piece, str) else piece
 
 
 def is_file(path: str | Path) -> bool:
@@ -203,10 +84,9 @@ def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
     try:
         check_regular(Path(path), pipes=True)
         with Path(path).open("rb") as stream:
-            content = _read(stream, most)
+            content = stream.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        cause = reason(error) if isinstance(error, OSError) else str(error)
-        raise FileError(f"cannot read {what} {str(path)!r}: {cause}") from None
+        raise FileError(f"cannot read {what} {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
     if len(content) > most:
         raise FileError(f"{what} {str(path)!r} has more than {most / 1e6:.0f} MB", hint="is it the right file?")
     return content
@@ -222,18 +102,6 @@ def check_regular(path: Path, pipes: bool = False) -> None:
     shell = pipes and stat.S_ISFIFO(mode) and path.is_absolute() and path.parts[1] in ("dev", "proc")
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or shell):
         raise OSError(errno.EINVAL, "it is not a regular file")
-
-
-def _read(stream: BinaryIO, most: int) -> bytes:
-    """All of it, or a little more than it may have, of a pipe."""
-    state = os.fstat(stream.fileno())
-    if stat.S_ISREG(state.st_mode) and state.st_size <= most:
-        return stream.read()
-    pieces, length = [], 0
-    while length <= most and (piece := stream.read(BLOCK)):
-        pieces.append(piece)
-        length += len(piece)
-    return b"".join(pieces)
 
 
 def decoded(content: bytes) -> str:
@@ -276,13 +144,11 @@ def keep_old(file: str | Path) -> Path | None:
     Raises `InputError` where that cannot be done.
     """
     path = Path(file)
-    if not path.is_file():
-        return None
-    kept = path.with_name(free_name(path.name, lambda name: os.path.lexists(path.with_name(name))))
-    return write_atomically(kept, read_bytes(path, "file"))
+    return write_atomically(old_name(path), read_bytes(path, "file")) if path.is_file() else None
 
 
-def free_name(name: str, taken: Callable[[str], bool]) -> str:
-    """`NAME.old`, or `NAME.old2` and so on, whichever is not taken first."""
+def old_name(file: Path) -> Path:
+    """`NAME.old`, or `NAME.old2` and so on, whichever is free first."""
     numbers = itertools.chain([""], itertools.count(2))
-    return next(free for number in numbers if not taken(free := f"{name}.old{number}"))
+    names: Iterator[Path] = (file.with_name(f"{file.name}.old{number}") for number in numbers)
+    return next(name for name in names if not os.path.lexists(name))

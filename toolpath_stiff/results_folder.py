@@ -1,26 +1,21 @@
-"""A folder of results: the files of one run, written all or none.
+"""A folder of results: the files of one run, and nothing of another.
 
 A small manifest (`.tps-files.json`) names the files that a run wrote, with their checksums. The next run clears
 those, and nothing else: a file that the tool did not write, or that was changed since, is somebody's own. It stays
 where the run has no file of that name, and where it has one, nothing is written at all. A folder without a manifest
 holds nothing of the tool's.
 
-The new files are written into a folder beside it and flushed to the disk. Then the two folders are exchanged, which is
-one step: whatever stops a run, the folder holds the old files or the new. A folder that cannot be exchanged (it has
-folders in it, it is the current one, the file system does not do it) gets its files one by one: an error takes all of
-them back, and what a kill cuts off there the next run carries to its end.
-
-What one exchange cannot hold (reports of many programs, a file elsewhere) is bracketed: the folder holds
-`INCOMPLETE.txt` from before the first of it until after the last, and every command that reads there says so.
+The new files are made in a hidden folder within, which only one run can hold; an error until then leaves the results
+as they were. Then the old ones are taken away and the new ones renamed, and meanwhile `INCOMPLETE.txt` says so: every
+command that reads there asks to run again what was cut off.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import re
 import shutil
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -28,55 +23,30 @@ from pathlib import Path
 from types import MappingProxyType
 
 from toolpath_stiff.errors import FileError
-from toolpath_stiff.files import (
-    Content,
-    check_outputs,
-    checksum,
-    exchange,
-    free_name,
-    sync_folder,
-    write_file,
-    written_beside,
-)
+from toolpath_stiff.files import BLOCK, Content, check_outputs, old_name, write_atomically, write_new, writing_errors
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.locks import beside, locked, writing_errors
+
+try:
+    import fcntl
+except ImportError:  # Windows: there nothing keeps two runs apart
+    fcntl = None  # type: ignore[assignment]
 
 MANIFEST = ".tps-files.json"
-INCOMPLETE = "INCOMPLETE.txt"  # a file of the run like the others, until it comes to its end
-SHA256 = re.compile(r"[0-9a-f]{64}")  # what earlier versions recorded
-STAGE = ".tps-stage"  # the temporary folder of a run, where it lies in the folder itself
-# In the temporary folder of a run: files that are being written; the same when all are there and nothing is left but
-# to move them to their places; what was moved out of their way.
-NEW, WHOLE, GONE = "new", "whole", "gone"
-KEPT = "kept.json"  # beside them: what was in the way -> the name that it gets
+INCOMPLETE = "INCOMPLETE.txt"
+STAGE = ".tps-stage"  # the hidden folder; what a killed run left in it the next run takes away
 _OTHER_FOLDER = f"choose another folder with {both_names('--out')}"
 ELSEWHERE = f"{_OTHER_FOLDER}, or say --replace (replace=True): the old file is kept beside the new one"
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a run of the tool left in a folder.
+    """What a run left in a folder: file name -> `checksum`.
 
-    Attributes
-    ----------
-    command
-        Name of the command, as `analyze`.
-    of
-        What the results are of: names, or paths relative to the folder. Empty where the user named the folder.
-    files
-        File name -> checksums (`files.checksum`) that it may have; SHA-256 in records of earlier versions. Two of a
-        run that was cut off between its renames: the old or the new.
+    `of` says what the results are of: names, or paths relative to the folder. Empty where the user named the folder.
     """
 
-    command: str = ""
     of: tuple[str, ...] = ()
-    files: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-
-    def text(self) -> str:
-        """As JSON; nothing in it depends on when or by whom it was written. Escaped, as names need not be UTF-8."""
-        entries = {name: hashes[0] if len(hashes) == 1 else list(hashes) for name, hashes in self.files.items()}
-        document = {"written_by": f"tps {self.command}", "results_of": list(self.of), "checksums": entries}
-        return json.dumps(document, indent=1) + "\n"
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -127,7 +97,7 @@ def write_folder(
     rules
         What must not be replaced, and what to do about it.
     elsewhere
-        Files of the same run in other folders: made before the folder changes, put in their places right after.
+        Files of the same run in other folders: put in their places right before those of the folder.
     unfinished
         Whether the run goes on to write: the folder is marked as incomplete until its next files.
 
@@ -141,48 +111,93 @@ def write_folder(
     InputError
         A file of such a name is not the tool's, is an input, or the folder cannot be written. Nothing is changed then.
     """
-    target = Path(os.path.realpath(folder))
-    marked: Mapping[str, Content | Callable[[], Content]] = {}
-    if elsewhere or unfinished:
-        files = "".join(f", with {file}" for file in elsewhere)
-        not_yet = "While this file is here, it has not come to its end: run it again."
-        marked = {INCOMPLETE: f"`tps {command}` writes here{files}. {not_yet}\n"}
-    with writing_errors(folder, "write to"), _folders_above(target), locked(_lock(target), repr(str(folder))):
-        _clear_up_held(target)
-        in_the_way = _refused(Path(folder), [*marked, *contents], rules)
-        old = read_manifest(target)
-        outside, inside = _stages(target)
-        stage = outside if not target.is_dir() or _can_be_exchanged(target) else inside
+    target = Path(folder)
+    with writing_errors(folder, "write to"), _made(target.absolute()), _stage(target) as stage:
+        in_the_way = check_folder(target, contents, rules)
+        sums = {}
+        for name, content in contents.items():
+            write_new(stage / name, content() if callable(content) else content)
+            sums[name] = checksum(stage / name)
+        # Nothing in it depends on when or by whom it was written. Escaped, as names need not be UTF-8.
+        document = {"written_by": f"tps {command}", "results_of": _relative(target, rules.of), "checksums": sums}
+        write_new(stage / MANIFEST, json.dumps(document, indent=1) + "\n")
+        note, incomplete_before = target / INCOMPLETE, bool(incomplete(target))
+        if not incomplete_before:
+            write_new(note, f"`tps {command}` writes here. While this file is here, run it again.\n")
         try:
-            new = stage / NEW
-            new.mkdir(parents=True)
-            sums = {
-                name: (write_file(new / name, content() if callable(content) else content),)
-                for name, content in {**marked, **contents}.items()
-            }
-            manifest = Manifest(command, _relative(target, rules.of), sums)
-            write_file(new / MANIFEST, manifest.text())
-            with written_beside(elsewhere) as put_elsewhere:
-                kept = _put(target, stage, old, [file.name for file in in_the_way])
-                put_elsewhere()
-            if elsewhere and not unfinished:
-                (target / INCOMPLETE).unlink()
+            for file, other in elsewhere.items():
+                write_atomically(file, other)
+        except BaseException:
+            if not incomplete_before:
+                note.unlink()
+            raise
+        old = read_manifest(target)
+        for name in old.files:
+            if target / name not in in_the_way and _is_ours(target / name, old):
+                (target / name).unlink()
+        for file in (*in_the_way, *(target / name for name in contents)):
+            if os.path.lexists(file):
+                kept = file.rename(old_name(file))
+                if rules.kept is not None:
+                    rules.kept(file, kept)
+        for name in (MANIFEST, *contents):
+            (stage / name).replace(target / name)
+        if not unfinished:
+            note.unlink()
+    return [target / name for name in contents]
+
+
+@contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """The folder is there; after an error it is taken away again, with those above that were made for it."""
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        for place in made:
+            with suppress(OSError):  # not empty: someone else uses it by now
+                place.rmdir()
+        raise
+
+
+@contextmanager
+def _stage(folder: Path) -> Iterator[Path]:
+    """An empty folder within, of this run alone. Raises `InputError` where another run has it."""
+    stage = folder / STAGE
+    stage.mkdir(exist_ok=True)
+    handle = None if fcntl is None else os.open(stage, os.O_RDONLY)
+    try:
+        if handle is not None and not _held(handle):
+            hint = "wait for it, or choose another folder"
+            raise FileError(f"{str(folder)!r} is being written by another run", hint=hint)
+        try:
+            for left in stage.iterdir():
+                left.unlink()
+            yield stage
         finally:
-            for left in (outside, inside):
-                if not (left / WHOLE / MANIFEST).exists():  # else it could not be taken back: the next run goes on
-                    shutil.rmtree(left, ignore_errors=True)
-    for name, kept_as in kept.items():
-        if rules.kept is not None:
-            rules.kept(Path(folder) / name, Path(folder) / kept_as)
-    return [Path(folder) / name for name in contents]
+            shutil.rmtree(stage, ignore_errors=True)
+    finally:
+        if handle is not None:
+            os.close(handle)
+
+
+def _held(handle: int) -> bool:
+    """Whether this run has the lock of an open folder; it ends with the process."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks keeps nobody out
+        return True
+    return True
 
 
 def incomplete(folder: str | Path) -> str:
     """Why the results in a folder are not those of one whole run, a sentence; "" where nothing says so."""
-    place = Path(folder)
-    if (place / INCOMPLETE).is_file() or (place / STAGE / WHOLE / MANIFEST).is_file():
-        return f"{str(folder)!r} is incomplete: the run that wrote it has not come to its end; run it again"
-    return ""
+    if not (Path(folder) / INCOMPLETE).is_file():
+        return ""
+    return f"{str(folder)!r} is incomplete: the run that wrote it has not come to its end; run it again"
 
 
 def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules()) -> list[Path]:
@@ -193,31 +208,21 @@ def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules(
     InputError
         As `write_folder`.
     """
-    with writing_errors(folder, "write to"):
-        clear_up([folder])
-        return _refused(Path(folder), names, rules)
-
-
-def _refused(target: Path, names: Iterable[str], rules: Rules) -> list[Path]:
-    names = list(names)
+    target, names = Path(folder), list(names)
     nearest = next(path for path in (target, *target.absolute().parents) if os.path.lexists(path))
     if not nearest.is_dir():
         raise FileError(f"cannot write to {str(target)!r}: {str(nearest)!r} is not a folder")
     old = read_manifest(target)
     touched = [target / name for name in dict.fromkeys([*names, *old.files])]
-    in_the_way = check_outputs(touched, rules.inputs, rules.replace)
-    if rules.replace:
-        return list(
-            dict.fromkeys([*in_the_way, *(target / name for name in names if _objection(target, name, old, rules))])
-        )
-    if holds_others(target, rules.of):
-        raise FileError(
-            f"{str(target)!r} holds the results of {', '.join(map(repr, old.of))} (seen from there)", hint=_OTHER_FOLDER
-        )
-    for name in names:
-        if objection := _objection(target, name, old, rules):
-            raise FileError(f"{str(target / name)!r} {objection}", hint=ELSEWHERE)
-    return []
+    read = check_outputs(touched, rules.inputs, rules.replace)
+    if not rules.replace and holds_others(target, rules.of):
+        others = ", ".join(map(repr, old.of))
+        raise FileError(f"{str(target)!r} holds the results of {others} (seen from there)", hint=_OTHER_FOLDER)
+    objections = {target / name: _objection(target / name, old, rules) for name in names}
+    for file, objection in objections.items():
+        if objection and not rules.replace:
+            raise FileError(f"{str(file)!r} {objection}", hint=ELSEWHERE)
+    return list(dict.fromkeys([*read, *(file for file, objection in objections.items() if objection)]))
 
 
 def holds_others(folder: Path, of: Sequence[str]) -> bool:
@@ -226,204 +231,53 @@ def holds_others(folder: Path, of: Sequence[str]) -> bool:
     return bool(of and old.of and old.of != _relative(folder, of))
 
 
-def _objection(folder: Path, name: str, old: Manifest, rules: Rules) -> str:
+def _objection(file: Path, old: Manifest, rules: Rules) -> str:
     """Why a file must not be replaced; nothing where it may."""
-    if not os.path.lexists(folder / name):
+    if not os.path.lexists(file):
         return ""
     if rules.fresh:
         return "is there already"
-    if name not in old.files:
+    if file.name not in old.files:
         return f"is there already, and no {MANIFEST} beside it says that tps wrote it"
-    return "" if _is_ours(folder, name, old) else "was changed since tps wrote it"
+    return "" if _is_ours(file, old) else "was changed since tps wrote it"
 
 
 def read_manifest(folder: Path) -> Manifest:
     """The record in a folder, empty where there is none. Raises `InputError` where it is not to be understood."""
+    file = folder / MANIFEST
     try:
-        document = json.loads((folder / MANIFEST).read_bytes())
-        listed = {
-            str(name): tuple(hashes) if isinstance(hashes, list) else (str(hashes),)
-            for name, hashes in document["checksums" if "checksums" in document else "sha256"].items()
-            if Path(name).name == name  # never beyond the folder
-        }
-        return Manifest(str(document["written_by"]), tuple(map(str, document["results_of"])), listed)
-    except (FileNotFoundError, NotADirectoryError):
-        return Manifest()
+        if not file.exists():
+            return Manifest()
+        document = json.loads(file.read_bytes())
+        sums = {name: str(known) for name, known in document["checksums"].items() if Path(name).name == name}
+        return Manifest(tuple(map(str, document["results_of"])), sums)
+    except OSError as error:
+        raise FileError(f"cannot read {str(file)!r}: {error.strerror}") from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise FileError(
-            f"{str(folder / MANIFEST)!r} does not record what tps wrote", hint="delete it, or choose another folder"
-        ) from None
-    except OSError as error:
-        raise FileError(f"cannot read {str(folder / MANIFEST)!r}: {error.strerror}") from None
+        hint = "delete it, or choose another folder"
+        raise FileError(f"{str(file)!r} does not record what tps wrote", hint=hint) from None
 
 
-def _is_ours(folder: Path, name: str, manifest: Manifest) -> bool:
+def _is_ours(file: Path, manifest: Manifest) -> bool:
     """Whether the file is as the tool wrote it."""
-    path = folder / name
-    if path.is_symlink() or not path.is_file():
-        return False
-    try:
-        known = manifest.files[name]
-        if checksum(path) in known:
-            return True
-        if not any(map(SHA256.fullmatch, known)):
-            return False
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest() in known
-    except OSError as error:
-        raise FileError(f"cannot read {str(path)!r}: {error.strerror}") from None
+    with writing_errors(file, "read"):
+        return not file.is_symlink() and file.is_file() and checksum(file) == manifest.files[file.name]
+
+
+def checksum(path: Path) -> str:
+    """CRC-32 and length of a file's content, by which an edit is seen. Raises `OSError`.
+
+    A file that grew or shrank has another length, and CRC-32 misses one in 4e9 of the other changes (none within 32
+    bits; Peterson and Brown, "Cyclic codes for error detection", Proc. IRE 49 (1961) 228). Against somebody who forges
+    a file nothing is to be kept here, and SHA-256 of a table of a million lines takes as long as its pictures.
+    """
+    crc = size = 0
+    with path.open("rb", buffering=0) as stream:
+        while block := stream.read(BLOCK):
+            crc, size = zlib.crc32(block, crc), size + len(block)
+    return f"{crc:08x}-{size}"
 
 
 def _relative(folder: Path, of: Sequence[str]) -> tuple[str, ...]:
     """Files as seen from the folder, names that are no files as they are."""
     return tuple(Path(os.path.relpath(name, folder)).as_posix() if Path(name).exists() else name for name in of)
-
-
-def _lock(folder: Path) -> Path:
-    """The lock file of a folder: beside it, or in it where beside it nothing can be written."""
-    return beside(folder, "lock") if os.access(folder.parent, os.W_OK) else folder / ".tps-lock"
-
-
-def _stages(folder: Path) -> tuple[Path, Path]:
-    """Where the temporary folder of a run may be: beside the folder, or in it."""
-    return beside(folder, "stage"), folder / STAGE
-
-
-def _can_be_exchanged(folder: Path) -> bool:
-    """Whether a folder holds files alone, is nobody's current one and lies in one that we may write to."""
-    if folder == Path(os.path.realpath(".")) or folder.is_mount() or not os.access(folder.parent, os.W_OK):
-        return False
-    with os.scandir(folder) as entries:
-        return all(entry.is_file(follow_symlinks=False) or entry.is_symlink() for entry in entries)
-
-
-def _put(folder: Path, stage: Path, old: Manifest, in_the_way: Iterable[str]) -> dict[str, str]:
-    """The new files to their places, those of the earlier run away; what is in the way -> the name that it gets."""
-    new = stage / NEW
-    sync_folder(new)
-    if not folder.is_dir():
-        new.rename(folder)
-        sync_folder(folder.parent)
-        return {}
-    kept = {name: free_name(name, lambda free: os.path.lexists(folder / free)) for name in in_the_way}
-    # The names in the folder that are the tool's: the manifest, and the files that are as they were written.
-    ours = [MANIFEST, *(name for name in old.files if name not in kept and _is_ours(folder, name, old))]
-    if stage.parent != folder:
-        if _exchanged(folder, new, ours, kept):
-            return kept
-        inside = _stages(folder)[1]
-        inside.mkdir()
-        new.rename(inside / NEW)
-        stage = inside
-    write_file(stage / KEPT, json.dumps(kept))
-    (stage / NEW).rename(stage / WHOLE)
-    sync_folder(stage)
-    _move_in(folder, stage, old, kept)
-    return kept
-
-
-def _exchanged(folder: Path, new: Path, ours: Sequence[str], kept: Mapping[str, str]) -> bool:
-    """Give the new folder what is the user's in the old one, and exchange them; False where that cannot be done."""
-    taken = {file.name: kept.get(file.name, file.name) for file in folder.iterdir() if file.name not in ours}
-    linked = []
-    try:
-        for name, becomes in taken.items():
-            os.link(folder / name, new / becomes, follow_symlinks=False)
-            linked.append(becomes)
-        state = folder.stat()
-        new.chmod(state.st_mode & 0o7777)
-        if new.stat().st_gid != state.st_gid:
-            os.chown(new, -1, state.st_gid)
-    except OSError:  # no hard links here, say
-        done = False
-    else:
-        sync_folder(new)
-        done = exchange(new, folder)
-    if not done:
-        for becomes in linked:
-            (new / becomes).unlink()
-        return False
-    sync_folder(folder.parent)
-    for file in list(new.iterdir()):  # written by somebody else in this very moment
-        now = folder / taken.get(file.name, file.name)
-        if file.name not in ours and not (os.path.lexists(now) and os.path.samestat(file.lstat(), now.lstat())):
-            file.replace(now)
-    return True
-
-
-def _move_in(folder: Path, stage: Path, old: Manifest, kept: Mapping[str, str], again: bool = False) -> None:
-    """One by one, the manifest first away and last in place; an error takes all of it back.
-
-    `again`: a run was killed in the midst of it. There is no way back then, and an error leaves it to the next run.
-    """
-    whole, gone = stage / WHOLE, stage / GONE
-    moves: list[tuple[Path, Path]] = []
-
-    def move(file: Path, to: Path) -> None:
-        file.rename(to)
-        moves.append((file, to))
-
-    try:
-        gone.mkdir(exist_ok=True)
-        new = read_manifest(whole)
-        # What is in its place already arrived before the kill that this run makes good.
-        arrived = {name for name in new.files if not (whole / name).exists()}
-        for name, becomes in kept.items():
-            if name not in arrived and os.path.lexists(folder / name):
-                move(folder / name, folder / becomes)
-        for name in (MANIFEST, *old.files):
-            if name in arrived:
-                continue
-            if _is_ours(folder, name, old) if name != MANIFEST else (folder / name).exists():
-                move(folder / name, gone / name)
-        for name in (*new.files, MANIFEST):
-            if (whole / name).exists():
-                if os.path.lexists(folder / name):  # somebody put it there since the run was killed
-                    move(folder / name, folder / free_name(name, lambda free: os.path.lexists(folder / free)))
-                move(whole / name, folder / name)
-        sync_folder(folder)
-    except BaseException:
-        if not again:
-            for file, to in reversed(moves):
-                to.rename(file)
-            whole.rename(stage / NEW)
-        raise
-
-
-def clear_up(folders: Iterable[str | Path]) -> None:
-    """Take away what killed runs left for folders and beside them; one that had all its files is carried to its end."""
-    targets = [Path(os.path.realpath(folder)) for folder in folders]
-    for parent in dict.fromkeys(target.parent for target in targets):
-        for left in (*parent.glob(".*.tps-stage"), *parent.glob(".*.tps-lock")):
-            lock = left.with_name(left.name.rpartition("-")[0] + "-lock")
-            with suppress(FileError, OSError), locked(lock, repr(str(left)), wait=0.0):  # a run that lives holds it
-                shutil.rmtree(left, ignore_errors=True)
-    for target in targets:
-        if _stages(target)[1].exists():
-            with locked(_lock(target), repr(str(target))):
-                _clear_up_held(target)
-
-
-def _clear_up_held(folder: Path) -> None:
-    """The same of one folder, whose lock this run holds."""
-    outside, inside = _stages(folder)
-    if (inside / WHOLE / MANIFEST).exists():
-        began = (inside / GONE / MANIFEST).exists()
-        kept = json.loads((inside / KEPT).read_bytes()) if (inside / KEPT).exists() else {}  # an earlier version's
-        _move_in(folder, inside, read_manifest(inside / GONE if began else folder), kept, again=True)
-    for stage in (outside, inside):
-        shutil.rmtree(stage, ignore_errors=True)
-
-
-@contextmanager
-def _folders_above(folder: Path) -> Iterator[None]:
-    """Make the folders above; those are taken away again after an error."""
-    made = [parent for parent in folder.parents if not parent.exists()]
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        yield
-    except BaseException:
-        for parent in made:
-            with suppress(OSError):  # not empty: someone else uses it by now
-                parent.rmdir()
-        raise

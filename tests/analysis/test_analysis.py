@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 import numpy as np
 import pytest
 
-from toolpath_stiff.analysis import analyze, evaluate, parse_load
 from toolpath_stiff.analysis.document import required_stiffness_missed
-from toolpath_stiff.analysis.loads import load_directions, softest_directions, stiffest_directions
+from toolpath_stiff.analysis.evaluation import evaluate
+from toolpath_stiff.analysis.loads import load_directions, parse_load, principal_directions
 from toolpath_stiff.analysis.poses import evaluate_poses
-from toolpath_stiff.analysis.statistics import weakest_places
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program
@@ -136,8 +138,8 @@ def test_load_directions():
     np.testing.assert_allclose(directions("radial")[0], [[-1, 0, 0], [1, 0, 0], [0, 1, 0]])
     np.testing.assert_allclose(directions("axial")[0], [[0, 0, 1]] * 3)
     np.testing.assert_allclose(directions("0,3,4")[0], [[0, 0.6, 0.8]] * 3)
-    np.testing.assert_allclose(softest_directions(compliance), [[1, 0, 0]] * 3)
-    np.testing.assert_allclose(stiffest_directions(compliance), [[0, 0, 1]] * 3)
+    np.testing.assert_allclose(principal_directions(compliance), [[1, 0, 0]] * 3)
+    np.testing.assert_allclose(principal_directions(compliance, softest=False), [[0, 0, 1]] * 3)
     normal, substituted = directions("normal")  # sideways; a plunge takes the softest across the axis; none at rest
     np.testing.assert_allclose(normal, [[0, 1, 0], [1, 0, 0], [1, 0, 0]])
     assert substituted.tolist() == [False, True, True]
@@ -163,7 +165,7 @@ def test_required_stiffness_lists_the_lines_below_weakest_first():
 
 def test_weakest_places_are_apart_and_begin_with_the_weakest():
     analysis = analyse_text(SQUARE)
-    rows = weakest_places(analysis)
+    rows = analysis.weakest_rows
     stiffness = analysis.at.stiffness[rows]
     assert stiffness[0] == analysis.at.stiffness[analysis.counted].min()
     assert len(set(analysis.samples.line[rows])) == len(rows) == 3
@@ -209,8 +211,9 @@ def test_a_pose_is_the_same_alone_and_among_many(load):
     parts = [slice(start, start + 100) for start in range(0, n, 100)]
     few = [evaluate(model, position[p], abc[p], tangent[p], tool[p], load) for p in parts]
     assert 0.5 < many.reachable.mean() < 1.0
-    for name in ("stiffness", "strut_lengths", "margin", "limit_value"):
-        alone = np.concatenate([getattr(part, name) for part in few])
-        np.testing.assert_allclose(getattr(many, name), alone, rtol=1e-9, atol=1e-12, err_msg=name)
-    for name in ("substituted", "extrapolated", "limit"):
-        np.testing.assert_array_equal(getattr(many, name), np.concatenate([getattr(part, name) for part in few]))
+    for name in ("stiffness", "strut_lengths", "reach.margin", "reach.value"):
+        alone = np.concatenate([attrgetter(name)(part) for part in few])
+        np.testing.assert_allclose(attrgetter(name)(many), alone, rtol=1e-9, atol=1e-12, err_msg=name)
+    for name in ("substituted", "extrapolated", "reach.limit"):
+        alone = np.concatenate([attrgetter(name)(part) for part in few])
+        np.testing.assert_array_equal(attrgetter(name)(many), alone)

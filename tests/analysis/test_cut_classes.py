@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.factory import make_analysis
-from toolpath_stiff.analysis import LOADS, analyze, parse_load
 from toolpath_stiff.analysis.document import required_stiffness_missed
-from toolpath_stiff.analysis.loads import along_tool_axis, headline_rows, plunging_rows
-from toolpath_stiff.analysis.statistics import FIGURES, stiffness_figures, weakest_places
+from toolpath_stiff.analysis.loads import LOADS, along_tool_axis, headline_rows, parse_load, plunging_rows
+from toolpath_stiff.analysis.results import analyze
+from toolpath_stiff.analysis.statistics import FIGURES, stiffness_figures
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.case_study import case_study_program, wavy_program
@@ -146,7 +146,7 @@ def test_require_catches_a_weak_plunge():
     analysis = analyzed("G1 Z-4 F100\nG1 X40\n")
     level = analysis.to_dict()["plunges"]["max_N_per_mm"] * 1e3 + 1.0
     assert {line for line, _ in required_stiffness_missed(analysis, level)} == {1, 2}
-    assert weakest_places(analysis) and not analysis.plunging[weakest_places(analysis)].any()
+    assert analysis.weakest_rows and not analysis.plunging[analysis.weakest_rows].any()
 
 
 STEPS = st.lists(st.sampled_from(["G1 X{}", "G1 Y{}", "G1 Z-{}", "G1 X{0} Z-{0}", "G0 Z{}", "G1 B{}"]), max_size=6)

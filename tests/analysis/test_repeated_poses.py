@@ -28,5 +28,5 @@ def test_a_pose_under_several_loads_is_as_each_by_itself():
         apart = evaluation.evaluate(NIST, position[mixed], angles[mixed], along[mixed], tool[mixed], parse_load(load))
         np.testing.assert_allclose(together.stiffness[mixed], apart.stiffness, rtol=1e-12)
         np.testing.assert_allclose(together.strut_lengths[mixed], apart.strut_lengths, rtol=1e-14)
-        np.testing.assert_allclose(together.margin[mixed], apart.margin, rtol=1e-9)
+        np.testing.assert_allclose(together.reach.margin[mixed], apart.reach.margin, rtol=1e-9)
         np.testing.assert_array_equal(together.substituted[mixed], apart.substituted)

@@ -59,22 +59,21 @@ def use(file: Path, n: int = 3) -> np.ndarray:
 
 FORM = (HOOK, "load_compliance")
 BROKEN_AT_RUN_TIME = [
-    ([(BODY, "return np.full(6, p['c'])")], DEFINED, "returns shape (6,) for 3 poses; expected (3, 6)"),
-    ([(BODY, "return p['c']")], DEFINED, "returns shape () for 3 poses"),
+    ([(BODY, "return np.full(6, p['c'])")], DEFINED, "returns an array of (6,) float64; expected an array of (3, 6)"),
+    ([(BODY, "return p['c']")], DEFINED, "returns float"),
     ([(BODY, "return path.struts.lengths * np.nan")], DEFINED, "returns nan at X0 Y0 Z800 mm; expected finite"),
     ([(BODY, "a = np.zeros((len(path), 6)); a[1, 2] = np.inf; return a")], DEFINED, "returns inf at X100 Y50 Z850 mm"),
     ([(BODY, "return 'soft'")], DEFINED, "returns str ('soft')"),
-    ([(BODY, "return path.struts.lengths * 1j")], DEFINED, "of complex128"),
+    ([(BODY, "return path.struts.lengths * 1j")], DEFINED, "complex128"),
     ([(BODY, "return [None] * 6")], DEFINED, "returns list"),
-    ([(BODY, "return 1e-9 / 0")], BODY_LINE, "ends in ZeroDivisionError: float division by zero at X0"),
+    ([(BODY, "return 1e-9 / 0")], BODY_LINE, "ends in ZeroDivisionError: float division by zero"),
     ([(BODY, "raise ValueError('no') if path.position[:, 0].max() > 0.15 else None")], BODY_LINE, ""),
-    ([(BODY, "return p['compliance'] * path.struts.lengths")], BODY_LINE, "'compliance' at X0 Y0 Z800 mm. Its "
-     "parameters are c"),
+    ([(BODY, "return p['compliance'] * path.struts.lengths")], BODY_LINE, "ends in KeyError: 'compliance'"),
     ([(BODY, "sys.exit(3)")], BODY_LINE, "ends in SystemExit: 3"),
-    ([(BODY, "path.struts.lengths[:] *= 2.0; return None")], BODY_LINE, "Copy an array before you change it"),
+    ([(BODY, "path.struts.lengths[:] *= 2.0; return None")], BODY_LINE, "read-only"),
     ([("self, path, p", "self, path")], DEFINED, "ends in TypeError"),
     ([FORM, (BODY, "q = np.zeros((len(path), 12, 12)); q[2, 0, 1] = 1e-9; return q")], DEFINED,
-     "is not symmetric at X200 Y100 Z900 mm: entry (0, 1) is 1e-09, entry (1, 0) is 0"),
+     "returns 1e-09 at X200 Y100 Z900 mm; expected a symmetric matrix"),
 ]  # fmt: skip
 
 
@@ -91,7 +90,7 @@ def test_an_effect_that_takes_more_than_there_is_names_effect_and_pose(tmp_path)
     with pytest.raises(InputError, match=r"with effect mine strut \d has no positive stiffness at X0 Y0 Z800 mm"):
         use(file)
     overflow = own(tmp_path, (BODY, "return np.full((len(path), 6), 1.7e308)"))
-    with pytest.raises(EffectFault, match=r"strut_compliance returns 1.7e\+308 at X0 Y0 Z800 mm; expected numbers"):
+    with pytest.raises(EffectFault, match=r"strut_compliance returns 1.7e\+308 at X0 Y0 Z800 mm; expected finite"):
         use(overflow)
 
 
@@ -111,17 +110,17 @@ def test_an_effect_that_is_sound_adds_what_it_says(tmp_path):
 
 
 WRONG_DECLARATIONS = [
-    ([("1e-9", '"nano"')], 14, "parameter c: si = 'nano'; expected the SI value of one nm/N"),
-    ([("1e-9", "-1e-9")], 14, "si = -1e-09"),
-    ([("1e-9", "1" + 400 * "0")], 14, "si = 1000000000... (401 characters); expected the SI value of one nm/N"),
-    ([("1e-9", "10**5000")], 14, "si = a number of thousands of digits; expected the SI value of one nm/N"),
-    ([("(0.0, 100.0)", "(0, 10**400)")], 14, "bounds = (0, 100000... (406 characters); expected two numbers"),
-    ([("(0.0, 100.0)", "(100.0, 0.0)")], 14, "low < high with the neutral value between them"),
-    ([("(0.0, 100.0)", "100.0")], 14, "bounds = 100.0; expected two numbers"),
-    ([("(1.0, 5.0)", "(1.0, 500.0)")], 14, "typical (1.0, 500.0)"),
-    ([('"nm/N"', '"µm"')], 14, "a unit in plain letters"),
-    ([('Parameter("c"', 'Parameter("my c"')], 14, "name = 'my c'; expected letters"),
-    ([("(\n        Parameter", "[\n        3, Parameter"), ("),\n    )\n", "),\n    ]\n")], 14, "parameters hold 3"),
+    ([("1e-9", '"nano"')], 13, "parameter c: si is no number above 0; expected the SI value of one nm/N"),
+    ([("1e-9", "-1e-9")], 13, "si is no number above 0"),
+    ([("1e-9", "1" + 400 * "0")], 13, "si is no number above 0"),
+    ([("1e-9", "10**5000")], 13, "si is no number above 0"),
+    ([("(0.0, 100.0)", "(0, 10**400)")], 13, "bounds is not of numbers"),
+    ([("(0.0, 100.0)", "(100.0, 0.0)")], 13, "low < high with the neutral between them"),
+    ([("(0.0, 100.0)", "100.0")], 13, "bounds is not of numbers; expected bounds and typical = (low, high)"),
+    ([("(1.0, 5.0)", "(1.0, 500.0)")], 13, "typical 1 to 500"),
+    ([('"nm/N"', '"µm"')], 13, "a unit in plain letters"),
+    ([('Parameter("c"', 'Parameter("my c"')], 13, "name = 'my c'; expected letters"),
+    ([("(\n        Parameter", "[\n        3, Parameter"), ("),\n    )\n", "),\n    ]\n")], 13, "parameters hold 3"),
     ([('"test"),', '"test", nme="c"),')], 14, "TypeError"),
     ([('link = "struts"', 'link = "strut"')], 9, "link = 'strut'; expected one of tool"),
     ([('link = "struts"', 'link = "instrument"')], 9, "`reading` alone with link"),
@@ -193,10 +192,10 @@ def test_geometry_and_instruments_are_held_against_the_contract_too(tmp_path):
     geometry = own(
         tmp_path, ("self, path, p", "self, machine, p"), (HOOK, "geometry"), (BODY, "return machine.frame_joints")
     )
-    with pytest.raises(EffectFault, match=r"mine\.py:17: effect mine: geometry returns an array of shape \(6, 3\)"):
+    with pytest.raises(EffectFault, match=r"mine\.py:17: effect mine: geometry returns an array of \(6, 3\)"):
         use(geometry)
     bent = "return machine.with_changes(platform_joints=machine.platform_joints * np.nan)"
-    with pytest.raises(EffectFault, match="gives platform_joints that are an array"):
+    with pytest.raises(EffectFault, match="gives joints that are not finite"):
         use(own(tmp_path, ("self, path, p", "self, machine, p"), (HOOK, "geometry"), (BODY, bent)))
 
 
@@ -208,7 +207,7 @@ def test_an_instrument_that_shows_nothing(tmp_path, monkeypatch, capsys):
     )  # fmt: skip
     with_machine(tmp_path, "instrument")
     assert main(["compare", "nist-table1", "--machine", "m.toml", "--effects", "mine.py", "--no-plots"]) == 2
-    assert "mine.py:17: effect mine: reading shows -" in capsys.readouterr().err
+    assert "mine.py:17: effect mine: reading returns -" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", [n for n, e in known_effects().items() if type(e).__module__.startswith("toolpath")])
@@ -240,7 +239,7 @@ def test_check_finds_what_is_wrong(tmp_path, capsys, changes, failing, told):
 def test_check_of_a_sound_effect(tmp_path, capsys):
     assert main(["effects", "check", str(own(tmp_path)), "--machine", "genhexkins"]) == 0
     told = capsys.readouterr().out
-    assert "mine, on machine genhexkins: good" in told and "times the plain model's time" in told
+    assert "mine, on machine genhexkins: good" in told and "changes by -20 to -20 %" in told
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,11 @@ from benchmarks import hunt
 from benchmarks.hunt_compensation import Beside, Tolerances
 from tests.nc import rs274
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.compensation import CORNER
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.path import sample_moves
 from toolpath_stiff.rewriting.program import rewrite_program
@@ -115,7 +116,7 @@ def test_other_controls_do_otherwise(text, dialect):
 
 def test_the_check_goes_on_after_an_error_under_compensation():
     lines = ("G21 F100", "G41.1 D6", "G1 X1", "G1 X10", "G55", "G3 X20 I1", "G1 Y5", "G40", "G1 X0 Y0", "M2")
-    found = check_lines(lines, "p.nc", controller=LINUXCNC)
+    found = check(Request(lines, "p.nc", controller=LINUXCNC))
     assert [f.line for f in found.findings if f.severity == "error"] == [3, 5, 6]
 
 

@@ -12,13 +12,14 @@ import pytest
 
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.words import looks_like_cutter_location
 from toolpath_stiff.rewriting.offset_blocks import offset_blocks
 from toolpath_stiff.rotations import rotation_matrices
@@ -138,10 +139,10 @@ def test_g_code_is_not_taken_for_one(text):
 
 def test_check_goes_on_after_errors():
     text = SLOT.replace("FINI\n", "COPY/1\nGOTO/1,x,0\nTLRGT\nGOTO/9,9,9\nCIRCLE/0,9,9,0,0,1,9\n")
-    checked = check_lines(tuple(text.splitlines()), "part.apt")
+    checked = check(Request(tuple(text.splitlines()), "part.apt"))
     errors = [finding for finding in checked.findings if finding.severity == "error"]
     assert [finding.line for finding in errors] == [7, 8, 9, 11] and not checked.complete
-    assert checked.moves is not None and checked.moves.line[-1] == 10
+    assert checked.program.moves.line[-1] == 10
 
 
 def test_mutated_files_are_read_or_refused_with_their_line():
@@ -168,7 +169,7 @@ def test_mutated_files_are_read_or_refused_with_their_line():
         except InputError as error:
             assert error.line is not None or "no cutting move" in str(error)
             outcomes["refused"] += 1
-        check_lines(tuple(text.splitlines()), "part.apt")
+        check(Request(tuple(text.splitlines()), "part.apt"))
     assert min(outcomes.values()) > 25
 
 

@@ -15,8 +15,9 @@ from toolpath_stiff.analysis.program_check import extents, figures, machine_find
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.path import sample_moves
 
@@ -24,7 +25,7 @@ PROGRAMS = sorted((Path(__file__).parents[2] / "programs").glob("*.nc"))
 
 
 def checked(text: str, **options):
-    return check_lines(tuple(text.splitlines()), "part.nc", **options)
+    return check(Request(tuple(text.splitlines()), "part.nc", **options))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -59,7 +60,7 @@ def test_findings_go_on_after_an_error():
     errors = [(f.line, f.column) for f in found.findings if f.severity == "error"]
     assert errors == [(3, 1), (4, 3), (6, 1)]
     assert "tool's radius" in found.findings[0].text and "--dialect" in found.findings[0].text
-    assert not found.complete and found.moves is not None and found.moves.end[-1, 0] == pytest.approx(0.02)
+    assert not found.complete and found.program.moves.end[-1, 0] == pytest.approx(0.02)
     assert any(f.line == 10 and "read once" in f.text for f in found.findings)
     assert [(u.line, u.code) for u in found.unsupported] == [(1, "M8"), (7, "G64"), (8, "M150")]
     used = {code.code: (code.line, code.column, code.count) for code in found.used}
@@ -85,7 +86,7 @@ def test_reach_and_strut_speeds():
     """A strut's speed is the part of the tip's velocity along it: u . v, at constant orientation."""
     machine = load_machine("nist")
     found = checked("G0 X0 Y0 Z0\nG1 X30 F6000\nG0 X2000\nG1 X2001", default_origin=machine.default_origin)
-    findings, speed = machine_findings(found, machine, found.origin, 1e-4, 0.05)
+    findings, speed = machine_findings(found.program, machine, 1e-4, 0.05)
     assert [(f.line, f.severity) for f in findings if f.code == "reach"] == [(3, "warning"), (4, "error")]
     from toolpath_stiff.machine.kinematics import solve_struts
 
@@ -121,7 +122,7 @@ def test_the_command(tmp_path, capsys):
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.name)
 def test_our_own_programs_are_without_errors(path):
     if path.stat().st_size < 200_000:
-        found = check_lines(tuple(path.read_text().splitlines()), path.name)
+        found = check(Request(tuple(path.read_text().splitlines()), path.name))
         assert [f.text for f in found.findings if f.severity == "error" and "--tools" not in f.text] == []
 
 

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import DIALECTS, Controller, read_controller
 from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.rewriting.program import rewrite_program
 
 PLAIN, LINUXCNC, FANUC, HAAS = (Controller(DIALECTS[name]) for name in ("generic", "linuxcnc", "fanuc", "haas"))
@@ -160,7 +161,7 @@ def test_numbers_in_increments_that_look_like_millimetres():
         lines = f"G1 F100. X10 (Y5.5)\nY20{text}\n"
         warnings = parse_program(lines, "p.nc", controller=FANUC).warnings
         assert any("X10 stands beside numbers with decimals" in w for w in warnings) is warned
-        findings = check_lines(tuple(lines.splitlines()), "p.nc", controller=FANUC).findings
+        findings = check(Request(tuple(lines.splitlines()), "p.nc", controller=FANUC)).findings
         assert any("X10 stands beside numbers with decimals" in f.text for f in findings) is warned
 
 

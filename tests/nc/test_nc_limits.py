@@ -7,9 +7,10 @@ import time
 import pytest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.languages import language_of
 from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.nc.words import LARGEST_FILE, LONGEST_LINE
 
@@ -128,7 +129,7 @@ def test_a_file_beyond_all_programs_is_refused(tmp_path):
 
 def test_check_names_each_of_them():
     lines = ("G21 G90 F600", "G1 X5", "T99999999999999999999 M6", "G2 X10 Y0 I1e200 J0", "G1 X6")
-    checked = check_lines(lines, "p.nc")
+    checked = check(Request(lines, "p.nc"))
     assert [(finding.line, finding.severity) for finding in checked.findings][-2:] == [(3, "error"), (4, "error")]
 
 

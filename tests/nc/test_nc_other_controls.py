@@ -8,12 +8,13 @@ import pytest
 from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import TABLE_OURS, TABLE_RS274, assert_same_path
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.codes.registry import would_change
 from toolpath_stiff.nc.controller import Controller, dialect_named
 from toolpath_stiff.nc.lathes import lathe_program
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.words import read_block, read_lines
 
 HEAD = "G21 G90 F600.\nG0 Z5.\n"
@@ -320,7 +321,7 @@ def test_what_a_code_would_change_is_that_code_s():
     assert would_change("G041 D1") == "the whole path, by the tool's radius"
     assert would_change("G54.3") == ""
     assert would_change("M305") == "what is not known: it may run anything on its control"
-    checked = check_lines(("G21 G90 F600", "G1 X1", "G05 P10000", "G419", "G64", "M30"), "p.nc")
+    checked = check(Request(("G21 G90 F600", "G1 X1", "G05 P10000", "G419", "G64", "M30"), "p.nc"))
     texts = {finding.code: finding.text for finding in (*checked.unsupported, *checked.findings)}
     assert "radius" not in texts["not read"]
     assert texts["G05"].endswith("it would change corners, by the control's tolerance, and the time")
@@ -340,7 +341,7 @@ def test_a_lathe_s_limit_of_speed_is_refused(block):
 def test_what_looks_like_a_lathe_s_program_gives_a_warning():
     for blocks in ("G96 S100\nG1 X1.", "G95 S100 F.1\nG1 X1. Z-3."):
         assert any("looks like a lathe's program" in text for text in read(blocks).warnings)
-        checked = check_lines(tuple(f"{HEAD}{blocks}".splitlines()), "p.nc")
+        checked = check(Request(tuple(f"{HEAD}{blocks}".splitlines()), "p.nc"))
         assert any("looks like a lathe's program" in finding.text for finding in checked.findings)
     for blocks in ("G96 S100\nG1 X1. Y1.", "G95 S100 F.1\nG1 X1.\nG2 X3. I1.", "G1 X1.\nG50"):
         assert not any("lathe" in text for text in read(blocks).warnings)
@@ -362,7 +363,7 @@ def test_two_signs_of_a_lathe_are_refused_by_name(pair):
         with pytest.raises(InputError, match=r"a lathe's program: .*X is a diameter") as refusal:
             parse_program(text, "p.nc", interpreter=interpreter)
     assert all(LATHE[blocks] in str(refusal.value) for blocks in pair) and refusal.value.line in (3, 4)
-    checked = check_lines(tuple(text.splitlines()), "p.nc")
+    checked = check(Request(tuple(text.splitlines()), "p.nc"))
     assert not checked.complete and "a lathe's program" in checked.findings[0].text
     for blocks in pair:
         read(blocks)
@@ -419,7 +420,7 @@ def test_text_before_the_tape_mark_is_no_part_of_the_program():
     assert cuts(program) == [[5, 0, 0]]
     assert program.moves.line.tolist() == [7]
     assert any("before the tape mark (%) in line 4 is not read" in text for text in program.warnings)
-    assert check_lines(tuple(text.splitlines()), "p.nc").complete
+    assert check(Request(tuple(text.splitlines()), "p.nc")).complete
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.nc import rs274
 from toolpath_stiff.nc.controller import DIALECTS, Controller
-from toolpath_stiff.nc.operations import MOST_OPERATIONS, Operations, find_operations, headings, operations, plain_name
+from toolpath_stiff.nc.operations import MOST_OPERATIONS, Operations, headings, operations, plain_name
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 
@@ -371,8 +373,6 @@ def test_a_tool_without_comment_has_its_remark_from_the_tool_table() -> None:
 
 
 def test_marks_take_the_place_of_comments() -> None:
-    from dataclasses import replace
-
     program = replace(parse_program("G1 X1 F100\n(NO)\nX2\nX3\n", "part.nc"), marks=((1, "ROUGH"), (3, "WALL")))
     assert [(row.name, row.first_line, row.last_line) for row in operations(program).rows] == [
         ("ROUGH", 1, 1),
@@ -527,8 +527,8 @@ def test_frames_around_names(comment: str, name: str) -> None:
 )
 def test_no_line_takes_forever(line: str) -> None:
     headings([line] * 3)
-    moves = parse_program("G1 X1 F100\nX2\n").moves
-    assert len(find_operations([line, "", line], moves, "part.nc").rows) >= 1
+    program = replace(parse_program("G1 X1 F100\nX2\n"), source=(line, "", line))
+    assert len(operations(program).rows) >= 1
 
 
 @given(st.lists(st.text(alphabet="(); NOMGTX019-*\t:.%/#<>[]äß", max_size=12), max_size=8))

@@ -14,10 +14,11 @@ from benchmarks.hunt import OTHER, hunt_one
 from benchmarks.hunt_programs import Parametric
 from tests.nc import rs274
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, dialect_named
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.request import Request
 
 LINUXCNC, FANUC = Controller(dialect_named("linuxcnc")), Controller(dialect_named("fanuc"))
 
@@ -271,7 +272,7 @@ def test_refused_with_line_and_reason(text, controller, line, says):
 @pytest.mark.parametrize("loop", ["while [1]", "repeat [3]", "do"])
 def test_check_goes_on_behind_a_loop_without_its_end(loop, leave):
     text = f"F100\nG0 X0\no10 {loop}\no10 {leave}\nG1 X1\nM2"
-    findings = check_lines(tuple(text.splitlines()), "p.nc", controller=LINUXCNC).findings
+    findings = check(Request(tuple(text.splitlines()), "p.nc", controller=LINUXCNC)).findings
     assert [(f.line, "has no end" in f.text) for f in findings if f.severity == "error"] == [(3, True), (4, True)]
 
 
@@ -326,9 +327,9 @@ def test_subprograms_of_a_folder(tmp_path):
 def test_check_names_the_line_of_a_subprogram_s_file(tmp_path):
     (tmp_path / "slot.ngc").write_text("o<slot> sub\nG1 X[1/#1]\nG77\no<slot> endsub\n")
     control = replace(LINUXCNC, subprograms=str(tmp_path))
-    checked = check_lines(("G21 F100", "o<slot> call [0]", "G1 X2"), "part.ngc", controller=control)
+    checked = check(Request(("G21 F100", "o<slot> call [0]", "G1 X2"), "part.ngc", controller=control))
     errors = [finding for finding in checked.findings if finding.severity == "error"]
-    assert [error.line for error in errors] == [2, 3] and len(checked.moves) == 1
+    assert [error.line for error in errors] == [2, 3] and len(checked.program.moves) == 1
 
 
 def test_a_computed_number_never_counts_increments():
@@ -352,10 +353,12 @@ def test_without_a_folder_the_message_says_how_to_name_one():
 
 
 def test_check_counts_what_runs_and_goes_on_after_an_error():
-    checked = check_lines(("G21 F100", "o1 repeat [3]", "G91 G1 X1", "o1 endrepeat", "G1 X[1/0]", "G1 Y1"), "part.ngc")
+    checked = check(
+        Request(("G21 F100", "o1 repeat [3]", "G91 G1 X1", "o1 endrepeat", "G1 X[1/0]", "G1 Y1"), "part.ngc")
+    )
     assert {code.code: code.count for code in checked.used}["G1"] == 4
     assert [(f.line, f.severity) for f in checked.findings if f.severity == "error"] == [(5, "error")]
-    assert not checked.complete and len(checked.moves) == 4
+    assert not checked.complete and len(checked.program.moves) == 4
 
 
 @settings(max_examples=30)

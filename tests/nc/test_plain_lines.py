@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import frames, geometry, plain_lines, plain_words, program_run
-from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.codes import modes, points
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.program_run import ProgramRun
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.nc.words import read_lines, split_lines
@@ -170,10 +171,10 @@ def test_random_programs(blocks, dialect):
 @given(st.lists(st.one_of(plain(), arc(), modal), min_size=1, max_size=20))
 def test_random_programs_are_checked_alike(blocks):
     lines = split_lines("F300\n" + "\n".join(blocks), "p")
-    fast = check_lines(lines, "p", controller=Controller())
+    fast = check(Request(lines, "p", controller=Controller()))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(program_run, "FEWEST_LINES", len(lines) + 1)
-        slow = check_lines(lines, "p", controller=Controller())
+        slow = check(Request(lines, "p", controller=Controller()))
     for found in (fast, slow):
         assert found.used == slow.used
         assert found.findings == slow.findings

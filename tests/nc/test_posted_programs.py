@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 from tests.nc import rs274
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import Controller, read_controller
 from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import ARC, RAPID, ReadProgram
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.path import move_durations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 
@@ -656,8 +657,8 @@ def files(tmp_path, monkeypatch):
 def test_check_places_the_part_where_it_is_asked_for(files):
     """Not where the machine that it was posted for has its G54."""
     lines, place = tuple(Path(files[0]).read_text().splitlines()), (0.1, -0.2, 0.9, 0.0, 0.0, 0.5)
-    found = check_lines(lines, "part.nc", origin=place, controller=read_controller(files[2]))
-    assert found.origin == pytest.approx(place)
+    found = check(Request(lines, "part.nc", origin=place, controller=read_controller(files[2])))
+    assert found.program.origin == pytest.approx(place)
 
 
 def test_check_analyze_and_path_take_it(files, capsys):
@@ -688,7 +689,7 @@ def test_place_works_and_write_is_refused(files, capsys):
     blocks = json.loads(capsys.readouterr().out)["offset_blocks"]
     assert not blocks["linuxcnc"] and "posted for another kinematics" in blocks["linuxcnc_reason"]
     assert main(["place", *files, *few, "--write", "placed.nc"]) == 2
-    assert "posted for another kinematics (table-table A C) is not rewritten" in capsys.readouterr().err
+    assert "posted for another kinematics (table-table A C) cannot be rewritten" in capsys.readouterr().err
     assert not Path("placed.nc").exists()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.nc import rs274
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.path import place

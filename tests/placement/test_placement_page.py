@@ -12,7 +12,7 @@ import pytest
 
 from tests.browser import needs_browser, opened, painted
 from tests.placement.test_placement_search import headline_figures
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import toolpath_stiff as tps
 from tests.nc import rs274
 from tests.placement.rewriting import assert_same_path
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
@@ -220,9 +221,9 @@ def test_text_without_a_file_is_rewritten_too():
 
 @pytest.mark.parametrize("decimals", [1, 10, -4])
 def test_decimals_that_make_no_program(decimals):
-    program = parse_program("G1 X2 F100\n")
+    program = tps.Program.from_text("G1 X2 F100\n")
     with pytest.raises(InputError, match="decimals"):
-        rewrite_program(program, program.origin, program.origin, decimals=decimals)
+        tps.rewrite(program, to_mm_deg=(1, 0, 0), decimals=decimals)
 
 
 def test_the_printed_differences_are_those_of_the_figures():

@@ -75,11 +75,11 @@ QUARTER = at(10, 20, 30, 90)
         ("G18 G2 X8 Z0 I4 K0", at(turn=180), ["G18 G3 X-8 Z0 I-4 K0"]),
         ("G19 G2 Y8 Z0 J4 K0", at(turn=270), ["G18 G3 X8 Y0 Z0 I4 K0"]),
         ("G18\nG2 X8 I4\nX0 I-4", at(turn=180), ["G18", "G3 X-8 I-4", "X0 I4"]),
-        # A full circle ends where it begins, with words or without.
-        ("G3 X0 Y0 I4", at(1, 2), ["G3 X1 Y2 I4"]),
+        # A full circle ends where it begins, without words that might be rounded off it.
+        ("G3 X0 Y0 I4", at(1, 2), ["G3 I4"]),
         ("G3 I4", QUARTER, ["G3 I0 J4"]),
-        # R stays, but for arcs near half a circle, where its centre hangs on the last digit.
-        ("G3 X5 Y5 R5", at(turn=37), ["G3 X0.9841 Y7.0023 R5"]),
+        # A radius becomes a centre, which does not hang on the last digit near half a circle.
+        ("G3 X5 Y5 R5", at(turn=37), ["G3 X0.9841 Y7.0023 I-3.0091 J3.9932"]),
         ("G3 X0 Y10 R5", at(turn=37), ["G3 X-6.0182 Y7.9864 I-3.0091 J3.9932"]),
         # Cycles: the hole turns and moves, heights move; increments are no heights.
         ("G81 X5 Y0 Z-3 R2\nX6\nG80", QUARTER, ["G81 X10 Y25 Z27 R32", "X10 Y26", "G80"]),

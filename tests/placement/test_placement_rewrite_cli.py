@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.placement.test_placement_search import headline_figures
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import read_program
@@ -85,7 +85,7 @@ def test_nothing_asked_nothing_written():
     [
         ("pocket.nc", ["--decimals", "5"], "--decimals without --write"),
         ("pocket.nc", ["--linearise", "0.01"], "--linearise without --write"),
-        ("pocket.nc", ["--write", "placed.nc", "--decimals", "0"], "0 decimals"),
+        ("pocket.nc", ["--write", "placed.nc", "--decimals", "0"], "--decimals 0"),
         ("pocket.nc", ["--write", str(PROGRAMS / "pocket.nc")], "is read here and would be written over"),
         ("pocket.nc", ["--write", "placed.nc", "--linearise", "nan"], "--linearise"),
     ],

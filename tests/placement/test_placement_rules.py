@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.placement.test_placement_search import MODEL, TANGENTIAL, headline_figures, program_of
-from toolpath_stiff.analysis import analyze
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import UnreachableError
@@ -471,7 +471,7 @@ def test_effects_are_placed_by_the_plain_analysis(tmp_path):
 
 @pytest.mark.parametrize("load", ["normal", "softest", "radial", "axial", "x", "1,1,0.5"])
 def test_other_loads_are_those_of_the_plain_analysis(load):
-    from toolpath_stiff.analysis import parse_load
+    from toolpath_stiff.analysis.loads import parse_load
 
     program, direction = program_of("tilted_five_axis"), parse_load(load)
     placements = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7], [0.0, 0.05, 0.8, 0.05, -0.03, 0.2]])
@@ -483,4 +483,4 @@ def test_other_loads_are_those_of_the_plain_analysis(load):
         assert found.mean[i] == pytest.approx(
             np.average(k, weights=analysis.samples.weight[analysis.counted]), rel=1e-9
         )
-        assert found.margin[i] == pytest.approx(analysis.at.margin[analysis.samples.cutting].min(), rel=1e-9)
+        assert found.margin[i] == pytest.approx(analysis.at.reach.margin[analysis.samples.cutting].min(), rel=1e-9)

@@ -16,7 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.stats import qmc
 
-from toolpath_stiff.analysis import analyze, parse_load
+from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
@@ -66,8 +67,8 @@ def headline_figures(analysis) -> dict:
         "range_N_per_mm": np.ptp(k),
         "min_N_per_mm": k.min(),
         "mean_deflection_um": np.average(1e6 / k, weights=weight),  # of 1000 N
-        "min_margin": analysis.at.margin[samples.cutting].min(),
-        "rapid_margin": analysis.at.margin[~samples.cutting].min(),
+        "min_margin": analysis.at.reach.margin[samples.cutting].min(),
+        "rapid_margin": analysis.at.reach.margin[~samples.cutting].min(),
         "extrapolated_share": analysis.at.extrapolated[samples.cutting].mean(),
     }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.moves_factory import make_moves
-from toolpath_stiff.analysis import Analysis, analyze
+from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.moves import RAPID, ReadProgram, ToolUse, Unsupported
 

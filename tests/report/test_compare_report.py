@@ -80,7 +80,7 @@ def test_the_page_says_what_the_figures_are():
     assert "No pattern stands out from scatter" in page
     for title in ("Checks without a model", "Errors by direction, plane and set-up", "How much readings scatter"):
         assert title in page
-    assert "displacement across the load" in page
+    assert "no pose was measured at two loads" in page
 
 
 def test_residuals_as_a_table_say_what_they_are():

@@ -209,7 +209,8 @@ def test_the_table_of_operations_is_that_of_the_summary(analysis, parsed):
         assert number(row["mean_N_per_mm"]) in cells
         assert f"{row['first_line']}-{row['last_line']}" in cells
     assert [name for _, name, _ in data["operations"]] == [row["name"] for row in summary["per_operation"]]
-    assert [first for first, *_ in data["operations"]] == [0, int(np.argmax(analysis.operation == 2))]
+    operation = analysis.operations.of_move[analysis.samples.move]
+    assert [first for first, *_ in data["operations"]] == [0, int(np.argmax(operation == 1))]
 
 
 def test_one_operation_has_no_table():
@@ -221,7 +222,7 @@ def test_a_thinned_page_keeps_where_operations_begin(monkeypatch):
     analysis = spiral()
     rows = page_rows(analysis)
     assert len(rows) < len(analysis.samples)
-    first = np.flatnonzero(np.diff(analysis.operation)) + 1
+    first = np.flatnonzero(np.diff(analysis.operations.of_move[analysis.samples.move])) + 1
     assert set(first) <= set(rows)
     (_, second) = Page(render(analysis)).data["operations"]
     assert rows[second[0]] == first[0]

@@ -12,8 +12,9 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.case import clamp_of, draw_case, effects_of_layout, make_case, rows_of
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text
-from toolpath_stiff.rig.hidden import OUTSIDE, Nuisances, disturb_readings
+from toolpath_stiff.rig.hidden import Nuisances, disturb_readings
 from toolpath_stiff.rig.nominal import load_nominal, reachable
+from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
 from toolpath_stiff.rig.sizes import NuisanceCovariance
 
 NIST = load_nominal("nist")
@@ -57,11 +58,11 @@ def test_tilted_poses_are_within_the_machines_limits(seed):
     assert reachable(NIST, rows.position, rows.angles, rows.extension).all()
 
 
-@pytest.mark.parametrize("name", [*CATALOGUE, *OUTSIDE])
+@pytest.mark.parametrize("name", [*CATALOGUE, *ODDITIES, *ODDITIES_IN_TIME])
 def test_every_effect_shows_at_the_size_asked_for(name):
     """A change of 5 % rms, or less where the effect's bound is nearer; the data do change."""
-    rows, truth = make_case(2, "tilted", name, size=0.05, nuisances=Nuisances.none())
-    plain, _ = make_case(2, "tilted", "none", nuisances=Nuisances.none())
+    rows, truth = make_case(2, "tilted", name, size=0.05, noise=Nuisances.none())
+    plain, _ = make_case(2, "tilted", "none", noise=Nuisances.none())
     change = np.log(rows["stiffness_N_per_mm"] / plain["stiffness_N_per_mm"])
     seen = np.sqrt(np.mean(change**2))
     assert seen == pytest.approx(truth["effects"][0]["size"], rel=0.01)  # parameters are rounded to four digits
@@ -141,7 +142,7 @@ def test_strut_spread_and_joint_errors_over_many_machines():
 
 def test_readings_scatter_about_the_model_as_the_nuisances_say():
     """Whole cases: variance of ln k over seeds is repeat, outliers, clamping and strut spread together."""
-    exact = make_case(0, "paper", "none", nuisances=Nuisances.none())[0]["stiffness_N_per_mm"]
+    exact = make_case(0, "paper", "none", noise=Nuisances.none())[0]["stiffness_N_per_mm"]
     logs = np.array(
         [np.log(make_case(seed, "paper", "none")[0]["stiffness_N_per_mm"] / exact) for seed in seeds(0, 200)]
     )
@@ -187,7 +188,7 @@ def test_other_machines_are_measured_at_poses_of_ones_own():
     plan = {"x_mm": np.zeros(3), "y_mm": np.zeros(3), "z_mm": np.full(3, 800.0), "direction": ["X", "Y", "Z"]}
     turned = dataclasses.replace(NIST, law_stiffnesses=NIST.law_stiffnesses * 2.0)
     rows, doubled = (
-        make_case(1, "campaign", "none", machine=machine, plan=plan, nuisances=Nuisances.none())[0]
+        make_case(1, "campaign", "none", machine=machine, plan=plan, noise=Nuisances.none())[0]
         for machine in (NIST, turned)
     )
     assert doubled["stiffness_N_per_mm"] == pytest.approx(2.0 * rows["stiffness_N_per_mm"])

@@ -12,7 +12,7 @@ import pytest
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import score
-from toolpath_stiff.rig.hidden import OUTSIDE
+from toolpath_stiff.rig.unknowns import OUTSIDE
 
 BLIND = ["--seed", "7", "--hidden", "weak_strut", "--layout", "paper"]
 PLAN = "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm,setup,clamp\n0,0,800,X,,table,1\n0,0,800,Z,,riser,2\n"

@@ -9,9 +9,10 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from toolpath_stiff.rig.hidden import HiddenMachine, Oddity, readings, true_stiffness
+from toolpath_stiff.rig.hidden import HiddenMachine, readings, true_stiffness
 from toolpath_stiff.rig.nominal import commanded_lengths, load_nominal, rotations, true_poses
 from toolpath_stiff.rig.rows import Rows
+from toolpath_stiff.rig.unknown import Unknown
 
 NIST = load_nominal("nist")
 AXES = np.eye(3)
@@ -221,7 +222,7 @@ def test_the_instruments():
 
 def test_a_coupled_pair_of_struts_bends_reciprocally():
     """Loads along X + Y and X - Y differ by four times the cross compliance, whichever is loaded first."""
-    hidden = HiddenMachine(oddity=Oddity("strut_crosstalk", 0.3))
+    hidden = HiddenMachine(unknown=Unknown("strut_crosstalk", 0.3))
     assert np.abs(np.log(compliance(hidden, SOMEWHERE) / BASE)).max() > 0.01
     tensor = []
     for d in (AXES[0], AXES[1], (AXES[0] + AXES[1]) / np.sqrt(2), (AXES[0] - AXES[1]) / np.sqrt(2)):

@@ -63,9 +63,9 @@ def test_several_slips_are_in_different_rows():
 def test_a_slip_that_the_table_has_no_room_for_is_refused():
     rng = np.random.default_rng(1)
     with pytest.raises(InputError, match="sign_of_angle"):
-        with_slip(draw_case(1, "paper", "none").rows, CASE.nominal, rng, "sign_of_angle")
+        with_slip(CASE, draw_case(1, "paper", "none").rows, rng, "sign_of_angle")
     with pytest.raises(InputError, match="no slip called"):
-        with_slip(CASE.rows, CASE.nominal, rng, "coffee")
+        with_slip(CASE, CASE.rows, rng, "coffee")
 
 
 def test_a_noise_is_stated_as_it_is_or_by_a_factor():

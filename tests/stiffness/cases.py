@@ -8,10 +8,11 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.stiffness.reference import structure_stiffness
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness.truss import TIP, platform_nodes, structure_stiffness
+from toolpath_stiff.stiffness.truss import TIP, platform_nodes
 
 FloatArray = NDArray[np.float64]
 AXES = ("x", "y", "z")

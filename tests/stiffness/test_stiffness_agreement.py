@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.stiffness import reference
 from tests.stiffness.cases import nist, random_poses, wrench_compliance
 from toolpath_stiff.rotations import rotation_about_z
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness import truss as reference
 from toolpath_stiff.stiffness.core import BLOCK, tip_compliance
 from toolpath_stiff.stiffness.model import build_model, load_path
 

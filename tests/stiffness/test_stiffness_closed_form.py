@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.stiffness import reference
 from tests.stiffness.cases import nist, orthogonal_hexapod, random_poses
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness import truss as reference
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.model import build_model, load_path

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.stiffness import reference
 from tests.stiffness.cases import nist, table_1_positions, table_1_stiffness
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import truss as reference
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.model import build_model
 

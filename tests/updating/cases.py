@@ -68,7 +68,7 @@ def campaign(
     nuisances: hidden_module.Nuisances | None = None,
 ) -> tuple[Readings, dict[str, Any]]:
     """A blind campaign on the NIST machine and its truth."""
-    rows, truth = case.make_case(seed, layout=layout, hidden=hidden, size=size, nuisances=nuisances)
+    rows, truth = case.make_case(seed, layout=layout, hidden=hidden, size=size, noise=nuisances or 0.02)
     return read_text(exercise.csv_text(rows)), truth
 
 
@@ -257,7 +257,7 @@ def correlated_covariance(own: ArrayLike, shared: ArrayLike) -> Covariance:
 
 def examined(machine: Hexapod, data: Readings, **options: Any) -> Diagnosis:
     """A diagnosis without the plan of what to measure next."""
-    return diagnose(machine, data, plan_next=False, **options)
+    return diagnose(machine, data, **options)
 
 
 @cache

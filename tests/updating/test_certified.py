@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from toolpath_stiff.inference.noise import NormalEquations, gauss_newton, scaled_inverse
+from toolpath_stiff.inference.least_squares import NormalEquations, gauss_newton, scaled_inverse
 
 FloatArray = NDArray[np.float64]
 

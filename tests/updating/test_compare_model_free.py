@@ -72,8 +72,8 @@ def test_a_soft_table_breaks_the_symmetry_on_the_axis():
 def test_turned_poses_are_images_of_each_other():
     found, _ = checked(modelled(turned_poses()))
     images = [one for one in found if one.check == "symmetric images"]
-    # Three pairs of poses: Z, the turned X, and the sum of the compliances across the axis.
-    assert len(images) >= 8
+    # Three pairs of poses: along Z, and along the turned X.
+    assert len(images) >= 6
     assert all(abs(one.percent) < 1e-3 for one in images)
     broken, _ = checked(modelled(turned_poses(), [active("weak_strut", {"strut": 3}, factor=0.7)]))
     assert any(not one.holds for one in broken if one.check == "symmetric images")
@@ -104,7 +104,6 @@ def test_set_ups_at_one_pose():
 def test_what_cannot_be_checked_is_said_with_the_reason():
     _, cannot = checked(table_1())
     reasons = {one.check: one.reason for one in cannot}
-    assert "displacement across the load" in reasons["reciprocity"]
     assert reasons["proportionality"] == "no pose was measured at two loads"
     assert reasons["set-ups"] == "no pose was measured in two set-ups"
 

@@ -17,7 +17,7 @@ from toolpath_stiff.inference.gates import Forms, absolute_gate, simulate
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import from_repeats, repeat_groups
-from toolpath_stiff.inference.slips import alone, mended, slips_that_show, suspect_entries, suspect_rows
+from toolpath_stiff.inference.slips import alone, mended, suspect_entries, suspect_rows
 from toolpath_stiff.rig.hidden import Nuisances
 
 DATA = campaign(78, "tilted", "none")[0]
@@ -96,7 +96,7 @@ def test_rows_are_left_out_where_that_explains_all_and_else_stay() -> None:
 
 
 @pytest.mark.parametrize(("scatter", "shows"), [(0.003, True), (0.08, False)])
-def test_a_slip_is_found_where_it_is_said_to_show(scatter: float, shows: bool) -> None:
+def test_a_slip_is_found_where_it_shows(scatter: float, shows: bool) -> None:
     """All of two clampings typed 1 degree off in b, one at a time, on a machine that is as modelled."""
     rng, noise, found = np.random.default_rng(5), simple_noise(len(DATA), scatter, outliers=0.02), 0
     true = predictor_for(DATA).log_stiffness() + scatter * rng.standard_normal(len(DATA))
@@ -106,11 +106,7 @@ def test_a_slip_is_found_where_it_is_said_to_show(scatter: float, shows: bool) -
         problem = Problem.of(Predictor(nist(), replace(DATA, angles=angles, stiffness=np.exp(true))), noise)
         base = problem.score_base()
         found += any(set(one.rows) == set(rows.tolist()) for one in suspect_rows(problem, base))
-    sizes = {one.column: one.size for one in slips_that_show(problem, base)}
-    assert (sizes["b_deg"] < 0.5) == shows and (sizes["b_deg"] > 1.5) == (not shows)
     assert found == (2 if shows else 0)
-    # The platform's place shows far later than its tilt.
-    assert 10.0 * sizes["b_deg"] < sizes["x_mm"]
 
 
 def test_how_the_time_is_written_changes_neither_noise_nor_verdict() -> None:

@@ -13,8 +13,9 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, read_text
 from tests.updating.test_diagnose import SADDLE
+from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
-from toolpath_stiff.diagnosis.diagnose import common_verdict, diagnose
+from toolpath_stiff.diagnosis.diagnose import common_verdict, diagnose, with_plan
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.drawn import CONFIRMS, foretold
 from toolpath_stiff.inference.evidence import Problem
@@ -51,7 +52,7 @@ def among_few(data, file):
 def described(tmp_path_factory):
     """Judged by the readings that it was drawn from alone."""
     file = drawn_file(tmp_path_factory.mktemp("draft_status"), slice(None))
-    return diagnose(nist(), DATA, effect_files=[file]), file
+    return with_plan(diagnose(nist(), DATA, effect_files=[file])), file
 
 
 def test_the_readings_that_it_was_drawn_from_only_describe(described):
@@ -72,7 +73,7 @@ def test_the_readings_that_it_was_drawn_from_only_describe(described):
 
 def test_an_update_by_them_says_so(described):
     _, file = described
-    found = update(nist(), DATA, ["saddle"], effect_files=[file], files=["nist-table1"])
+    found = update(UpdateTask(nist(), DATA, ["saddle"], effect_files=[file], files=["nist-table1"]))
     said = found.document
     assert said["verdict"] == "updated" and said["described"] == ["saddle"]
     assert "added as described, not as identified" in said["text"]

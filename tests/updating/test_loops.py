@@ -10,6 +10,7 @@ from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.correction.document import residuals_csv
+from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.errors import InputError, InputErrors
@@ -229,9 +230,9 @@ def joints(tmp_path_factory):
 
 def test_what_the_tip_cannot_tell_an_indicator_names(joints):
     """A constant compliance in series with every strut is a strut law to the tip; across a joint it is nothing else."""
-    alone = diagnose(nist(), read_measurements(joints[0], nist()), plan_next=False)
+    alone = diagnose(nist(), read_measurements(joints[0], nist()))
     assert alone.verdict == "adequate" and "joint_compliance" in alone.plausible
-    found = diagnose(nist(), read_measurements(list(joints), nist()), plan_next=False)
+    found = diagnose(nist(), read_measurements(list(joints), nist()))
     assert (found.verdict, found.plausible) == ("identified", ["joint_compliance"])
     written = found.to_dict()
     # Errors are those of the tip's readings; the loops stand beside them.
@@ -256,9 +257,9 @@ def test_compare_shows_loops_in_a_section_of_their_own(joints):
 
 def test_update_counts_errors_over_the_tip_as_compare_does(joints):
     data = read_measurements(list(joints), nist())
-    compared, found = compare(nist(), data, draws=20).document, update(nist(), data, strut_law=True)
+    compared, found = compare(nist(), data, draws=20).document, update(UpdateTask(nist(), data, strut_law=True))
     written = found.document
-    assert written["readings"] == compared["readings"] == 42 < len(found.data)
+    assert written["readings"] == compared["readings"] == 42 < len(found.task.data)
     step, given = compared["baseline"], written["steps"][0]
     for name in ("mean_abs_error_percent", "bias_percent", "rms_percent"):
         assert given[name] == pytest.approx(step[name], abs=1e-3)
@@ -352,7 +353,7 @@ def test_the_next_pose_is_another_one_until_it_is_settled(step_by_step, tmp_path
 
 def test_next_says_what_it_needs(tmp_path, capsys):
     assert main(["plan", "--next", str(tmp_path)]) == 2
-    assert "folder of a plan" in capsys.readouterr().err
+    assert "no table of a plan" in capsys.readouterr().err
     (tmp_path / TABLES).write_bytes(b"nothing")
     assert main(["plan", "--next", str(tmp_path)]) == 2
     assert "no table of a plan" in capsys.readouterr().err

@@ -5,27 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
-from scipy.optimize import lsq_linear, minimize_scalar
+from scipy.optimize import lsq_linear
 
-from toolpath_stiff.inference.minima import bounded_minimum, bounded_step
-from toolpath_stiff.inference.splines import Spline
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_least_value_along_a_line(seed: int) -> None:
-    a, b, c = 3.0 * np.random.default_rng(seed).random(3)
-
-    def curve(x: float) -> float:
-        return float((x - a) ** 2 * b + np.sin(3.0 * x + c))
-
-    assert bounded_minimum(curve, 0.0, 5.0) == pytest.approx(
-        minimize_scalar(curve, bounds=(0.0, 5.0), method="bounded").x, abs=1e-8
-    )
-
-
-def test_a_minimum_at_an_end_is_found() -> None:
-    assert bounded_minimum(lambda x: x, 0.0, 5.0) == pytest.approx(0.0, abs=2e-5)
-    assert bounded_minimum(lambda x: -x, 0.0, 5.0) == pytest.approx(5.0, abs=2e-5)
+from toolpath_stiff.inference.candidates import spline
+from toolpath_stiff.inference.least_squares import bounded_step
 
 
 def test_bounded_steps_are_bounded_variable_least_squares() -> None:
@@ -48,4 +31,4 @@ def test_splines_are_not_a_knot_splines(count: int) -> None:
     rng = np.random.default_rng(count)
     knots, values = np.sort(rng.random(count)) + np.arange(count), rng.random((count, 3))
     at = rng.uniform(knots[0] - 0.1, knots[-1] + 0.1, (5, 7))
-    assert Spline.through(knots, values)(at) == pytest.approx(CubicSpline(knots, values)(at), abs=1e-12)
+    assert spline(knots, values)(at) == pytest.approx(CubicSpline(knots, values)(at), abs=1e-12)

@@ -19,10 +19,10 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import VERDICTS as CASES
 from tests.updating.cases import campaign, diagnosed, examined, table_1
 from toolpath_stiff.comparison.compare import Comparison, compare
-from toolpath_stiff.correction.additions import parse_addition
 from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.ladder import _Work, build_ladder
 from toolpath_stiff.correction.result import Update
+from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.diagnosis import words as verdict_words
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.rows import odds_words
@@ -63,8 +63,7 @@ def updated(data: Readings, *names: str, **options: Any) -> dict[str, Any]:
 
 
 def update_of(data: Readings, *names: str, **options: Any) -> Update:
-    found = build_ladder(nist(), data, [parse_addition(name, data) for name in names], **options)
-    return replace(found, provenance=PROVENANCE, names=("a.csv",))
+    return replace(build_ladder(UpdateTask(nist(), data, names, **options)), provenance=PROVENANCE)
 
 
 # -- one baseline ------------------------------------------------------------------------------------------------------
@@ -127,18 +126,18 @@ def test_a_mean_error_that_rises_with_the_refitted_law_has_its_reason():
 
 def test_a_kept_law_is_said_beside_the_refitted_one():
     data = diagnosed(*CASES["identified"]).data
-    kept = updated(data, "table_compliance", keep_law=True, force=True)
+    kept = updated(data, "table_compliance", keep_strut_law=True, force=True)
     assert [step["name"] for step in kept["steps"]] == ["as given", "+ table_compliance"]
     assert f"(strut law refitted alone) {told('identified')['baseline'][MEAN]:.2f} %" in kept["text"]
 
 
 def test_nothing_added_leaves_the_machine_file_as_it_is():
     """The refitted law is shown, and it is not written unless it is asked for."""
-    found = build_ladder(nist(), table_1(), auto=True)
+    found = build_ladder(UpdateTask(nist(), table_1(), auto=True))
     assert not found.accepted and not found.changed
     assert [step.name for step in found.steps] == ["as given", "strut law refitted"]
     assert found.last is found.steps[0]
-    assert build_ladder(nist(), table_1(), strut_law=True).accepted
+    assert build_ladder(UpdateTask(nist(), table_1(), strut_law=True)).accepted
 
 
 # -- one sign ----------------------------------------------------------------------------------------------------------
@@ -159,7 +158,7 @@ def test_minus_is_softer_than_modelled_everywhere(factor, sign):
     signs += [float(found.residual.mean())]  # what every picture of residuals draws, as 100 (exp r - 1)
     compliance = np.mean(1.0 / data.stiffness) / np.mean(np.exp(-found.log_model))
     signs += [stiffness_deviation_percent(float(compliance))]
-    found_update = build_ladder(nist(), data, strut_law=True)
+    found_update = build_ladder(UpdateTask(nist(), data, strut_law=True))
     told_update = replace(found_update, provenance=PROVENANCE).document["steps"][0]
     signs += [told_update["bias_percent"], *(one["bias_percent"] for one in told_update["by_direction"].values())]
     rows = list(csv.DictReader(io.StringIO(residuals_csv(found_update))))
@@ -309,8 +308,7 @@ def ladder(errors: dict[frozenset[str], float], *names: str) -> list[tuple[str, 
         return SimpleNamespace(fit=SimpleNamespace(names=held), error=value, held=SimpleNamespace(mean_error=value))
 
     work = object.__new__(_Work)
-    work.say = lambda text: None
-    work.added = lambda before, candidates: step((*before.fit.names, candidates[0].name))
+    work.task = SimpleNamespace(progress=lambda text: None)
     work.together = lambda before, asked: step((*before.fit.names, *(one[0].name for one in asked)))
     asked = [[SimpleNamespace(name=name)] for name in names]
     return [one.fit.names for one in work.ladder(step(()), asked)]

@@ -287,7 +287,6 @@ def test_a_certain_rival_takes_no_visits_from_the_doubtful_ones():
         ({"n": 0}, "0 poses"),
         ({"noise_relative": 0.0}, "noise"),
         ({"rivals": []}, "two or more"),
-        ({"rivals": [Rival("none"), Rival("none")]}, "different names"),
         ({"menu": Menu(heights=(20.0,))}, "reaches none"),
     ],
 )

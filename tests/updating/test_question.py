@@ -10,6 +10,7 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, examined, predictor_for, table_1
 from toolpath_stiff.comparison.compare import compare
+from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.question import question
@@ -70,7 +71,7 @@ def test_the_verdict_is_unexplained_and_the_question_is_put():
 
 
 def test_nothing_is_written_of_readings_of_something_else_but_by_force():
-    refused, forced = (update(nist(), TENFOLD, strut_law=True, force=force) for force in (False, True))
+    refused, forced = (update(UpdateTask(nist(), TENFOLD, strut_law=True, force=force)) for force in (False, True))
     assert refused.corrected is None and forced.corrected is not None
     assert [one.verdict for one in (refused, forced)] == ["refused", "forced"]
     assert all(ASKED in one.document["text"] for one in (refused, forced))
@@ -78,7 +79,7 @@ def test_nothing_is_written_of_readings_of_something_else_but_by_force():
 
 def test_a_machine_that_fits_worse_is_never_written():
     """The strut law of the second packaged machine, fitted to the paper's readings: 77 to 388 %."""
-    found = update(load_machine("nategh_agheli"), TABLE, strut_law=True, force=True)
+    found = update(UpdateTask(load_machine("nategh_agheli"), TABLE, strut_law=True, force=True))
     before, after = (step.fit.errors.mean() for step in found.steps)
     assert after > 2.0 * before
     assert found.worse and found.corrected is None
@@ -86,7 +87,7 @@ def test_a_machine_that_fits_worse_is_never_written():
 
 
 def test_a_mean_error_that_rises_within_rounding_is_no_worse_fit():
-    found = update(nist(), TABLE, strut_law=True)
+    found = update(UpdateTask(nist(), TABLE, strut_law=True))
     before, after = (step.fit.errors.mean() for step in found.steps)
     assert after > before  # 9.62 to 9.72 %: likelier, by fewer readings far off
     assert not found.worse and found.corrected is not None
@@ -96,8 +97,8 @@ def test_a_mean_error_that_rises_within_rounding_is_no_worse_fit():
 def test_repeats_that_agree_exactly_tell_nothing_of_the_scatter(command):
     """Copied rows, as spreadsheets make them: the noise is guessed as without repeats."""
     few = TABLE.select(np.tile(np.r_[0:6, 21:27], 2))
-    options = {"strut_law": True} if command is update else {"draws": 50} if command is compare else {}
-    found = command(nist(), few, **options)
-    origins = [one["origin"] for one in found.document["noise"]] if command is compare else []
-    origins += [found.noise.origin] if command is update else []
+    if command is compare:
+        origins = [one["origin"] for one in compare(nist(), few, draws=50).document["noise"]]
+    else:
+        origins = [update(UpdateTask(nist(), few, strut_law=True)).noise.origin]
     assert origins and all("agree exactly" in origin for origin in origins)

@@ -13,6 +13,7 @@ from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.correction.additions import parse_addition
 from toolpath_stiff.correction.document import residuals_csv
 from toolpath_stiff.correction.ladder import build_ladder
+from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
 from toolpath_stiff.correction.update import update_by_mean_error
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
@@ -53,9 +54,7 @@ def readings(*effects, law=(0.0, 0.0), scatter=0.02, seed=1):
 
 def updated(data, *names, files=(), **options):
     machine = options.pop("machine", nist())
-    return build_ladder(
-        machine, data, [parse_addition(name, data, files) for name in names], effect_files=files, **options
-    )
+    return build_ladder(UpdateTask(machine, data, names, effect_files=files, **options))
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +62,7 @@ def two():
     """24 tilted poses of a rig machine that hides contact nonlinearity and a gauge 4 % off along Y."""
     data, truth = campaign(9, "tilted", "two")
     assert [one["effect"] for one in truth["effects"]] == ["contact_nonlinearity", "gauge_scale"]
-    return build_ladder(nist(), data, auto=True, strut_law=True), truth
+    return build_ladder(UpdateTask(nist(), data, auto=True, strut_law=True)), truth
 
 
 @pytest.fixture(scope="module")
@@ -100,8 +99,8 @@ def test_the_file_gives_the_fit_back(two):
     found, _ = two
     machine = found.fitted(PROVENANCE)
     again = parse_machine(machine_toml(machine))
-    modelled = Predictor(again, found.data).log_stiffness()
-    fitted = np.log(found.data.stiffness) - found.last.fit.residual
+    modelled = Predictor(again, found.task.data).log_stiffness()
+    fitted = np.log(found.task.data.stiffness) - found.last.fit.residual
     # Fitted numbers stand in the file to seven digits, on which all processors agree.
     assert modelled == pytest.approx(fitted, rel=0, abs=1e-7)
     assert [entry.name for entry in again.effects] == ["contact_nonlinearity"]
@@ -142,7 +141,7 @@ def test_the_weak_strut_is_found_among_six(weak):
 
 
 def test_a_choice_is_kept(weak):
-    found = updated(weak.data, "weak_strut:strut=5", strut_law=True)
+    found = updated(weak.task.data, "weak_strut:strut=5", strut_law=True)
     assert found.last.fit.effects[0].values["strut"] == 5
     assert found.last.held.mean_error > weak.last.held.mean_error
 
@@ -154,10 +153,10 @@ def test_what_is_not_there_is_refused_unless_forced():
         assert not found.accepted
         assert found.supports[0].reasons
     assert updated(data, name, strut_law=True, force=True).accepted
-    told = replace(found, provenance=PROVENANCE, names=("a.csv",)).document
+    told = replace(found, provenance=PROVENANCE).document
     assert told["verdict"] == "refused"
     assert found.supports[0].reasons[0] in told["text"]
-    assert not build_ladder(nist(), data, auto=True, strut_law=True).last.fit.names
+    assert not build_ladder(UpdateTask(nist(), data, auto=True, strut_law=True)).last.fit.names
 
 
 def test_a_parameter_at_its_bound_is_refused():
@@ -181,7 +180,7 @@ def test_each_effect_is_judged_beside_the_others():
 
 
 def test_the_law_stays_if_that_is_asked_for(weak):
-    found = updated(weak.data, "weak_strut", keep_law=True)
+    found = updated(weak.task.data, "weak_strut", keep_strut_law=True)
     assert [step.name for step in found.steps] == ["as given", "+ weak_strut (strut 3)"]
     assert np.array_equal(found.last.fit.law, [0.0, 0.0])
     machine = found.fitted(PROVENANCE)
@@ -191,8 +190,10 @@ def test_the_law_stays_if_that_is_asked_for(weak):
 
 def test_an_update_on_top_of_an_update(weak):
     first = weak.fitted(PROVENANCE)
-    data = replace(weak.data, stiffness=np.where(weak.data.direction[:, 1] > 0.9, 1.08, 1.0) * weak.data.stiffness)
-    found = updated(data, "gauge_scale:direction=Y", machine=first, keep_law=True)
+    data = replace(
+        weak.task.data, stiffness=np.where(weak.task.data.direction[:, 1] > 0.9, 1.08, 1.0) * weak.task.data.stiffness
+    )
+    found = updated(data, "gauge_scale:direction=Y", machine=first, keep_strut_law=True)
     assert found.accepted
     machine = found.fitted(PROVENANCE)
     assert [entry.name for entry in (*machine.effects, *machine.instruments)] == ["weak_strut", "gauge_scale"]
@@ -216,7 +217,7 @@ def test_a_users_own_effect(tmp_path):
 
 
 def test_the_papers_own_estimation():
-    found = update_by_mean_error(nist(), table_1(), seed=1)
+    found = update_by_mean_error(UpdateTask(nist(), table_1(), strut_law=True, objective=MEAN_ERROR, seed=1))
     first, last = (step.fit.errors.mean() for step in found.steps)
     assert (first, last) == (pytest.approx(0.0962, abs=5e-5), pytest.approx(0.0942, abs=5e-5))
     # Fitted to the points themselves, the law does worse at points that it has not seen.
@@ -232,7 +233,7 @@ def test_the_papers_own_estimation():
 
 
 def test_the_document_and_the_residuals_agree_with_the_fit(weak):
-    told = replace(weak, provenance=PROVENANCE, names=("a.csv",)).document
+    told = replace(weak, provenance=PROVENANCE).document
     assert told["verdict"] == "updated"
     assert [step["name"] for step in told["steps"]] == ["as given", "strut law refitted", "+ weak_strut (strut 3)"]
     assert set(told["steps"][0]["by_direction"]) == {"X", "Y", "Z"}
@@ -268,11 +269,11 @@ def test_additions_that_cannot_be(text, match):
 def test_updates_that_cannot_be():
     data = readings()
     with pytest.raises(InputError, match="nothing to update"):
-        build_ladder(nist(), data)
+        build_ladder(UpdateTask(nist(), data))
     with pytest.raises(InputError, match="twice"):
         updated(data, "weak_strut:strut=3", "weak_strut:strut=4")
     carrying = nist().with_changes(effects=(EffectEntry("joint_compliance", {"compliance_nm_per_N": 1.0}),))
     with pytest.raises(InputError, match="already"):
         updated(data, "joint_compliance", machine=carrying)
     with pytest.raises(InputError, match="at least 6"):
-        build_ladder(nist(), data.select(np.arange(5)), strut_law=True)
+        build_ladder(UpdateTask(nist(), data.select(np.arange(5)), strut_law=True))

@@ -24,7 +24,6 @@ from toolpath_stiff.inference.judgement import (
     FALSE_ALARM,
     NONE,
     OUTSIDE,
-    Probabilities,
     _smallest_set,
     _sparing,
     decide,
@@ -208,7 +207,7 @@ def test_the_plausible_set_is_the_smallest_that_holds_95_percent():
     ],
 )
 def test_a_pair_is_named_where_no_other_is_left(weights, verdict, explanations):
-    assert decide(SimpleNamespace(enough=False, singles=()), Probabilities(weights)) == (verdict, explanations)
+    assert decide(SimpleNamespace(enough=False, singles=()), weights) == (verdict, explanations)
 
 
 @pytest.mark.parametrize(

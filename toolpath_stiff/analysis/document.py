@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.loads import RULES
 from toolpath_stiff.analysis.statistics import (
     FIGURES,
     EvaluatedPath,
@@ -19,7 +15,7 @@ from toolpath_stiff.analysis.statistics import (
     share,
 )
 from toolpath_stiff.analysis.uncertainty import band_figures
-from toolpath_stiff.documents import to_dict
+from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.stiffness.model import acting_effects, conditions_stated, effects_stated
@@ -28,15 +24,14 @@ from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s, n_per_mm_fr
 
 def assumptions(analysis: EvaluatedPath) -> list[str]:
     """Everything that was assumed or recovered rather than published or given; plain sentences."""
-    machine = analysis.machine
+    machine, model, law = analysis.machine, analysis.model, analysis.machine.strut_law
     sentences = list(analysis.program.assumptions)
     if words_turn_the_platform(analysis.program):
         sentences.append(
             "A, B, C of the program are roll, pitch, yaw of the platform (see [kinematics] of controller files)"
         )
     if analysis.origin_source == "default":
-        values = pose_in_mm(analysis.origin)
-        words = [f"{axis}{value:g}" for axis, value in zip("XYZABC", values, strict=True)]
+        words = [f"{axis}{value:g}" for axis, value in zip("XYZABC", pose_in_mm(analysis.origin), strict=True)]
         where = " ".join(words if any(analysis.origin[3:]) else words[:3])
         sentences.append(
             f"program zero (G54) sits at {where} in machine coordinates, the machine's default; "
@@ -46,40 +41,34 @@ def assumptions(analysis: EvaluatedPath) -> list[str]:
         if origin != "published":
             remark = machine.remarks.get(quantity)
             sentences.append(f"machine {machine.name}: {quantity} {origin}" + (f": {remark}" if remark else ""))
-    feed = mm_per_min_from_m_per_s(machine.rapid_feed)
-    sentences += [f"rapid moves take {feed:g} mm/min (time only)", f"load {analysis.load}: {RULES[analysis.load.kind]}"]
-    sentences += conditions_stated(analysis.model)
-    acting = acting_effects(analysis.model)
-    secant = "; the stiffness is the secant one at this load" if analysis.model.load_dependent else ""
-    sentences.append(f"a force of {analysis.force:g} N for deflections{secant}")
-    law = machine.strut_law
-    sentences.append(
-        "the stiffness of a strut is the same at every length"
-        if law.constant
-        else f"the strut law is extrapolated outside {mm_from_m(min(law.length_1, law.length_2)):.1f} to "
-        f"{mm_from_m(max(law.length_1, law.length_2)):.1f} mm of strut length"
-    )
+    secant = "; the stiffness is the secant one at this load" if model.load_dependent else ""
+    sentences += [
+        f"rapid moves take {mm_per_min_from_m_per_s(machine.rapid_feed):g} mm/min (time only)",
+        *conditions_stated(model),
+        f"a force of {analysis.force:g} N for deflections{secant}",
+    ]
+    low, high = sorted((mm_from_m(law.length_1), mm_from_m(law.length_2)))
+    range_of_law = f"the strut law is extrapolated outside {low:.1f} to {high:.1f} mm of strut length"
+    sentences.append("the stiffness of a strut is the same at every length" if law.constant else range_of_law)
     if analysis.parameter_band is not None:
         sentences.append(
             "the band of the stiffness holds the uncertainty of the fitted parameters alone, propagated linearly: "
             f"{', '.join(analysis.parameter_band.names)}"
         )
-    if not acting:
+    if not acting_effects(model):
         sentences.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
     return sentences
 
 
-def summarise(analysis: EvaluatedPath) -> dict[str, Any]:
+def summarise(analysis: EvaluatedPath) -> Document:
     """The figures of `summary.json`, in the shop's units."""
-    samples = analysis.samples
-    cutting = samples.cutting & analysis.at.reachable
-    nearest = int(np.argmin(np.where(cutting, analysis.at.margin, np.inf)))
-    band = analysis.parameter_band
-    uncertainty = None if band is None else band_figures(band, samples, analysis.at.stiffness, analysis.headline)
+    samples, program, at, band = analysis.samples, analysis.program, analysis.at, analysis.parameter_band
+    cutting, headline = samples.cutting & at.reachable, analysis.headline
+    nearest = int(np.argmin(np.where(cutting, at.reach.margin, np.inf)))
     return {
-        "program": analysis.program.name,
-        "interpreter": analysis.program.interpreter,
-        "kinematics": analysis.program.kinematics,
+        "program": program.name,
+        "interpreter": program.interpreter,
+        "kinematics": program.kinematics,
         "machine": analysis.machine.name,
         "load": str(analysis.load),
         "force_N": analysis.force,
@@ -91,24 +80,24 @@ def summarise(analysis: EvaluatedPath) -> dict[str, Any]:
         "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
         "time_s": float(samples.t[-1]) if len(samples) else 0.0,
         **analysis.figures,
-        **({} if band is None else {"parameter_uncertainty": to_dict(uncertainty)}),
+        **({} if band is None else {"parameter_uncertainty": band_figures(band, samples, at.stiffness, headline)}),
         "weakest_places": [describe_sample(analysis, row) for row in analysis.weakest_rows],
         "per_tool": per_tool(analysis),
         "per_operation": per_operation(analysis),
-        "min_margin": float(analysis.at.margin[nearest]),
-        "min_margin_limit": analysis.at.reach.describe(nearest),
+        "min_margin": float(at.reach.margin[nearest]),
+        "min_margin_limit": at.reach.describe(nearest),
         "min_margin_line": int(samples.line[nearest]),
         "out_of_reach_samples": int(analysis.out_of_reach.sum()),
-        "extrapolated_share": share(analysis.at.extrapolated, cutting),
+        "extrapolated_share": share(at.extrapolated, cutting),
         **effects_stated(analysis.model),
-        "unsupported": to_dict(analysis.program.unsupported),
+        "unsupported": to_dict(program.unsupported),
         "assumptions": assumptions(analysis),
         "warnings": analysis.warnings,
         "version": defaults.VERSION,
     }
 
 
-def idle_on(other: Mapping[str, Any]) -> list[str]:
+def idle_on(other: Document) -> list[str]:
     """Effects of the other machine that wait for something: without them the two machines may look the same."""
     return [
         f"{both_names('--compare', other['machine'])}: {idle['effect']} does not act: {idle['reason']}"
@@ -116,7 +105,7 @@ def idle_on(other: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def compare_summaries(summary: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+def compare_summaries(summary: Document, other: Document) -> Document:
     """The entry `compare` of `summary.json`.
 
     The other machine's figures, and `difference_percent`: how much higher each is than the first machine's

@@ -13,7 +13,7 @@ from toolpath_stiff.analysis.loads import Load, geometric_directions, load_direc
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import PoseError
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Extremes, Limit, Reach, machine_limits, reach
+from toolpath_stiff.machine.limits import Extremes, Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
@@ -39,30 +39,20 @@ class Evaluation:
         (n, 6) m.
     extrapolated
         (n,) a strut is longer or shorter than the strut law was given for.
-    margin, limit, limit_value
-        (n,) as in `Reach`.
-    limits
-        The machine's limits.
+    reach
+        Margins and limits.
     """
 
     stiffness: FloatArray
     substituted: BoolArray
     strut_lengths: FloatArray
     extrapolated: BoolArray
-    margin: FloatArray
-    limit: IntArray
-    limit_value: FloatArray
-    limits: tuple[Limit, ...]
+    reach: Reach
 
     @property
     def reachable(self) -> BoolArray:
         """(n,) whether every limit is kept."""
-        return np.asarray(self.margin >= 0.0)
-
-    @property
-    def reach(self) -> Reach:
-        """The limits' side of it, for `Reach.describe`."""
-        return Reach(self.margin, self.limit, self.limit_value, self.limits)
+        return self.reach.reachable
 
     def put(
         self,
@@ -74,7 +64,8 @@ class Evaluation:
     ) -> None:
         """Enter the figures of some rows."""
         self.stiffness[rows], self.strut_lengths[rows], self.extrapolated[rows] = stiffness, strut_lengths, extrapolated
-        self.margin[rows], self.limit[rows], self.limit_value[rows] = stand.margin, stand.limit, stand.value
+        for name in ("margin", "limit", "value"):
+            getattr(self.reach, name)[rows] = getattr(stand, name)
 
 
 def evaluate(
@@ -125,10 +116,7 @@ def evaluate(
         substituted=np.zeros(n, dtype=bool),
         strut_lengths=np.empty((n, 6)),
         extrapolated=np.zeros(n, dtype=bool),
-        margin=np.empty(n),
-        limit=np.zeros(n, dtype=np.int64),
-        limit_value=np.empty(n),
-        limits=machine_limits(model.machine),
+        reach=Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(model.machine)),
     )
     task = _Task(model, position, abc, tangent, lengths, load or Load(), force, route, result)
     for start in range(0, n, BLOCK):
@@ -178,8 +166,7 @@ def other_poses(position: FloatArray, abc: FloatArray, tool_length: FloatArray) 
     """(n,) True for another pose than the one before it: a move begins where the last one has ended."""
     other = np.zeros(len(position), dtype=bool)
     other[:1] = True
-    tools = () if isinstance(_one_if_equal(tool_length), float) else (tool_length,)
-    for values in (*position.T, *abc.T, *tools):
+    for values in (*position.T, *abc.T, np.nan_to_num(tool_length, nan=-1.0)):
         other[1:] |= values[1:] != values[:-1]
     return other
 
@@ -198,7 +185,7 @@ def _evaluate_fast(task: _Task, rows: slice, new: BoolArray) -> IntArray:
     directed = [geometric_directions(task.load, task.position[some], rotation, task.tangent[some]) for some in samples]
     turns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
     tip, towards = np.ascontiguousarray(task.position[poses].T), np.stack([direction.T for direction, _ in directed])
-    for tool, some in _of_one_tool(task.tool_length[poses]):
+    for tool, some in core.rows_of_tools(task.tool_length[poses]):
         turn = None if turns is None else turns[:, some]
         there = tip[:, some]
         compliance, determinant, lengths, good = core.compliance_along_columns(
@@ -232,21 +219,12 @@ def _rows_of_poses(rows: slice, new: BoolArray) -> list[slice | IntArray]:
     return [first, np.append(first[1:], rows.stop) - 1]
 
 
-def _of_one_tool(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]]:
-    """Each tool length, nan counts as one, and the rows that have it."""
-    single = _one_if_equal(tool_length)
-    if isinstance(single, float):
-        return [(single, slice(None))]
-    lengths, number = np.unique(tool_length, return_inverse=True)
-    return [(float(length), np.flatnonzero(number == i)) for i, length in enumerate(lengths)]
-
-
 def _evaluate_rows(task: _Task, rows: slice | IntArray) -> None:
     """Any poses under any load, one by one where effects ask for it."""
     model, machine, force = task.model, task.model.machine, task.force
     tip, angles, tool = task.position[rows], task.abc[rows], task.tool_length[rows]
     rotation = rotation_matrices(angles) if np.any(angles != 0.0) else None
-    struts = solve_struts(machine, tip, rotation, _one_if_equal(tool))
+    struts = solve_struts(machine, tip, rotation, tool)
     stand = reach(machine, tip, struts, rotation)
     within = stand.reachable
     compliance = np.full((len(tip), 3, 3), np.nan)
@@ -286,10 +264,3 @@ def refuse_no_number(machine: Hexapod, tip: FloatArray, bad: BoolArray) -> None:
             f"machine {machine.name} is singular at X{x:g} Y{y:g} Z{z:g} mm: the tip has no stiffness there",
             hint="keep such poses out of reach: min_index of [limits.singularity] in the machine file, such as 0.05",
         )
-
-
-def _one_if_equal(tool_length: FloatArray) -> FloatArray | float:
-    """A single tool length where all are equal (all nan counts): the kinematics is then cheaper."""
-    if len(tool_length) and (np.isnan(tool_length).all() or np.ptp(tool_length) == 0.0):
-        return float(tool_length[0])
-    return tool_length

@@ -13,6 +13,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import Progress, evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.results import FolderResult
@@ -72,39 +73,32 @@ class StiffnessMap(FolderResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Extremes of each plane, and of a circle about the machine axis where the planes hold one: `map.json`."""
-        return self._document
-
-    @cached_property
-    def _document(self) -> dict[str, Any]:
         return {
             "machine": self.model.machine.name,
             "load": str(self.load),
             "abc_deg": [deg_from_rad(v) for v in self.abc],
             "points": int(self.stiffness.size),
-            "slices": [self._slice(i) for i in range(len(self.z))],
+            "slices": self._slices,
             **effects_stated(self.model),
             "warnings": condition_warnings(self.model),
         }
 
-    def _slice(self, i: int) -> dict[str, Any]:
-        height, layer = float(self.z[i]), self.stiffness[i]
-        row: dict[str, Any] = {"z_mm": mm_from_m(height), "reachable_share": float(self.reachable[i].mean())}
-        if not self.reachable[i].any():
-            return row
-        for name, place in (("softest", np.nanargmin(layer)), ("stiffest", np.nanargmax(layer))):
-            j, k = np.unravel_index(int(place), layer.shape)
-            row[name] = {
-                "x_mm": mm_from_m(float(self.x[k])),
-                "y_mm": mm_from_m(float(self.y[j])),
-                "stiffness_N_per_mm": n_per_mm_from_n_per_m(float(layer[j, k])),
-            }
+    @cached_property
+    def _slices(self) -> list[Document]:
+        return [self._slice(i) for i in range(len(self.z))]
+
+    def _slice(self, i: int) -> Document:
+        height, layer = float(self.z[i]), n_per_mm_from_n_per_m(self.stiffness[i])
+        row: dict[str, object] = {"z_mm": mm_from_m(height), "reachable_share": float(self.reachable[i].mean())}
+        for name, extreme in (("softest", np.nanargmin), ("stiffest", np.nanargmax)) if self.reachable[i].any() else ():
+            j, k = divmod(int(extreme(layer)), len(self.x))
+            place = {"x_mm": mm_from_m(float(self.x[k])), "y_mm": mm_from_m(float(self.y[j]))}
+            row[name] = {**place, "stiffness_N_per_mm": float(layer[j, k])}
         radius = float(min(-self.x[0], self.x[-1], -self.y[0], self.y[-1]))
-        if radius > 0.0 and not any(self.abc):
+        if self.reachable[i].any() and radius > 0.0 and not any(self.abc):
             turns = turning_points(self.model, radius, height, self.load)
-            row["circle"] = {
-                "radius_mm": mm_from_m(radius),
-                **{f"{k}_deg": [round(deg_from_rad(v), 2) for v in angles] for k, angles in turns.items()},
-            }
+            angles = {f"{k}_deg": [round(deg_from_rad(v), 2) for v in angles] for k, angles in turns.items()}
+            row["circle"] = {"radius_mm": mm_from_m(radius), **angles}
         return row
 
     def columns(self) -> Iterator[dict[str, AnyArray]]:
@@ -183,7 +177,11 @@ def map_stiffness(
     >>> found.stiffness.shape, round(float(found.stiffness[0, 2, 2]) / 1e3)  # N/mm in the middle
     ((1, 3, 3), 54823)
     """
-    _check_map(x, y, load)
+    if load.kind in ("tangential", "normal"):
+        expected = "radial, axial, softest, x, y, z or DX,DY,DZ"
+        raise InputError(f"load {load} needs a path, and a map has none", expected=expected)
+    if not (x[0] < x[1] and y[0] < y[1]):
+        raise InputError("the area of the map has no extent", expected="LO:HI with LO below HI in x and in y")
     spacing = max(x[1] - x[0], y[1] - y[0]) / (points - 1)
     nx, ny = (int(np.ceil((hi - lo) / spacing - 1e-9)) + 1 for lo, hi in (x, y))
     if nx * ny * len(heights) > MOST_POINTS:
@@ -193,23 +191,13 @@ def map_stiffness(
     turned = np.broadcast_to(np.array(abc), grid.shape)
     evaluation = evaluate(model, grid, turned, np.zeros_like(grid), load=load, force=force, progress=progress)
     if not evaluation.reachable.any():
-        nearest = int(np.argmax(evaluation.margin))
-        raise UnreachableError(
-            f"nothing of the map is within reach; the nearest point: {evaluation.reach.describe(nearest)}"
-        )
+        nearest = int(np.argmax(evaluation.reach.margin))
+        near = evaluation.reach.describe(nearest)
+        raise UnreachableError(f"nothing of the map is within reach; the nearest point: {near}")
     shape = (len(zs), ny, nx)
     return StiffnessMap(
         model, xs, ys, zs, evaluation.stiffness.reshape(shape), evaluation.reachable.reshape(shape), load, abc
     )
-
-
-def _check_map(x: tuple[float, float], y: tuple[float, float], load: Load) -> None:
-    if load.kind in ("tangential", "normal"):
-        raise InputError(
-            f"load {load} needs a path, and a map has none", expected="radial, axial, softest, x, y, z or DX,DY,DZ"
-        )
-    if not (x[0] < x[1] and y[0] < y[1]):
-        raise InputError("the area of the map has no extent", expected="LO:HI with LO below HI in x and in y")
 
 
 def around_axis(model: StiffnessModel, radius: float, height: float, load: Load, angles: FloatArray) -> FloatArray:

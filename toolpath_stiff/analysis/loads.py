@@ -20,24 +20,13 @@ import numpy as np
 from toolpath_stiff import defaults, rotations
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.stiffness.core import signed
 
 # Poses (n,) of all and, unless all directions are meant, unit vectors (k, 3) to stay across: to directions (k, 3).
 Softest = Callable[[BoolArray, FloatArray | None], FloatArray]
 
 LOADS = ("tangential", "axial", "normal", "softest", "radial", "x", "y", "z")
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-RULES = {
-    "tangential": "along the motion of the tip; a corner is evaluated once for each of its two moves",
-    "axial": "along the tool axis",
-    "normal": "across the motion and the tool axis (sideways); a move along the tool axis takes the softest "
-    "direction across it",
-    "softest": "the direction in which the tip gives way most",
-    "radial": "in the plane z = const towards the machine axis; on the axis itself along X",
-    "x": "along X of the machine",
-    "y": "along Y of the machine",
-    "z": "along Z of the machine",
-    "fixed": "along a fixed direction of the machine",
-}
 # Below this sine of the angle between motion and tool axis (0.06 degrees) "sideways" has no meaning.
 ALONG_AXIS = 1e-3
 
@@ -148,39 +137,25 @@ def geometric_directions(
 
 def _radial(position: FloatArray) -> FloatArray:
     radius = np.hypot(position[:, 0], position[:, 1])
-    on_axis = radius < 1e-9
-    safe = np.where(on_axis, 1.0, radius)
-    directions = np.zeros_like(position)
-    directions[:, 0] = np.where(on_axis, 1.0, -position[:, 0] / safe)
-    directions[:, 1] = np.where(on_axis, 0.0, -position[:, 1] / safe)
+    directions = -position / np.maximum(radius, 1e-9)[:, None]
+    directions[:, 2] = 0.0
+    directions[radius < 1e-9] = AXES["x"]
     return directions
 
 
 def _softest_of(compliance: FloatArray, rows: BoolArray, axis: FloatArray | None) -> FloatArray:
     """Softest directions of some rows of the compliance (n, 3, 3), in the planes across `axis` if it is given."""
     if axis is None:
-        return softest_directions(compliance[rows])
+        return principal_directions(compliance[rows])
     across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
-    return softest_directions(across @ compliance[rows] @ across)
+    return principal_directions(across @ compliance[rows] @ across)
 
 
-def softest_directions(compliance: FloatArray) -> FloatArray:
-    """(n, 3) unit vectors of the largest eigenvalue of C; the sign makes the largest component positive."""
-    return _principal(compliance, -1)
-
-
-def stiffest_directions(compliance: FloatArray) -> FloatArray:
-    """(n, 3) unit vectors of the smallest eigenvalue of C, signed as `softest_directions`."""
-    return _principal(compliance, 0)
-
-
-def _principal(compliance: FloatArray, which: int) -> FloatArray:
+def principal_directions(compliance: FloatArray, softest: bool = True) -> FloatArray:
+    """(n, 3) unit vectors of the largest, else the smallest eigenvalue of C; their largest component is positive."""
     finite = np.isfinite(compliance).all(axis=(1, 2))
     directions = np.full((len(compliance), 3), np.nan)
-    vectors = np.linalg.eigh(compliance[finite])[1][:, :, which]
-    rows = np.arange(len(vectors))
-    largest = vectors[rows, np.abs(vectors).argmax(axis=1)]
-    directions[finite] = vectors * np.where(largest < 0.0, -1.0, 1.0)[:, None]
+    directions[finite] = signed(np.linalg.eigh(compliance[finite])[1][:, :, -1 if softest else 0])
     return directions
 
 
@@ -207,14 +182,9 @@ def along_tool_axis(tangent: FloatArray, abc: FloatArray) -> BoolArray:
 
 def plunging_rows(load: Load, tangent: FloatArray, abc: FloatArray, counted: BoolArray) -> BoolArray:
     """(n,) the counted samples of plunges; none where the load does not follow the motion. As `headline_rows`."""
-    if not follows_motion(load):
+    if load.kind != "tangential":
         return np.zeros(len(counted), dtype=bool)
     return np.asarray(counted & along_tool_axis(tangent, abc))
-
-
-def follows_motion(load: Load) -> bool:
-    """Whether the load points along the motion, so that a plunge is another case than a cut across the axis."""
-    return load.kind == "tangential"
 
 
 def headline_rows(load: Load, tangent: FloatArray, abc: FloatArray, counted: BoolArray) -> BoolArray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -147,20 +146,17 @@ def _struts(machine: Hexapod) -> list[str]:
     """Stiffnesses of a strut that no strut has, at the lengths that the file gives, else at the ends of the travel."""
     law = machine.strut_law
     ends = [(x, float(law.stiffness(np.array(x)))) for x in machine.limits.strut_length if np.isfinite(x)]
-    return [*_implausible("[strut_law]", law.points)] or [*_implausible("the strut law at an end of the travel", ends)]
+    return _implausible("[strut_law]", law.points) or _implausible("the strut law at an end of the travel", ends)
 
 
-def _implausible(where: str, struts: list[tuple[float, float]]) -> Iterator[str]:
-    for length, stiffness in struts:
-        value = n_per_um_from_n_per_m(stiffness)
-        if STRUT_SOFTEST <= value <= STRUT_STIFFEST:
-            continue
-        per, other = ("N/mm", value / 1e3) if value > STRUT_STIFFEST else ("kN/um", value * 1e3)
-        meant = f"; if it is in {per}, it is {other:g} N/um" if STRUT_SOFTEST <= other <= STRUT_STIFFEST else ""
-        yield (
-            f"{where}: a strut of {mm_from_m(length):g} mm with {value:g} N/um; "
-            f"expected {STRUT_SOFTEST:g} to {STRUT_STIFFEST:g} N/um{meant}"
-        )
+def _implausible(where: str, struts: list[tuple[float, float]]) -> list[str]:
+    values = [(mm_from_m(length), n_per_um_from_n_per_m(stiffness)) for length, stiffness in struts]
+    return [
+        f"{where}: a strut of {length:g} mm with {value:g} N/um; expected {STRUT_SOFTEST:g} to {STRUT_STIFFEST:g} N/um"
+        + ("; is it in N/mm?" if value > STRUT_STIFFEST else "; is it in kN/um?")
+        for length, value in values
+        if not STRUT_SOFTEST <= value <= STRUT_STIFFEST
+    ]
 
 
 def _stiffness(report: PoseStiffness) -> list[str]:

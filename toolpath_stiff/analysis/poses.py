@@ -10,7 +10,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import refuse_no_number
-from toolpath_stiff.analysis.loads import softest_directions, stiffest_directions
+from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.documents import without_nan
@@ -183,7 +183,7 @@ def evaluate_poses(
     if model.load_dependent:
         soft, stiff = (core.extreme_directions(model, tip, turn, tool_length, force, which) for which in (True, False))
     else:
-        soft, stiff = softest_directions(compliance), stiffest_directions(compliance)
+        soft, stiff = (principal_directions(compliance, which) for which in (True, False))
     axes = [along(np.broadcast_to(axis, (len(tip), 3))) for axis in np.eye(3)]
 
     def spread(values: FloatArray) -> FloatArray:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,21 +12,21 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import other_poses
 from toolpath_stiff.analysis.statistics import operation_heading, rows_of_parts
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.documents import to_dict
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.nc.checking import check_by
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches
-from toolpath_stiff.nc.findings import ERROR, WARNING, Checked, Finding
+from toolpath_stiff.nc.checking import check
+from toolpath_stiff.nc.findings import ERROR, WARNING, Finding, UsedCode, in_order
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
-from toolpath_stiff.nc.moves import RAPID, Moves
-from toolpath_stiff.nc.operations import find_operations
-from toolpath_stiff.nc.request import ZERO
+from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
+from toolpath_stiff.nc.operations import operations
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.path import BLOCK, Samples, move_durations, place, sample_moves
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import Pose, deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
+from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,10 +47,8 @@ class Figures:
     times_s: dict[str, float]
 
 
-def figures(moves: Moves | None, rapid_feed: float = defaults.RAPID_FEED) -> Figures:
+def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Figures:
     """Extents, lengths and times of moves; rapids at `rapid_feed`, m/s."""
-    if moves is None:
-        return Figures({}, {}, {}, {}, {})
     cutting = moves.motion != RAPID
     length, duration = move_lengths(moves), move_durations(moves, rapid_feed)
     parts = (("cutting", cutting), ("rapid", ~cutting))
@@ -110,16 +107,14 @@ def radii_findings(moves: Moves) -> list[Finding]:
 
 
 def machine_findings(
-    checked: Checked, machine: Hexapod, origin: Pose, step: float, speed_limit: float | None
+    program: ReadProgram, machine: Hexapod, step: float, speed_limit: float | None
 ) -> tuple[list[Finding], dict[str, float]]:
     """Moves beyond reach, and the struts' speeds (m/s) at the programmed feeds.
 
     Parameters
     ----------
-    checked
-        With moves.
-    machine, origin
-        The machine, and where program zero sits on it, m and rad.
+    program, machine
+        The program, where it sits on the machine, and that.
     step
         Distance of the samples, m.
     speed_limit
@@ -129,8 +124,8 @@ def machine_findings(
     -------
     findings, and the largest speed of a strut in a cut with its line.
     """
-    assert checked.moves is not None
-    samples = sample_moves(place(checked.moves, origin), step=step, rapid_feed=machine.rapid_feed, origin=origin)
+    moves, origin = place(program.moves, program.origin), program.origin
+    samples = sample_moves(moves, step=step, rapid_feed=machine.rapid_feed, origin=origin)
     strut_lengths, within = _struts_and_reach(machine, samples)
     cutting = samples.motion != RAPID
     findings = []
@@ -184,8 +179,43 @@ def _rest(code: str, count: int) -> list[Finding]:
     return [Finding(0, 0, code, f"and {count - MOST_NAMED} more of the kind {code!r}", WARNING)]
 
 
+@dataclass(frozen=True)
+class ToolRow(Figures):
+    """What a tool does; `remark` is the tool table's."""
+
+    tool: int
+    remark: str
+
+
+@dataclass(frozen=True)
+class OperationRow(Figures):
+    """What an operation does; from its heading to the last line of its moves."""
+
+    operation: int
+    name: str
+    tool: int
+    first_line: int
+    last_line: int
+
+
+@dataclass(frozen=True, repr=False)
 class ProgramCheck(Result):
     r"""What a program uses, what is not understood, extents, times, and what a machine says to it.
+
+    Attributes
+    ----------
+    program, interpreter, dialect, kinematics
+        Its name, who read it, as what, and for which machine it was posted, "" for this one.
+    complete
+        Whether it was read to its end.
+    used, unsupported, findings
+        Codes; words not acted upon; errors, warnings and notes, in the order of lines.
+    whole, tools, operations
+        Figures of all moves, of each tool in order of use, of each operation in the order of the run.
+    fastest_strut
+        Largest speed of a strut in a cut with its line; empty without a machine.
+    modal_start, modal_end
+        The modes in force before the first block and after the last one.
 
     Examples
     --------
@@ -193,8 +223,8 @@ class ProgramCheck(Result):
     >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
     >>> found
     <ProgramCheck: slot.nc, 1 error>
-    >>> found.errors == [one for one in found.findings if one["severity"] == "error"]
-    True
+    >>> [(finding.line, finding.severity) for finding in found.errors]
+    [(3, 'error')]
     >>> found.to_frame()["line"].tolist(), found.to_dict()["complete"]
     ([3], False)
     """
@@ -202,28 +232,38 @@ class ProgramCheck(Result):
     command: ClassVar[str] = "check"
     shown_by: ClassVar[str] = "check"
 
-    def __init__(self, document: dict[str, Any]) -> None:
-        self._document = document
+    program: str
+    interpreter: str
+    dialect: str
+    kinematics: str
+    complete: bool
+    used: tuple[UsedCode, ...]
+    unsupported: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
+    whole: Figures
+    tools: tuple[ToolRow, ...]
+    operations: tuple[OperationRow, ...]
+    fastest_strut: dict[str, float]
+    modal_start: dict[str, str]
+    modal_end: dict[str, str]
 
     def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self._document
+        """The JSON document of the command; the figures of all moves stand among its own keys."""
+        document: dict[str, Any] = {}
+        for key, value in to_dict(self).items():
+            document |= value if key == "whole" else {key: value}
+        return document
 
     @property
-    def findings(self) -> list[dict[str, Any]]:
-        """What was found: line, column, subject, text, severity."""
-        return list(self._document["findings"])
-
-    @property
-    def errors(self) -> list[dict[str, Any]]:
+    def errors(self) -> list[Finding]:
         """The findings that keep the program from running as it stands."""
-        return [finding for finding in self.findings if finding["severity"] == ERROR]
+        return [finding for finding in self.findings if finding.severity == ERROR]
 
     def to_frame(self) -> pd.DataFrame:
         """The findings, one a row."""
         import pandas as pd
 
-        return pd.DataFrame(self.findings, columns=["line", "column", "code", "text", "severity", "count"])
+        return pd.DataFrame(to_dict(self.findings), columns=["line", "column", "code", "text", "severity"])
 
     def save(self, file: str | Path) -> Path:
         r"""Write the JSON document to a file, whole or not at all.
@@ -241,110 +281,70 @@ class ProgramCheck(Result):
     def _short(self) -> str:
         count = len(self.errors)
         errors = f"{self.view.number(count)} error{'s' * (count > 1)}" if count else "no errors"
-        return f"{self._document['program']}, {errors}"
+        return f"{self.program}, {errors}"
 
 
 def check_program(
-    lines: tuple[str, ...],
-    name: str,
-    *,
-    machine: Hexapod | None,
-    origin: Pose | None = None,
-    step: float = defaults.STEP,
-    strut_speed: float | None = None,
-    controller: Controller = UNKNOWN_CONTROL,
-    block_delete: Switches = False,
-    interpreter: str = "builtin",
-    rs274: str | None = None,
-    unconfined: bool = False,
+    request: Request, machine: Hexapod | None, step: float = defaults.STEP, strut_speed: float | None = None
 ) -> ProgramCheck:
     """Everything that is to be said of a program, in the shop's units.
 
     Parameters
     ----------
-    lines, name
-        The program.
+    request
+        The program, and how it is read; its default origin is the machine's.
     machine
         Whose reach and strut speeds are checked; None: the program alone.
-    origin, step, strut_speed
-        Where program zero sits (m, rad); distance of the samples, m; largest speed of a strut, m/s.
-    controller, block_delete, interpreter, rs274, unconfined
-        As of `read_program`.
+    step, strut_speed
+        Distance of the samples, m; largest speed of a strut, m/s.
     """
-    default = machine.default_origin if machine else ZERO
-    run: dict[str, Any] = {"rs274": rs274, "unconfined": unconfined, "controller": controller}
-    checked, reader = check_by(
-        interpreter, lines, name, origin=origin, default_origin=default, block_delete=block_delete, **run
-    )
-    findings: list[Finding] = list(checked.findings)
+    checked = check(request)
+    program, findings = checked.program, list(checked.findings)
     speed: dict[str, float] = {}
     rapid_feed = machine.rapid_feed if machine else defaults.RAPID_FEED
-    whole = figures(checked.moves, rapid_feed)
-    if checked.moves is not None:
-        findings += radii_findings(checked.moves)
+    if len(program.moves):
+        findings += radii_findings(program.moves)
         if machine is not None:
-            more, speed = machine_findings(checked, machine, checked.origin, step, strut_speed)
+            more, speed = machine_findings(program, machine, step, strut_speed)
             findings += more
-    tools, operations = check_parts(checked, lines, name, rapid_feed, whole)
-    posted = controller.kinematics if checked.dialect in ("", "linuxcnc") else None
     return ProgramCheck(
-        {
-            "program": name,
-            "interpreter": reader,
-            "dialect": checked.dialect or controller.label,
-            "kinematics": posted.label if posted else "",
-            "complete": checked.complete,
-            "used": [asdict(code) for code in checked.used],
-            "unsupported": [asdict(word) for word in checked.unsupported],
-            "findings": [
-                asdict(finding) for finding in sorted(findings, key=lambda finding: (finding.line, finding.column))
-            ],
-            **asdict(whole),
-            "tools": tools,
-            "operations": operations,
-            "fastest_strut": speed,
-            "modal_start": checked.start,
-            "modal_end": checked.end,
-        }
+        program=program.name,
+        interpreter=program.interpreter,
+        dialect=program.dialect,
+        kinematics=program.kinematics,
+        complete=checked.complete,
+        used=checked.used,
+        unsupported=checked.unsupported,
+        findings=in_order(findings),
+        whole=figures(program.moves, rapid_feed),
+        tools=tool_rows(program, rapid_feed),
+        operations=operation_rows(program, rapid_feed),
+        fastest_strut=speed,
+        modal_start=checked.start,
+        modal_end=checked.end,
     )
 
 
-def check_parts(
-    checked: Checked,
-    lines: Sequence[str],
-    name: str,
-    rapid_feed: float = defaults.RAPID_FEED,
-    whole: Figures | None = None,
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Tools in order of use, and operations in the order of the run: rows of `--json`, mm, degrees, s.
-
-    Parameters
-    ----------
-    checked
-        What the check found; without moves there are no rows.
-    lines, name
-        The program.
-    rapid_feed
-        Of rapids, m/s.
-    whole
-        The figures of all moves, where they are known.
-    """
-    moves = checked.moves
-    if moves is None:
-        return [], []
-    numbers, first, of_move = np.unique(moves.tool, return_index=True, return_inverse=True)
-    operations = find_operations(lines, moves, name, checked.remarks, checked.marks, checked.jumps)
-
-    def rows(of_move: IntArray, count: int) -> list[dict[str, Any]]:
-        """The figures of moves in `count` parts, each in the part that `of_move` (n,) says."""
-        if count == 1 and whole is not None:
-            return [asdict(whole)]
-        return [asdict(figures(moves.take(part), rapid_feed)) for part in rows_of_parts(of_move, count)]
-
-    by_tool = rows(of_move, len(numbers))
-    tools = [
-        {"tool": int(numbers[i]), "remark": checked.remarks.get(int(numbers[i]), ""), **by_tool[i]}
+def tool_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[ToolRow, ...]:
+    """Figures of each tool in order of use; rapids at `rapid_feed`, m/s."""
+    numbers, first, of_move = np.unique(program.moves.tool, return_index=True, return_inverse=True)
+    remarks = {tool.number: tool.remark for tool in program.tools}
+    parts = _parts(program.moves, of_move, len(numbers), rapid_feed)
+    return tuple(
+        ToolRow(**vars(parts[i]), tool=int(numbers[i]), remark=remarks.get(int(numbers[i]), ""))
         for i in np.argsort(first).tolist()
-    ]
-    by_operation = zip(operations.rows, rows(operations.of_move, len(operations.rows)), strict=True)
-    return tools, [operation_heading(operation) | part for operation, part in by_operation]
+    )
+
+
+def operation_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[OperationRow, ...]:
+    """Figures of each operation in the order of the run; rapids at `rapid_feed`, m/s."""
+    found = operations(program)
+    parts = _parts(program.moves, found.of_move, len(found.rows), rapid_feed)
+    return tuple(
+        OperationRow(**vars(part), **operation_heading(row)) for row, part in zip(found.rows, parts, strict=True)
+    )
+
+
+def _parts(moves: Moves, of_move: IntArray, count: int, rapid_feed: float) -> list[Figures]:
+    """The figures of moves in `count` parts, each in the part that `of_move` (n,) says."""
+    return [figures(moves.take(part), rapid_feed) for part in rows_of_parts(of_move, count)] if count else []

@@ -20,7 +20,7 @@ from toolpath_stiff.analysis.document import (
 from toolpath_stiff.analysis.evaluation import Evaluation, Progress, evaluate
 from toolpath_stiff.analysis.loads import Load, parse_load
 from toolpath_stiff.analysis.statistics import EvaluatedPath, sample_columns
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
@@ -35,6 +35,9 @@ from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+
+MOST_NAMED = 5  # lines in a warning
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -55,12 +58,12 @@ class Analysis(EvaluatedPath, FolderResult):
     >>> found = tps.analyze(slot, "nist", origin_mm_deg=(0, 0, 800), require_N_per_mm=54000)
     >>> [round(one) for one in (found.mean_N_per_mm, found.min_N_per_mm, found.range_N_per_mm)]
     [54353, 53875, 948]
-    >>> found.weakest["line"], found.weakest["text"]
-    (4, 'G1 X40')
+    >>> [found.to_dict()["weakest"][name] for name in ("line", "text")]
+    [4, 'G1 X40']
     >>> [(line, round(stiffness)) for line, stiffness in found.below_required]
     [(4, 53875)]
-    >>> found.complete, found.warnings, len(found.assumptions) > 0
-    (True, [], True)
+    >>> found.complete, found.warnings
+    (True, [])
     >>> found.deviation_N_per_mm is None  # the figures of this machine are stated without standard deviations
     True
     >>> len(found.to_frame()), len(found.to_dict()["weakest_places"])
@@ -82,11 +85,6 @@ class Analysis(EvaluatedPath, FolderResult):
         return place(self.program.moves, self.origin)
 
     @property
-    def assumptions(self) -> list[str]:
-        """What was assumed or recovered rather than published or given, plain sentences."""
-        return list(self.to_dict()["assumptions"])
-
-    @property
     def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
         """Mean stiffness over the length of the cuts, plunges along the tool axis left out; nan without any."""
         return float(self.figures["mean_N_per_mm"] or np.nan)
@@ -100,12 +98,7 @@ class Analysis(EvaluatedPath, FolderResult):
     def range_N_per_mm(self) -> float:  # noqa: N802
         """The largest less the smallest."""
         span = self.figures["range_N_per_mm"]
-        return float("nan") if span is None else float(span)
-
-    @property
-    def weakest(self) -> dict[str, Any]:
-        """Where the smallest stiffness is: line, position, direction."""
-        return dict(self.figures["weakest"])
+        return np.nan if span is None else float(span)
 
     @property
     def complete(self) -> bool:
@@ -134,7 +127,7 @@ class Analysis(EvaluatedPath, FolderResult):
 
     @cached_property
     def _document(self) -> dict[str, Any]:
-        summary = summarise(self)
+        summary: dict[str, Any] = {**summarise(self)}
         if self.required is not None:
             summary["required"] = {
                 "required_N_per_mm": n_per_mm_from_n_per_m(self.required),
@@ -252,28 +245,21 @@ def _effective_origin(machine: Hexapod, program: ReadProgram, origin: Pose | Non
 def _warnings(samples: Samples, evaluation: Evaluation) -> list[str]:
     """What the evaluation itself has to say."""
     warnings = []
-    rapids = ~samples.cutting & ~evaluation.reachable
+    rapids, swapped = ~samples.cutting & ~evaluation.reachable, samples.cutting & evaluation.substituted
     if rapids.any():
         first = int(np.argmax(rapids))
         warnings.append(
             f"line {samples.line[first]}: {int(rapids.sum())} samples of rapid moves are out of reach, first "
             f"{describe_pose(samples, first)}: {evaluation.reach.describe(first)}"
         )
-    swapped = samples.cutting & evaluation.substituted
     if swapped.any():
         lines = np.unique(samples.line[swapped])
+        more = f" and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
         warnings.append(
-            f"{_lines(lines)}: the load direction does not exist there (rotary axes alone, or a move along "
-            "the tool axis); the softest direction stands in"
+            f"lines {', '.join(map(str, lines[:MOST_NAMED]))}{more}: the load direction does not exist there "
+            "(rotary axes alone, or a move along the tool axis); the softest direction stands in"
         )
     return warnings
-
-
-def _lines(lines: IntArray, most: int = 5) -> str:
-    """Line numbers in words: "lines 3, 4, 9 and 12 more"."""
-    shown = ", ".join(str(line) for line in lines[:most])
-    more = f" and {len(lines) - most} more" if len(lines) > most else ""
-    return f"line{'s' if len(lines) > 1 else ''} {shown}{more}"
 
 
 def describe_pose(samples: Samples, i: int) -> str:

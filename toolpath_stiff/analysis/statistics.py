@@ -6,15 +6,15 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.analysis.evaluation import Evaluation
-from toolpath_stiff.analysis.loads import Load, along_tool_axis, follows_motion, headline_of, headline_words
+from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_of, headline_words
 from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
+from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.operations import Operation, Operations, operations
@@ -35,6 +35,7 @@ COLUMNS: dict[str, int | None] = {
     "cut": None,
 }
 
+WEAKEST_PLACES = 3
 FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
 
 
@@ -96,7 +97,7 @@ class EvaluatedPath:
     @cached_property
     def plunging(self) -> BoolArray:
         """(n,) counted samples of plunges along the tool axis; none where the load does not follow the motion."""
-        return np.asarray(self.counted & self.along_axis if follows_motion(self.load) else np.zeros_like(self.counted))
+        return np.asarray(self.counted & self.along_axis & (self.load.kind == "tangential"))
 
     @property
     def headline(self) -> BoolArray:
@@ -109,19 +110,34 @@ class EvaluatedPath:
         return np.asarray(self.counted & ~self.headline)
 
     @cached_property
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> Document:
         """`class_figures` of the whole path."""
         return class_figures(self, np.arange(len(self.samples)))
 
     @cached_property
     def weakest_rows(self) -> list[int]:
-        """The rows of `weakest_places`."""
-        return weakest_places(self)
+        """The weakest headline samples, one a place: apart by at least a twentieth of the path, in other lines."""
+        rows = np.flatnonzero(self.headline)
+        chosen: list[int] = []
+        s, line = self.samples.s, self.samples.line
+        apart = (s[rows[-1]] - s[rows[0]]) / 20.0 if len(rows) else 0.0
+        while len(rows) and len(chosen) < WEAKEST_PLACES:
+            weakest = int(rows[np.argmin(self.at.stiffness[rows])])
+            chosen.append(weakest)
+            rows = rows[(np.abs(s[rows] - s[weakest]) >= apart) & (line[rows] != line[weakest])]
+        return chosen
 
     @cached_property
     def central_range(self) -> tuple[float, float]:
-        """Lowest and highest of `charted` in N/m, values far out set aside."""
-        return central_range(*self.charted)
+        """Lowest and highest of `charted` in N/m, those far out (`FENCE`) set aside."""
+        stiffness, weight = self.charted
+        order = np.argsort(stiffness, kind="stable")
+        length = np.cumsum(weight[order])
+        lower, upper = stiffness[order[np.searchsorted(length, [0.25 * length[-1], 0.75 * length[-1]])]]
+        reach = FENCE * (upper - lower)
+        inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
+        values = inside if np.ptp(inside) > 0.0 else stiffness
+        return float(values.min()), float(values.max())
 
     @property
     def charted(self) -> tuple[FloatArray, FloatArray]:
@@ -144,13 +160,8 @@ class EvaluatedPath:
         """The program's operations, and the row of its operation for every move."""
         return operations(self.program)
 
-    @property
-    def operation(self) -> IntArray:
-        """(n,) number of each sample's operation, from 1."""
-        return np.asarray(self.operations.of_move[self.samples.move] + 1)
 
-
-def stiffness_figures(path: EvaluatedPath, rows: BoolArray) -> dict[str, Any]:
+def stiffness_figures(path: EvaluatedPath, rows: BoolArray) -> Document:
     """Mean (by length), min, max, range in N/mm and mean deflection in um of some counted samples.
 
     None for each where there are no such samples.
@@ -165,32 +176,6 @@ def path_length(samples: Samples, rapid: bool) -> float:
     step = np.diff(samples.s, prepend=samples.s[0])
     step[np.diff(samples.move, prepend=samples.move[0]) != 0] = 0.0  # a move's first sample repeats the last end
     return float(step[(samples.motion == RAPID) == rapid].sum())
-
-
-def weakest_places(path: EvaluatedPath, count: int = 3) -> list[int]:
-    """Rows of the weakest headline samples, one a place: apart by at least a twentieth of the path, other lines."""
-    rows = np.flatnonzero(path.headline)
-    if not len(rows):
-        return []
-    s, line = path.samples.s, path.samples.line
-    apart = (s[rows[-1]] - s[rows[0]]) / 20.0
-    chosen: list[int] = []
-    while len(rows) and len(chosen) < count:
-        best = int(rows[np.argmin(path.at.stiffness[rows])])
-        chosen.append(best)
-        rows = rows[(np.abs(s[rows] - s[best]) >= apart) & (line[rows] != line[best])]
-    return chosen
-
-
-def central_range(stiffness: FloatArray, weight: FloatArray) -> tuple[float, float]:
-    """Lowest and highest of values (n,) with weights (n,), those far out (`FENCE`) set aside."""
-    order = np.argsort(stiffness, kind="stable")
-    length = np.cumsum(weight[order])
-    lower, upper = stiffness[order[np.searchsorted(length, [0.25 * length[-1], 0.75 * length[-1]])]]
-    reach = FENCE * (upper - lower)
-    inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
-    values = inside if np.ptp(inside) > 0.0 else stiffness
-    return float(values.min()), float(values.max())
 
 
 def share(condition: BoolArray, among: BoolArray) -> float:
@@ -216,7 +201,7 @@ def weighted_figures(stiffness: FloatArray, weight: FloatArray, force: float) ->
     }
 
 
-def class_figures(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
+def class_figures(path: EvaluatedPath, rows: IntArray) -> Document:
     """The headline figures of the samples `rows`, what they are about, their weakest place, and the plunges beside.
 
     `rows` (m,) are rows of samples, in order; only those in the statistics count. `plunges` is None without any.
@@ -224,7 +209,7 @@ def class_figures(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
     counted, plunging = path.counted[rows], path.plunging[rows]
     plunges, samples = rows[plunging], path.samples
 
-    def about(some: IntArray) -> dict[str, Any]:
+    def about(some: IntArray) -> Document:
         stiffness = path.at.stiffness[some]
         weakest = describe_sample(path, int(some[np.argmin(stiffness)])) if len(some) else None
         return {**weighted_figures(stiffness, samples.weight[some], path.force), "weakest": weakest}
@@ -242,67 +227,47 @@ def class_figures(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
     }
 
 
-def operation_heading(operation: Operation) -> dict[str, Any]:
+def operation_heading(operation: Operation) -> Document:
     """Number, name, tool and lines of an operation, as its row begins."""
-    return {
-        "operation": operation.number,
-        "name": operation.name,
-        "tool": operation.tool,
-        "first_line": operation.first_line,
-        "last_line": operation.last_line,
-    }
+    names = ("name", "tool", "first_line", "last_line")
+    return {"operation": operation.number, **{name: getattr(operation, name) for name in names}}
 
 
-def per_operation(path: EvaluatedPath) -> list[dict[str, Any]]:
+def per_operation(path: EvaluatedPath) -> list[Document]:
     """The figures of each operation, in the order of the run; their lengths, times and samples add up to the whole."""
     operations = path.operations
     parts = _parts(path, operations.of_move, range(len(operations.rows)))
-    return [operation_heading(row) | part for row, part in zip(operations.rows, parts, strict=True)]
+    return [{**operation_heading(row), **part} for row, part in zip(operations.rows, parts, strict=True)]
 
 
-def per_tool(path: EvaluatedPath) -> list[dict[str, Any]]:
-    """The figures of each tool that cuts, in order of use; a tool that cuts with two lengths has two rows.
-
-    Rapids with a length that the tool never cuts with (before G43) count with the first that it does.
-    """
-    moves = path.program.moves
-    remarks = {tool.number: tool.remark for tool in path.program.tools}
-    tools, tool = np.unique(moves.tool, return_inverse=True)
-    lengths, length = np.unique(moves.tool_length, return_inverse=True)  # nan, the reference tool's, is one of them
-    many = len(lengths)
-    of_move = tool * many + length
-    used, first = np.unique(of_move[moves.motion != RAPID], return_index=True)
-    order = used[np.argsort(first)].tolist()
-    first_of_tool = {part // many: part for part in reversed(order)}
-    counts_with = [
-        part if part in order else first_of_tool.get(part // many, part) for part in range(len(tools) * many)
-    ]
-    rows = []
-    for part, figures in zip(order, _parts(path, np.array(counts_with)[of_move], order), strict=True):
-        number, tool_length = int(tools[part // many]), float(lengths[part % many])
-        about = {
-            "tool": number,
-            "remark": remarks.get(number, ""),
-            "length_mm": None if math.isnan(tool_length) else mm_from_m(tool_length),
-        }
-        rows.append(about | figures)
+def per_tool(path: EvaluatedPath) -> list[Document]:
+    """The figures of each tool that cuts, in order of use, with the length of its first cut."""
+    moves, remarks = path.program.moves, {tool.number: tool.remark for tool in path.program.tools}
+    tool = np.unique(moves.tool, return_inverse=True)[1]
+    cuts = np.flatnonzero(moves.motion != RAPID)
+    used, first = np.unique(tool[cuts], return_index=True)
+    order = np.argsort(first)
+    rows: list[Document] = []
+    for part, cut in zip(_parts(path, tool, used[order].tolist()), cuts[first[order]], strict=True):
+        number, length = int(moves.tool[cut]), float(moves.tool_length[cut])
+        mm = None if math.isnan(length) else mm_from_m(length)
+        rows.append({"tool": number, "remark": remarks.get(number, ""), "length_mm": mm, **part})
     return rows
 
 
-def _parts(path: EvaluatedPath, of_move: IntArray, wanted: Sequence[int]) -> list[dict[str, Any]]:
+def _parts(path: EvaluatedPath, of_move: IntArray, wanted: Sequence[int]) -> list[Document]:
     """Length, time, figures, weakest place and nearest limit of parts of a path; (n_moves,) says which each move is."""
     samples, moves = path.samples, path.program.moves
     count = int(of_move.max(initial=0)) + 1
     first = np.searchsorted(samples.move, np.arange(len(moves)))
     last = np.append(first[1:], len(samples)) - 1
-    length, cutting = samples.s[last] - samples.s[first], moves.motion != RAPID
+    length, rapid = samples.s[last] - samples.s[first], moves.motion == RAPID
     duration = np.diff(np.append(samples.t[first], samples.t[-1]))  # with the dwell after each move but the last
-    cutting_length = np.bincount(of_move, np.where(cutting, length, 0.0), count)
-    rapid_length = np.bincount(of_move, np.where(cutting, 0.0, length), count)
-    time = np.bincount(of_move, duration, count)
-    margin = np.where(samples.cutting & path.at.reachable, path.at.margin, np.inf)
+    each = (np.where(rapid, 0.0, length), np.where(rapid, length, 0.0), duration)
+    cutting_length, rapid_length, time = (np.bincount(of_move, values, count) for values in each)
+    margin = np.where(samples.cutting & path.at.reachable, path.at.reach.margin, np.inf)
     rows_of = rows_of_parts(of_move[samples.move], count)
-    parts = []
+    parts: list[Document] = []
     for part in wanted:
         rows = rows_of[part]
         nearest = int(rows[np.argmin(margin[rows])])
@@ -330,7 +295,7 @@ def rows_of_parts(part: IntArray, count: int) -> list[IntArray]:
     return np.split(order, np.searchsorted(part[order], np.arange(1, count)))[:count]
 
 
-def describe_sample(path: EvaluatedPath, row: int) -> dict[str, Any]:
+def describe_sample(path: EvaluatedPath, row: int) -> Document:
     """Line, source text, position and stiffness of one sample."""
     samples, source = path.samples, path.program.source
     line = int(samples.line[row])
@@ -348,15 +313,15 @@ def describe_sample(path: EvaluatedPath, row: int) -> dict[str, Any]:
 def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, AnyArray]:
     """Column name -> values in the shop's units, for some rows."""
     evaluation = path.at
-    names = np.array([limit.name for limit in evaluation.limits] or ["none"])
+    reach, names = evaluation.reach, np.array([limit.name for limit in evaluation.reach.limits] or ["none"])
     moving = (path.samples.motion[rows] != RAPID) & path.samples.tangent[rows].any(axis=1)
     return {
         **path_columns(path.samples, rows),
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(evaluation.stiffness[rows]),
         "deflection_um": um_from_m(path.force / evaluation.stiffness[rows]),
         **{f"strut{i + 1}_mm": mm_from_m(evaluation.strut_lengths[rows, i]) for i in range(6)},
-        "margin": evaluation.margin[rows],
-        "margin_limit": names[evaluation.limit[rows]],
+        "margin": reach.margin[rows],
+        "margin_limit": names[reach.limit[rows]],
         "operation": path.operations.of_move[path.samples.move[rows]] + 1,
         "cut": np.where(moving, np.where(path.along_axis[rows], "plunge", "across"), ""),  # whatever the load
     }

@@ -14,6 +14,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.path import Samples
 from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
@@ -52,19 +53,6 @@ class ParameterBand:
         return float(np.sqrt(max(float(slope @ self.correlation @ slope), 0.0)))
 
 
-@dataclass(frozen=True)
-class BandFigures:
-    """Standard deviations and 95 % intervals of mean and smallest stiffness, and where the band is widest."""
-
-    parameters: tuple[str, ...]
-    mean_sd_N_per_mm: float  # noqa: N815  (newton)
-    mean_95_N_per_mm: list[float]  # noqa: N815
-    min_sd_N_per_mm: float  # noqa: N815  (newton)
-    min_95_N_per_mm: list[float]  # noqa: N815
-    largest_sd_percent: float
-    largest_sd_line: int
-
-
 def parameter_band(
     model: StiffnessModel, samples: Samples, load: Load, force: float, stiffness: FloatArray
 ) -> ParameterBand | None:
@@ -99,25 +87,20 @@ def parameter_band(
     )
 
 
-def band_figures(band: ParameterBand, samples: Samples, stiffness: FloatArray, rows: BoolArray) -> BandFigures | None:
-    """The figures of a band over some samples (n,); None where there are none."""
+def band_figures(band: ParameterBand, samples: Samples, stiffness: FloatArray, rows: BoolArray) -> Document | None:
+    """Standard deviations and 95 % intervals of mean and smallest stiffness of some samples (n,), the widest place."""
     if not rows.any():
         return None
     weight = np.where(rows, samples.weight, 0.0)
     relative = np.where(rows, band.deviation / stiffness, 0.0)
-    mean, mean_sd = float(np.average(stiffness[rows], weights=weight[rows])), band.deviation_of_mean(weight)
     low, widest = int(np.argmin(np.where(rows, stiffness, np.inf))), int(np.argmax(relative))
-    low_sd = float(band.deviation[low])
-    return BandFigures(
-        parameters=band.names,
-        mean_sd_N_per_mm=n_per_mm_from_n_per_m(mean_sd),
-        mean_95_N_per_mm=_interval(mean, mean_sd),
-        min_sd_N_per_mm=n_per_mm_from_n_per_m(low_sd),
-        min_95_N_per_mm=_interval(float(stiffness[low]), low_sd),
-        largest_sd_percent=100.0 * float(relative[widest]),
-        largest_sd_line=int(samples.line[widest]),
-    )
-
-
-def _interval(value: float, sd: float) -> list[float]:
-    return [n_per_mm_from_n_per_m(value + sign * defaults.NORMAL_95 * sd) for sign in (-1.0, 1.0)]
+    figures: dict[str, object] = {"parameters": list(band.names)}
+    for name, value, sd in (
+        ("mean", float(np.average(stiffness[rows], weights=weight[rows])), band.deviation_of_mean(weight)),
+        ("min", float(stiffness[low]), float(band.deviation[low])),
+    ):
+        figures[f"{name}_sd_N_per_mm"] = n_per_mm_from_n_per_m(sd)
+        ends = (value - defaults.NORMAL_95 * sd, value + defaults.NORMAL_95 * sd)
+        figures[f"{name}_95_N_per_mm"] = [n_per_mm_from_n_per_m(end) for end in ends]
+    widest_place = {"largest_sd_percent": 100.0 * float(relative[widest]), "largest_sd_line": int(samples.line[widest])}
+    return {**figures, **widest_place}

@@ -13,6 +13,7 @@ from toolpath_stiff.api.measurements import Data, NoisePercent, Question, Seed, 
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.correction.draft import EffectDraft, draft
 from toolpath_stiff.correction.result import Update
+from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.errors import InputError
@@ -89,12 +90,12 @@ def update(
         model = replace(build_model(corrected, on.effect_files), unchecked=on.model.unchecked)
         return Machine(model, on.asked, on.effect_files, allow_unchecked_effects=on.allow_unchecked_effects)
 
-    corrected = update_machine(
+    task = UpdateTask(
         question.model, question.readings, [add] if isinstance(add, str) else list(add), strut_law=strut_law,
         keep_strut_law=keep_strut_law, auto=auto, force=force, objective=objective, files=question.files,
         machine_file=str(machine_file), asked=question.request, progress=teller(progress), **question.common,
     )  # fmt: skip
-    return replace(corrected, inputs=question.inputs, opened=opened)
+    return replace(update_machine(task), inputs=question.inputs, opened=opened)
 
 
 @checked
@@ -138,14 +139,8 @@ def draft_effect(
     if name in known_effects(question.on.effect_files):
         raise InputError(f"effect {name} exists already", hint="give the draft another file name")
     diagnosis = replace(
-        diagnose(
-            question.model,
-            question.readings,
-            plan_next=False,
-            names=question.files,
-            progress=teller(progress),
-            **question.common,
-        ),
+        diagnose(question.model, question.readings, progress=teller(progress), **question.common),
+        names=question.files,
         line=question.request.command("diagnose", *options(seed=seed or None)),
         asked=question.request,
         inputs=question.inputs,

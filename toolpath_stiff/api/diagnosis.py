@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from toolpath_stiff.api.inputs import Origin, origin_si, origin_word
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.column_names import Mapped
-from toolpath_stiff.diagnosis.diagnose import choice_on_path
+from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.hints import options
@@ -80,10 +80,10 @@ def diagnose(
         temperature=question.on.temperature_C,
         seed=seed or None,
     )
+    tell = teller(progress)
     diagnosis = replace(
-        diagnose_readings(
-            question.model, question.readings, names=question.files, progress=teller(progress), **question.common
-        ),
+        with_plan(diagnose_readings(question.model, question.readings, progress=tell, **question.common), tell),
+        names=question.files,
         line=question.request.command("diagnose", *circumstances, *(part.words if part else ())),
         asked=question.request,
         inputs=(*question.inputs, *(part.inputs if part else ())),

@@ -22,7 +22,7 @@ from toolpath_stiff.nc.program import Program
 from toolpath_stiff.processes import ProcessPool, death
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, figures_of
 from toolpath_stiff.report.batch.programs import Listed
-from toolpath_stiff.results_folder import Rules, clear_up
+from toolpath_stiff.results_folder import Rules
 
 _ALONE = threading.Lock()  # a process analyzes one program at a time, however many threads an executor has
 
@@ -82,15 +82,11 @@ def answers(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> Iter
     """Position and outcome of each task, as they come; of no executor, from so many processes, one being this one."""
     if executor is None and jobs == 1:
         yield from enumerate(map(analyze_task, tasks))
-        return
-    try:
-        if executor is not None:
-            yield from _from_executor(tasks, executor)
-        else:
-            with ProcessPool(jobs) as pool:
-                yield from _from_executor(tasks, pool)
-    finally:  # of processes that died, wherever they were
-        clear_up(task.folder for task in tasks)
+    elif executor is not None:
+        yield from _from_executor(tasks, executor)
+    else:
+        with ProcessPool(jobs) as pool:
+            yield from _from_executor(tasks, pool)
 
 
 def _from_executor(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[int, ProgramOutcome]]:

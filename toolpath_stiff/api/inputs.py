@@ -19,6 +19,8 @@ Step = Annotated[float, Option("--step", "mm", above=0, at_most=1000)]
 Force = Annotated[float, Option("--force", "N", above=0, at_most=1e6)]
 LoadDirection = Annotated[str, Option("--load", "DIRECTION")]
 Origin = Annotated[Sequence[float] | None, Option("--origin", "X,Y,Z[,A,B,C]", read=numbers)]
+# Coarser than 0.01 mm is not machining; beyond nine decimals a double has no more digits.
+Decimals = Annotated[int | None, Option("--decimals", at_least=2, at_most=9)]
 Linearised = Annotated[float | None, Option("--linearise", "mm", above=0, at_most=10)]
 
 

@@ -15,7 +15,7 @@ from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table, analyze, check_options
 from toolpath_stiff.defaults import job_count
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.locks import writing_errors
+from toolpath_stiff.files import writing_errors
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import arguments_of, checked
 from toolpath_stiff.report.analysis.summary import check_table

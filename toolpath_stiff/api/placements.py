@@ -10,7 +10,17 @@ from typing import Annotated, Any
 import numpy as np
 
 from toolpath_stiff.analysis.loads import parse_load
-from toolpath_stiff.api.inputs import FARTHEST_MM, Force, Linearised, LoadDirection, Origin, Step, origin_si, pose_si
+from toolpath_stiff.api.inputs import (
+    FARTHEST_MM,
+    Decimals,
+    Force,
+    Linearised,
+    LoadDirection,
+    Origin,
+    Step,
+    origin_si,
+    pose_si,
+)
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
@@ -61,7 +71,7 @@ def place(
     step_mm: Step = 1.0,
     force_N: Force = FORCE,
     write: Annotated[str | Path | None, Option("--write", "FILE")] = None,
-    decimals: Annotated[int | None, Option("--decimals")] = None,
+    decimals: Decimals = None,
     linearise_mm: Linearised = None,
     progress: Progress | None = None,
 ) -> Placement:
@@ -258,12 +268,13 @@ def try_placement(
     return PlacementTrial(read, Evaluator(model, path, direction, force_N))
 
 
+@checked
 def rewrite(
     program: Program | str | Path,
     *,
     to_mm_deg: Sequence[float],
     from_mm_deg: Sequence[float] = (0.0, 0.0, 0.0),
-    decimals: int | None = None,
+    decimals: Decimals = None,
     linearise_mm: Linearised = None,
 ) -> RewrittenProgram:
     r"""Write a program so that, run where its zero sits now, it does what it would do untouched at another placement.

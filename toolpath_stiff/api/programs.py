@@ -7,16 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from toolpath_stiff.analysis import Analysis
-from toolpath_stiff.analysis import analyze as analyze_path
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.program_check import ProgramCheck, check_program
+from toolpath_stiff.analysis.results import Analysis
+from toolpath_stiff.analysis.results import analyze as analyze_path
 from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
+from toolpath_stiff.nc.request import ZERO, Request
 from toolpath_stiff.options import Option, arguments_of, checked
 from toolpath_stiff.path import SampledPath, place, sample_moves
 from toolpath_stiff.results import Progress, counter
@@ -176,7 +177,7 @@ def check(
     --------
     >>> import toolpath_stiff as tps
     >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
-    >>> [(one["line"], one["severity"]) for one in found.errors]
+    >>> [(finding.line, finding.severity) for finding in found.errors]
     [(3, 'error')]
     """
     part = program_from(program)
@@ -186,13 +187,13 @@ def check(
     speed = None
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
-    return check_program(
+    hexapod = None if on is None else on.model.machine
+    request = Request(
         part.lines,
         part.name,
-        machine=None if on is None else on.model.machine,
         origin=origin_si(origin_mm_deg),
-        step=m_from_mm(step_mm),
-        strut_speed=speed,
+        default_origin=ZERO if hexapod is None else hexapod.default_origin,
         controller=part.controller,
         **part.options,
     )
+    return check_program(request, hexapod, m_from_mm(step_mm), speed)

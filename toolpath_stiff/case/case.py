@@ -42,9 +42,8 @@ from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES
 from toolpath_stiff.correction.draft import EffectDraft
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.files import read_bytes, writing_errors
 from toolpath_stiff.hints import command_line
-from toolpath_stiff.locks import writing_errors
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import arguments_of

@@ -12,7 +12,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import json_text
-from toolpath_stiff.rig.exercise import measured_again, new_exercise, reveal
+from toolpath_stiff.rig.exercise import blind_case, measured_again, new_exercise, reveal
 
 
 class BlindExercise(Findings):
@@ -25,7 +25,7 @@ class BlindExercise(Findings):
         `hidden` and `layout` as of `tps rig new`.
         """
         folder = free_name(self.folder, "exercise")
-        new_exercise(self.folder / folder, seed, layout, hidden)
+        new_exercise(self.folder / folder, blind_case(seed, layout, hidden))
         copies = {
             free_name(self.folder, f"{room}/{name}"): (self.folder / folder / name).read_bytes()
             for room, name in (("machines", "machine.toml"), ("data", "measurements.csv"))

@@ -20,7 +20,7 @@ from toolpath_stiff.cli.parser import JSON, REPLACE, command
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.options import Option
 from toolpath_stiff.results_folder import Rules
-from toolpath_stiff.rig.exercise import FILES, measured_again, new_exercise, reveal
+from toolpath_stiff.rig.exercise import FILES, blind_case, measured_again, new_exercise, reveal
 
 LAYOUTS = ("paper", "tilted", "campaign")
 Exercise = Annotated[str, Option("DIR", help="folder that `tps rig new` wrote")]
@@ -58,7 +58,7 @@ def new(
         Nominal machine.
     """
     rules = Rules(inputs=tuple(inputs_of(args)), fresh=True, replace=args.replace, kept=tell_kept)
-    count = new_exercise(out, seed, layout, hidden, noise / 100.0, machine, at, rules)
+    count = new_exercise(out, blind_case(seed, layout, hidden, noise / 100.0, machine, at), rules)
     print(f"{out}: {count} measurements, the nominal machine and the sealed truth")
     print(hint("next", _diagnose(out)))
     return 0

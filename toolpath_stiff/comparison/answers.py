@@ -10,7 +10,7 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
 from toolpath_stiff.comparison.loop_readings import BesideTip
 from toolpath_stiff.comparison.principles import CheckOutcome, NotChecked
-from toolpath_stiff.comparison.residuals import Residuals, directions, planes
+from toolpath_stiff.comparison.residuals import Residuals, directions, plane_heights_mm, planes
 from toolpath_stiff.comparison.structure import (
     EXCESSES,
     SIGNIFICANT,
@@ -25,15 +25,11 @@ from toolpath_stiff.comparison.summary import (
     ComparisonSummary,
     FarReading,
     GroupErrors,
-    LawFigures,
     LawRefitted,
     ModelFree,
     NoiseFigures,
     PatternHint,
     PatternTest,
-    PlaneErrors,
-    RefittedHint,
-    Statistic,
 )
 from toolpath_stiff.comparison.words import sentence
 from toolpath_stiff.inference.errors import deviation_percent, error_figures, errors_text
@@ -58,7 +54,6 @@ class Answer:
     noise: Noise
     scattering: Scattering
     structure: FoundPatterns
-    refitted: FoundPatterns | None
     law: Fit | None
     model_free: list[CheckOutcome]
     problem: Problem
@@ -101,10 +96,11 @@ def summary_of(
         return {str(level): _errors(values, answers, label == level) for level in np.unique(label)}
 
     where, along = planes(data), directions(data)
-    heights = {str(name): float(mm_from_m(data.position[where == name, 2]).mean()) for name in np.unique(where)}
     baseline = _baseline(values, answers)
     by_noise = {
-        answer.noise.name: [_finding(f, values, answer, first=i == 0) for i, f in enumerate(answer.structure.patterns)]
+        answer.noise.name: [
+            _hint(detection, values, first=i == 0) for i, detection in enumerate(answer.structure.patterns)
+        ]
         for answer in answers
     }
     findings, tests = _shared_findings(answers, by_noise), _tests(answers)
@@ -122,10 +118,7 @@ def summary_of(
         seed=seed,
         baseline=baseline,
         by_direction=by(along),
-        by_plane={
-            name: PlaneErrors(**vars(errors), z_mm=heights[name])
-            for name, errors in sorted(by(where).items(), key=lambda plane: heights[plane[0]])
-        },
+        by_plane={name: by(where)[name] for name in plane_heights_mm(data)},
         by_setup=by(data.setup),
         by_plane_and_direction=by(np.array([f"{p} / {d}" for p, d in zip(where, along, strict=True)])),
         findings=findings,
@@ -175,15 +168,10 @@ def _refitted(last: Answer) -> LawRefitted | None:
     if last.law is None:
         return None
     law = scaled_law(last.problem.predictor.machine.strut_law, last.law.law)
-    count = len(law.parameters)  # of a constant law one, which belongs to no length
-    return LawRefitted(
-        **error_figures(last.law.residual),
-        strut_law=LawFigures(
-            [] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)],
-            [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][:count],
-        ),
-        excess_scatter_percent=None if last.refitted is None else 100.0 * last.refitted.excess,
-    )
+    lengths = [] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)]
+    stiffness = [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)]
+    # Of a constant law one, which belongs to no length.
+    return LawRefitted(**error_figures(last.law.residual), at_mm=lengths, N_per_um=stiffness[: len(law.parameters)])
 
 
 def _checks(answers: Sequence[Answer]) -> list[CheckOutcome]:
@@ -201,13 +189,11 @@ def _tests(answers: Sequence[Answer]) -> list[PatternTest]:
     p = [{test.pattern: test.p_adjusted for test in answer.structure.tests} for answer in answers]
     tests = [
         PatternTest(
-            *_about(test.pattern),
-            same=list(test.pattern.same),
-            statistic=test.statistic,
-            p_adjusted=max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in p),
+            *_about(test.pattern), list(test.pattern.same), test.statistic,
+            max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in p),
         )
         for test in answers[-1].structure.tests
-    ]
+    ]  # fmt: skip
     return sorted(tests, key=lambda test: -abs(test.statistic))
 
 
@@ -222,26 +208,14 @@ def _hint(test: FoundPattern, values: FloatArray, *, first: bool) -> PatternHint
     return PatternHint(text, test.statistic, test.p_adjusted, *_about(test.pattern), size, alike)
 
 
-def _finding(detection: FoundPattern, values: FloatArray, answer: Answer, *, first: bool) -> PatternHint:
-    """The same, with its statistic beside the refitted strut law where the data tell that."""
-    hint = _hint(detection, values, first=first)
-    if answer.refitted is None:
-        return hint
-    test = next((test for test in answer.refitted.tests if test.pattern is detection.pattern), None)
-    after = None if test is None else Statistic(test.statistic, test.p_adjusted)
-    return RefittedHint(**vars(hint), after_strut_law_refit=after)
-
-
 def _shared_findings(answers: Sequence[Answer], by_noise: dict[str, list[PatternHint]]) -> list[PatternHint]:
     """Findings that hold under every noise model, with the larger of their probabilities."""
     fewest = min(answers, key=lambda answer: len(answer.structure.patterns))
     kept = []
     for detection, finding in zip(fewest.structure.patterns, by_noise[fewest.noise.name], strict=True):
         others = [answer.least_p(detection.pattern) for answer in answers if answer is not fewest]
-        worst = max([finding.p_adjusted, *others])
-        if worst < SIGNIFICANT:
-            kept.append(replace(finding, p_adjusted=worst))
-    return kept
+        kept.append(replace(finding, p_adjusted=max([finding.p_adjusted, *others])))
+    return [finding for finding in kept if finding.p_adjusted < SIGNIFICANT]
 
 
 def _hints(last: Answer, tests: list[PatternTest], values: FloatArray) -> list[PatternHint]:
@@ -259,19 +233,9 @@ def _hints(last: Answer, tests: list[PatternTest], values: FloatArray) -> list[P
 def _far_readings(residuals: Residuals, last: Answer) -> list[FarReading]:
     rest, far, ratio = far_off(residuals.values, last.scattering, last.structure)
     data = residuals.predictor.data
-    along = directions(data)
-    return [
-        FarReading(
-            file=str(data.file[i]),
-            line=int(data.line[i]),
-            reading=i + 1,
-            point=str(data.point[i]),
-            direction=str(along[i]),
-            deviation_percent=float(deviation_percent(rest[i])),
-            standard_deviations=float(ratio[i]),
-        )
-        for i in far.tolist()
-    ]
+    numbers, off = np.arange(1, len(data) + 1), deviation_percent(rest)
+    columns = (data.file, data.line, numbers, data.point, directions(data), off, ratio)
+    return [FarReading(*row) for row in zip(*(column[far].tolist() for column in columns), strict=True)]
 
 
 def _assumptions(noises: Sequence[Noise]) -> list[str]:

@@ -6,7 +6,7 @@ counted and which sign they have: `baseline`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from io import StringIO
@@ -26,7 +26,6 @@ from toolpath_stiff.comparison.summary import ComparisonSummary
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Problem
@@ -47,9 +46,6 @@ DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 
 
 FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
-
-
-TELLS_LAW = 0.01  # smallest over largest singular value from which data tell the law's two constants apart
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,11 +128,6 @@ class Comparison(FolderResult):
         """Measured against modelled."""
         figure: Figure = self.view.measured_modelled_png.figure(self)
         return figure
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps compare`."""
-        files: Mapping[str, Content] = self.view.files(self, plots=plots)
-        return files
 
     def _short(self) -> str:
         return f"{self.summary.machine}, mean error {self.summary.baseline.mean_abs_error_percent:.2f} %"
@@ -232,14 +223,10 @@ def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int,
     spread = covariance(noise, predictor)
     scattering = Scattering(noise, spread, predictor.data.clamp, residuals.places, draws, seed)
     structure = find_structure(values, residuals.patterns, scattering)
-    refitted = law = None
     problem = Problem(predictor, Scatter.of(noise, spread))
-    if len(values) >= FEWEST_TO_REFIT:
-        law = base_fit(problem, law_free=True)
-        if np.linalg.cond(residuals.law_columns) < 1.0 / TELLS_LAW:
-            refitted = find_structure(values, residuals.patterns, scattering, residuals.law_columns.T, most=0)
+    law = base_fit(problem, law_free=True) if len(values) >= FEWEST_TO_REFIT else None
     model_free = assess(checks, predictor.data, spread, scattering.draws(0.0))
-    return Answer(noise, scattering, structure, refitted, law, model_free, problem)
+    return Answer(noise, scattering, structure, law, model_free, problem)
 
 
 def _beside_tip(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.readings.measurements import Readings, measured_path
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -33,9 +34,8 @@ class LinkShares:
 
 def load_path_shares(model: StiffnessModel, data: Readings) -> LinkShares:
     """Shares at the measured poses, each counted once."""
-    setup = np.unique(data.setup, return_inverse=True)[1]
-    keys = np.concatenate([data.position, data.angles, data.tool_extension[:, None], setup[:, None]], axis=1)
-    distinct = data.select(np.unique(np.round(keys, 9), axis=0, return_index=True)[1])
+    poses = repeat_groups(data, apart=("direction", "force", "loop"))
+    distinct = data.select(np.unique(poses, return_index=True)[1])
     by_axis = []
     for axis in np.eye(3):
         rows = replace(distinct, direction=np.broadcast_to(axis, (len(distinct), 3)).copy())

@@ -75,22 +75,10 @@ def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> Bes
     read, model, sd = 1e9 * data.compliance, 1e9 * beside.alone(joined), 1e9 * np.sqrt(spread.diagonal) * joined
     rows = np.flatnonzero(beside.beside)
     along, off = directions(data), read - model
-    readings = [
-        LoopReadingFigures(
-            file=str(data.file[i]),
-            line=int(data.line[i]),
-            point=str(data.point[i]),
-            loop=str(data.loop[i]),
-            direction=str(along[i]),
-            force_N=float(data.force[i]),
-            read_nm_per_N=float(read[i]),
-            model_nm_per_N=float(model[i]),
-            off_nm_per_N=float(off[i]),
-            sd_nm_per_N=float(sd[i]),
-            standard_deviations=float(off[i] / sd[i]),
-        )
-        for i in rows.tolist()
-    ]
+    texts = (data.file, data.line, data.point, data.loop, along)
+    figures = (data.force, read, model, off, sd, off / sd)
+    columns = (column[rows].tolist() for column in (*texts, *figures))
+    readings = [LoopReadingFigures(*row) for row in zip(*columns, strict=True)]
     means = []
     for name in dict.fromkeys(data.loop[rows].tolist()):
         of_loop = data.loop == name

@@ -2,10 +2,9 @@
 
 - Threefold symmetry: a tensor that a turn by 120 degrees leaves alone is isotropic across the axis, so that X and Y are
   equally stiff on the axis of a machine whose three legs are alike; and a pose turned by 120 degrees about the axis has
-  the same stiffness along the turned direction, and the same 1/k_x + 1/k_y.
+  the same stiffness along the turned direction.
 - Proportionality (Hooke): the stiffness does not depend on the size of the load.
 - Set-ups: one pose and direction measured in two set-ups differ only by what the set-ups add.
-- Reciprocity (Maxwell, Betti): C_xy = C_yx; needs the displacement across the load, which these data do not carry.
 
 Every check is a combination of ln readings that has mean zero if the principle holds.
 """
@@ -15,14 +14,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions, radius
-from toolpath_stiff.inference.covariances import Covariance
+from toolpath_stiff.inference.covariances import Covariance, Groups, Rows
 from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
@@ -51,15 +48,12 @@ class Check:
         With {percent} where the size goes: exp of the combination less 1.
     broken
         What it means if it does not vanish.
-    size
-        Of a combination that is not linear, of which `weights` are the derivatives; None: `weights` of ln readings.
     """
 
     check: str
     weights: FloatArray
     text: str
     broken: str
-    size: float | None = None
 
 
 @dataclass(frozen=True)
@@ -99,24 +93,13 @@ def symmetries(machine: Hexapod) -> list[FloatArray]:
 
 def model_free_checks(machine: Hexapod, data: Readings) -> tuple[list[Check], list[NotChecked]]:
     """The checks that n readings allow; for the others, why not."""
-    cells, turns = _cells(data), symmetries(machine)
+    cells, turns = Groups.by(repeat_groups(data)).members(), symmetries(machine)
     threefold = sum(np.linalg.det(q) > 0 for q in turns) == 2
+    across = "no pose on the axis was measured along X and Y with the spindle vertical"
+    turned = "a turn by 120 degrees does not leave this machine's joints as they are"
     kinds: list[tuple[str, list[Check], str]] = [
-        ("reciprocity", [], "needs the displacement across the load: no column of a measurement file holds it"),
-        (
-            ON_AXIS,
-            list(_on_axis(data, cells)) if threefold else [],
-            "no pose on the axis was measured along X and Y with the spindle vertical"
-            if threefold
-            else "a turn by 120 degrees does not leave this machine's joints as they are",
-        ),
-        (
-            IMAGES,
-            list(_images(data, cells, turns)),
-            "no two poses are images of each other under the machine's symmetry"
-            if turns
-            else "the machine has no symmetry",
-        ),
+        (ON_AXIS, list(_on_axis(data, cells)) if threefold else [], across if threefold else turned),
+        (IMAGES, list(_images(data, cells, turns)), "no two readings are images of each other under its symmetry"),
         ("proportionality", list(_proportionality(data)), "no pose was measured at two loads"),
         ("set-ups", list(_setups(data)), "no pose was measured in two set-ups"),
     ]
@@ -133,8 +116,7 @@ def assess(checks: list[Check], data: Readings, covariance: Covariance, draws: F
         return []
     weights = np.array([check.weights for check in checks])
     sd = np.sqrt(covariance.squares(weights))
-    logs = np.log(data.stiffness)
-    value = np.array([check.weights @ logs if check.size is None else check.size for check in checks])
+    value = weights @ np.log(data.stiffness)
     largest = np.abs(draws @ (weights / sd[:, None]).T).max(axis=1)
     outcomes = []
     for check, size, spread in zip(checks, value.tolist(), sd.tolist(), strict=True):
@@ -147,95 +129,59 @@ def assess(checks: list[Check], data: Readings, covariance: Covariance, draws: F
     return outcomes
 
 
-def _cells(data: Readings) -> dict[tuple[Any, ...], NDArray[np.int64]]:
-    """Rows of one pose, tool, set-up, loop, load and direction: (pose, rest, direction) -> rows."""
-    groups = repeat_groups(data)
-    cells = {}
-    for group in np.unique(groups):
-        rows = np.flatnonzero(groups == group)
-        i = int(rows[0])
-        pose = (*np.round(data.position[i], 6).tolist(), *np.round(data.angles[i], 6).tolist())
-        rest = (float(data.tool_extension[i]), float(data.force[i]), str(data.setup[i]), str(data.loop[i]))
-        cells[(pose, rest, tuple(np.round(data.direction[i], 6).tolist()))] = rows
-    return cells
-
-
-def _mean(n: int, rows: NDArray[np.int64], weight: float = 1.0) -> FloatArray:
+def _mean(n: int, rows: Rows, weight: float = 1.0) -> FloatArray:
     weights = np.zeros(n)
     weights[rows] = weight / len(rows)
     return weights
 
 
-def _on_axis(data: Readings, cells: dict[tuple[Any, ...], NDArray[np.int64]]) -> Iterator[Check]:
+def _on_axis(data: Readings, cells: list[Rows]) -> Iterator[Check]:
     """Differences ln k_x - ln k_y at upright poses on the axis."""
-    for (pose, rest, direction), rows in cells.items():
-        i = int(rows[0])
-        if abs(direction[0]) != 1.0 or radius(data)[i] > SAME or np.abs(data.angles[i, :2]).max() > UPRIGHT:
-            continue
-        across = next((rows for key, rows in cells.items() if key[:2] == (pose, rest) and abs(key[2][1]) == 1.0), None)
+    central = (radius(data) <= SAME) & (np.abs(data.angles[:, :2]).max(axis=1) <= UPRIGHT)
+    along, poses = directions(data), repeat_groups(data, apart=("direction",))
+    on_axis = [rows for rows in cells if central[rows[0]]]
+    for rows in (rows for rows in on_axis if along[rows[0]] == "X"):
+        i = rows[0]
+        across = next((other for other in on_axis if poses[other[0]] == poses[i] and along[other[0]] == "Y"), None)
         if across is not None:
-            weights = _mean(len(data), rows) - _mean(len(data), across)
-            place = f"z = {mm_from_m(float(data.position[i, 2])):.0f} mm" + (f", set-up {rest[2]}" if rest[2] else "")
+            setup = f", set-up {data.setup[i]}" if data.setup[i] else ""
             yield Check(
                 ON_AXIS,
-                weights,
-                f"On the axis at {place}, X against Y: {{percent}}",
+                _mean(len(data), rows) - _mean(len(data), across),
+                f"On the axis at z = {mm_from_m(float(data.position[i, 2])):.0f} mm{setup}, X against Y: {{percent}}",
                 "the three legs, table or instruments are not alike (table, set-up, gauge, one strut or vertex)",
             )
 
 
-def _images(
-    data: Readings, cells: dict[tuple[Any, ...], NDArray[np.int64]], turns: list[FloatArray]
-) -> Iterator[Check]:
-    """Two readings, or two sums 1/k_x + 1/k_y, that a symmetry of the machine maps onto each other."""
-    n = len(data)
-    broken = "the legs are not alike, or something about the machine is not symmetric"
-    poses: dict[tuple[Any, ...], dict[tuple[float, ...], NDArray[np.int64]]] = {}
-    for (pose, rest, direction), rows in cells.items():
-        poses.setdefault((pose, rest), {})[direction] = rows
-    for (first, cells_here), (second, cells_there) in combinations(poses.items(), 2):
-        if first[1] != second[1] or first[0] == second[0]:
-            continue
-        i, j = (int(next(iter(rows.values()))[0]) for rows in (cells_here, cells_there))
-        q = next((q for q in turns if _is_image(data, q, i, j)), None)
-        if q is None:
-            continue
-        where = f"Point {data.point[i]} and its image {data.point[j]}"
-        for direction, rows in cells_here.items():
-            for image, rows_there in cells_there.items():
-                if abs(float(np.dot(q @ direction, image))) > 1.0 - 1e-6:
-                    yield Check(IMAGES, _mean(n, rows) - _mean(n, rows_there), f"{where}, along "
-                                f"{_named(direction)}: {{percent}}", broken)  # fmt: skip
-        x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-        if abs(q[0, 1]) > 1e-9 and {x, y} <= set(cells_here) and {x, y} <= set(cells_there):
-            weights, size = np.zeros(n), 0.0
-            for sign, which in ((1.0, cells_here), (-1.0, cells_there)):
-                softness = {d: float(np.exp(-np.log(data.stiffness[which[d]]).mean())) for d in (x, y)}
-                size -= sign * float(np.log(sum(softness.values())))
-                for d in (x, y):
-                    weights += _mean(n, which[d], sign * softness[d] / sum(softness.values()))
-            yield Check(IMAGES, weights, f"{where}, 1/k along X and Y added: {{percent}}", broken, size)
-
-
-def _is_image(data: Readings, q: FloatArray, i: int, j: int) -> bool:
-    turn = data.rotation
-    near = float(np.abs(q @ data.position[i] - data.position[j]).max()) < SAME
-    return near and float(np.abs(q @ turn[i] @ q.T - turn[j]).max()) < UPRIGHT
-
-
-def _named(direction: tuple[float, ...]) -> str:
-    named: dict[tuple[float, ...], str] = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"}
-    return named.get(tuple(abs(v) for v in direction), "({:.2g}, {:.2g}, {:.2g})".format(*direction))
+def _images(data: Readings, cells: list[Rows], turns: list[FloatArray]) -> Iterator[Check]:
+    """Two readings that a symmetry of the machine maps onto each other."""
+    firsts = np.array([rows[0] for rows in cells])
+    place, turn, along = data.position[firsts], data.rotation[firsts], data.direction[firsts]
+    alike = repeat_groups(data, apart=("position", "angles", "direction"))[firsts]
+    pose = repeat_groups(data, apart=("direction",))[firsts]
+    images: set[tuple[int, int]] = set()
+    for q in turns:
+        axes = zip((place @ q.T).T, place.T, strict=True)
+        near = np.logical_and.reduce([np.abs(np.subtract.outer(x, y)) < SAME for x, y in axes])
+        a, b = np.nonzero(near & (alike[:, None] == alike) & (pose[:, None] < pose))
+        same = np.abs(q @ turn[a] @ q.T - turn[b]).max(axis=(1, 2)) < UPRIGHT
+        same &= np.abs(((along[a] @ q.T) * along[b]).sum(axis=1)) > 1.0 - 1e-6
+        images |= set(zip(a[same].tolist(), b[same].tolist(), strict=True))
+    points, names = data.point[firsts], directions(data)[firsts]
+    for first, second in sorted(images):
+        yield Check(
+            IMAGES,
+            _mean(len(data), cells[first]) - _mean(len(data), cells[second]),
+            f"Point {points[first]} and its image {points[second]}, along {names[first]}: {{percent}}",
+            "the legs are not alike, or something about the machine is not symmetric",
+        )
 
 
 def _proportionality(data: Readings) -> Iterator[Check]:
     """Slope of ln k over ln F within readings that differ in the load only, for a doubling of the load."""
     if "force_N" in data.missing:
         return
-    columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
-    columns += [data.tool_extension[:, None]]
-    columns += [np.unique(v, return_inverse=True)[1].reshape(-1, 1).astype(float) for v in (data.setup, data.loop)]
-    groups = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+    groups = repeat_groups(data, apart=("force",))
     log_force = np.log(data.force)
     centred = log_force - (np.bincount(groups, log_force) / np.bincount(groups))[groups]
     along = directions(data)
@@ -253,9 +199,7 @@ def _proportionality(data: Readings) -> Iterator[Check]:
 
 def _setups(data: Readings) -> Iterator[Check]:
     """Means of the differences between two set-ups at poses and directions measured in both."""
-    columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
-    columns += [data.tool_extension[:, None], data.force[:, None]]
-    groups = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+    groups = repeat_groups(data, apart=("setup", "loop"))
     n, along = len(data), directions(data)
     for a, b in combinations(np.unique(data.setup).tolist(), 2):
         for name in np.unique(along):

@@ -17,6 +17,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
 from toolpath_stiff.comparison.structure import Pattern
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.readings.measurements import Readings, model_stiffness
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
@@ -111,20 +112,9 @@ class Residuals:
         return cls(predictor, log_model, values, numbers, names, notes, patterns(data, numbers, names))
 
     @cached_property
-    def law_columns(self) -> FloatArray:
-        """(n, 2) what the strut law's constants change; (n, 1) of a constant law, whose second does nothing."""
-        columns = self.predictor.law_columns(self.log_model)
-        return columns[:, :1] if self.predictor.machine.strut_law.constant else columns
-
-    @cached_property
     def places(self) -> NDArray[np.int64]:
         """(n,) number of the place: pose, direction, tool and set-up, whatever the load and the repeat."""
-        data = self.predictor.data
-        columns = [np.round(part, 6) for part in (data.position, data.angles, data.direction)]
-        setup = np.unique(data.setup, return_inverse=True)[1].astype(float)
-        columns += [data.tool_extension[:, None], setup.reshape(-1, 1)]
-        number = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
-        return np.asarray(number.reshape(-1), dtype=np.int64)
+        return repeat_groups(self.predictor.data, apart=("force", "loop"))
 
 
 def directions(data: Readings) -> TextArray:
@@ -149,6 +139,13 @@ def planes(data: Readings) -> TextArray:
     named = {2: ("lower plane", "upper plane"), 3: ("lower plane", "middle plane", "upper plane")}
     heights = [f"plane at z = {mm_from_m(float(z[group == g].mean())):.0f} mm" for g in range(count)]
     return np.array(named.get(count, heights))[group]
+
+
+def plane_heights_mm(data: Readings) -> dict[str, float]:
+    """Mean height of each plane's readings, mm; the lowest first."""
+    names = planes(data)
+    heights = {str(name): float(mm_from_m(data.position[names == name, 2]).mean()) for name in np.unique(names)}
+    return dict(sorted(heights.items(), key=lambda plane: plane[1]))
 
 
 def radius(data: Readings) -> FloatArray:

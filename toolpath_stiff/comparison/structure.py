@@ -358,8 +358,6 @@ def find_structure(
     residual: FloatArray,
     patterns: list[Pattern],
     scattering: Scattering,
-    fixed: FloatArray | None = None,
-    most: int = MOST_PATTERNS,
 ) -> FoundPatterns:
     """Which patterns residuals (n,) show beyond scatter.
 
@@ -371,18 +369,13 @@ def find_structure(
         What is looked for.
     scattering
         The scatter.
-    fixed
-        (m, n) columns that are free anyway, such as those of the strut law.
-    most
-        So many patterns are taken out one after the other.
     """
-    n = len(residual)
     columns = np.array([pattern.values for pattern in patterns])
-    base = np.zeros((0, n)) if fixed is None else fixed
+    base = np.zeros((0, len(residual)))
     detections: list[FoundPattern] = []
     tests: tuple[FoundPattern, ...] = ()
     excess = left = 0.0
-    for step in range(most + 1):
+    for step in range(MOST_PATTERNS + 1):
         fit = _Fit(scattering, columns, base)
         statistic, grid, factor = fit.statistics(residual[None])
         t, excess_index = statistic[0], int(grid[0])
@@ -402,7 +395,7 @@ def find_structure(
             excess = left
             tests = tuple(test for test in answers if test.standard_error > 0.0)
         best = int(np.argmax(np.abs(t) >= (1.0 - TIED) * np.abs(t).max()))
-        if p[best] >= SIGNIFICANT or step == most:
+        if p[best] >= SIGNIFICANT or step == MOST_PATTERNS:
             break
         detections.append(answers[best])
         base = np.concatenate([base, columns[[best]]])

@@ -24,29 +24,14 @@ class GroupErrors:
 
 
 @dataclass(frozen=True)
-class PlaneErrors(GroupErrors):
-    """Of the readings in a plane."""
-
-    z_mm: float
-
-
-@dataclass(frozen=True)
-class LawFigures:
-    """A strut law: N/um at two lengths; of a constant law one stiffness and no length."""
-
-    at_mm: list[float]
-    N_per_um: list[float]
-
-
-@dataclass(frozen=True)
 class LawRefitted:
-    """What refitting the strut law would leave."""
+    """What refitting the strut law would leave; N/um at two lengths, of a constant law one stiffness and no length."""
 
     mean_abs_error_percent: float
     bias_percent: float
     rms_percent: float
-    strut_law: LawFigures
-    excess_scatter_percent: float | None
+    at_mm: list[float]
+    N_per_um: list[float]
 
 
 @dataclass(frozen=True)
@@ -86,21 +71,6 @@ class PatternHint:
     readings: int
     size_percent: float
     indistinguishable_from: list[str]
-
-
-@dataclass(frozen=True)
-class Statistic:
-    """A statistic and its adjusted probability."""
-
-    statistic: float
-    p_adjusted: float
-
-
-@dataclass(frozen=True)
-class RefittedHint(PatternHint):
-    """The same with what is left of it once the strut law is refitted."""
-
-    after_strut_law_refit: Statistic | None
 
 
 @dataclass(frozen=True)
@@ -152,7 +122,7 @@ class ComparisonSummary:
     seed: int
     baseline: AllErrors
     by_direction: dict[str, GroupErrors]
-    by_plane: dict[str, PlaneErrors]
+    by_plane: dict[str, GroupErrors]
     by_setup: dict[str, GroupErrors]
     by_plane_and_direction: dict[str, GroupErrors]
     findings: list[PatternHint]

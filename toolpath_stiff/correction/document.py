@@ -26,7 +26,7 @@ def document_of(update: UpdateOutcome) -> dict[str, Any]:
         "verdict": update.verdict,
         "text": text(update),
         "question": update.question,
-        "objective": update.objective,
+        "objective": update.task.objective,
         "baseline": steps[0],
         "strut_law_refitted": rounded_errors(update.refitted.residual),
         "steps": steps,
@@ -40,14 +40,14 @@ def document_of(update: UpdateOutcome) -> dict[str, Any]:
         "uncertainty": _uncertainty(None if update.corrected is None else update.corrected.uncertainty),
         "assumptions": assumptions(update),
         "warnings": list(update.problem.predictor.data.warnings),
-        "notes": list(update.data.notes),
-        "machine": update.given.name,
+        "notes": list(update.task.data.notes),
+        "machine": update.task.machine.name,
         "effects": update.problem.predictor.effects_that_act,
-        "machine_file": update.machine_file if update.accepted else None,
-        "data": list(update.names),
-        "readings": len(update.data.of_tip),
+        "machine_file": update.task.machine_file if update.accepted else None,
+        "data": list(update.task.files),
+        "readings": len(update.task.data.of_tip),
         "provenance": dict(update.provenance),
-        "seed": update.seed,
+        "seed": update.task.seed,
         "next": list(update.next),
     }
     return document if update.search is None else {**document, "search": _search(update.search)}
@@ -63,7 +63,7 @@ def rounded_step(update: UpdateOutcome, k: int) -> Document:
         "findings": list(step.fit.findings),
         **held_errors(step.held),
         "by_direction": step.by_direction,
-        "strut_law_N_per_um": to_dict(step.law_ends(update.given.strut_law, widening)),
+        "strut_law_N_per_um": to_dict(step.law_ends(update.task.machine.strut_law, widening)),
         "parameters": to_dict(step.sizes(widening)),
         "outliers": len(step.fit.scatter.wild),
     }
@@ -117,8 +117,8 @@ def _search(search: StrutLawSearch) -> Document:
 
 def residuals_csv(update: UpdateOutcome) -> str:
     """One row a reading of the tip: measured, modelled as given and after, deviations, that with its point left out."""
-    data, given, last = update.data.of_tip, update.steps[0], update.last
-    wild = np.isin(np.flatnonzero(update.data.tip), last.fit.scatter.wild)
+    data, given, last = update.task.data.of_tip, update.steps[0], update.last
+    wild = np.isin(np.flatnonzero(update.task.data.tip), last.fit.scatter.wild)
     head = [
         "file", "line", "point", "setup", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx",
         "dy", "dz", "measured_N_per_mm", "as_given_N_per_mm", "after_N_per_mm", "as_given_deviation_percent",

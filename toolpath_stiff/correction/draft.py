@@ -116,19 +116,17 @@ def draft(diagnosis: Diagnosis, file: str) -> EffectDraft:
 
 def _nothing_to_describe(diagnosis: Diagnosis) -> str:
     """Why there is nothing that an effect could describe, a sentence; "" where there is something."""
-    names = joined(list(diagnosis.explanations))
+    portrait, verdict = diagnosis.portrait, diagnosis.verdict
     if diagnosis.main.question:
         return f"{diagnosis.main.question} Nothing is drafted from readings that may be of another machine."
-    if diagnosis.verdict == "adequate":
+    if verdict == "adequate":
         return "Nothing is missing that these data could show: there is nothing to describe."
-    if diagnosis.verdict == "described":
-        return f"{names} describes these readings already: measure others, and see whether it foretells them."
-    if diagnosis.verdict == "unexplained" and (diagnosis.portrait is None or not diagnosis.portrait.terms):
+    if verdict == "unexplained" and (portrait is None or not portrait.terms):
         return "Something is missing, but no simple form of it stands out from chance: there is nothing to write down."
-    if diagnosis.portrait is None:
-        word, rest = ("explains", "leaves") if diagnosis.verdict == "identified" else ("may explain", "leave")
-        return f"{names} {word} these readings and {rest} nothing that stands out: there is nothing to describe."
-    terms = [sized.term for sized in diagnosis.portrait.terms]
+    if portrait is None or verdict == "described":
+        names = joined(list(diagnosis.explanations))
+        return f"{names} would leave nothing of these readings that stands out: there is nothing more to describe."
+    terms = [sized.term for sized in portrait.terms]
     if not any(term.acts for term in terms):
         with_what = joined(list(dict.fromkeys(name for term in terms for name in term.unseen)))
         return f"What is missing varies with {with_what}, which no effect of a machine sees: nothing is drafted."

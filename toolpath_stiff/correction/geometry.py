@@ -7,6 +7,7 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.file import load_machine
@@ -136,8 +137,6 @@ def recover_geometry(starts: int = 20, seed: int = 1) -> dict[str, Any]:
 
 
 def _fit(residuals: Any, start: FloatArray, bounds: tuple[float, float] = (-np.inf, np.inf)) -> Any:
-    from scipy.optimize import least_squares
-
     return least_squares(
         residuals, start, bounds=bounds, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=500
     )

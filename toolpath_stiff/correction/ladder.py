@@ -17,18 +17,17 @@ Of several effects each is judged beside the others.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolpath_stiff.correction.additions import parse_addition
 from toolpath_stiff.correction.machines import fitted_machine
 from toolpath_stiff.correction.result import Update
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
+from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.words import NEEDED
-from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.diagnosis.diagnose import FEWEST
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, testable_effects
@@ -39,78 +38,37 @@ from toolpath_stiff.inference.fits import add_effect, base_fit, baseline
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import score_families, signatures, tables_of
 from toolpath_stiff.inference.left_out import error_falls, gain_in_standard_errors
-from toolpath_stiff.inference.noise import Noise, noise_models
+from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.question import question
-from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import Effect
 
-if TYPE_CHECKING:
-    from toolpath_stiff.correction.additions import Addition
-
-
 TRIED = 4  # candidates a step of `--auto`, the most likely first
-
-
 MOST_EFFECTS = 4  # that `--auto` adds
 
 
-def build_ladder(
-    machine: Hexapod,
-    data: Readings,
-    additions: Sequence[Addition] = (),
-    *,
-    strut_law: bool = False,
-    keep_law: bool = False,
-    auto: bool = False,
-    force: bool = False,
-    noise: float | tuple[float, float] | None = None,
-    strut_spread: float = STRUT_SPREAD,
-    effect_files: Sequence[str | Path] = (),
-    seed: int = 0,
-    progress: Callable[[str], None] | None = None,
-) -> Update:
+def build_ladder(task: UpdateTask) -> Update:
     """Fit effects to measurements and judge them.
-
-    Parameters
-    ----------
-    machine, data
-        The model and n readings.
-    additions
-        The effects to be added.
-    strut_law
-        Write the refitted strut law even if no effect is added.
-    keep_law
-        Keep the strut law of the machine file; else its two stiffnesses are fitted along with every effect.
-    auto
-        Go on adding effects while the data support them.
-    force
-        Keep what the data do not support.
-    noise, strut_spread, effect_files, seed, progress
-        As in `diagnose`.
 
     Raises
     ------
     InputError
-        Too few readings, an effect named twice or present already, or nothing to do.
+        Too few readings, an effect unknown, named twice or present already, or nothing to do.
     """
-    _check(machine, data, additions, strut_law, keep_law, auto)
-    say = progress or (lambda text: None)
-    # Of several noise models the one with the largest noise, as in a diagnosis.
-    worst = max(noise_models(data, noise, strut_spread), key=lambda model: model.typical)
-    problem = Problem.of(Predictor(machine, data, effect_files), worst)
-    work = _Work(problem, worst, not keep_law, seed, tuple(effect_files), say)
+    additions = [parse_addition(text, task.data, task.effect_files) for text in task.add]
+    _check(task, [addition.effect.name for addition in additions])
+    noise, problem = task.problem()
+    work = _Work(task, problem, noise)
     as_given, law_refitted = baseline(problem)
     steps, refitted = [work.step(AS_GIVEN, as_given)], work.step(LAW_REFITTED, law_refitted)
-    if not keep_law:
+    if work.law_free:
         steps.append(refitted)
-    wanted = {addition.effect.name: addition.candidates(data) for addition in additions}
+    wanted = {addition.effect.name: addition.candidates(task.data) for addition in additions}
     steps += work.ladder(steps[-1], list(wanted.values()))
     full = steps[-1].fit
     supports = tuple(work.support(work.without(full, j), full, j, wanted[name]) for j, name in enumerate(full.names))
     turned_down: tuple[Support, ...] = ()
-    while auto and len(steps[-1].fit.candidates) < MOST_EFFECTS:
+    while task.auto and len(steps[-1].fit.candidates) < MOST_EFFECTS:
         better, tried = work.next_effect(steps[-1])
         if better is None:
             turned_down = tried
@@ -118,32 +76,31 @@ def build_ladder(
         steps.append(better)
         supports = (*supports, tried[-1])
     return Update(
-        machine, data, worst, problem, tuple(steps), refitted, supports, turned_down, force, strut_law,
-        question=question(problem.predictor), drawn=work.drawn(steps[-1].fit),
+        task, noise, problem, tuple(steps), refitted, supports, turned_down, question(problem.predictor),
+        work.drawn(steps[-1].fit),
     )  # fmt: skip
 
 
-def _check(
-    machine: Hexapod, data: Readings, additions: Sequence[Addition], strut_law: bool, keep_law: bool, auto: bool
-) -> None:
-    if strut_law and keep_law:
+def _check(task: UpdateTask, names: Sequence[str]) -> None:
+    if task.strut_law and task.keep_strut_law:
         raise InputError("--strut-law and --keep-strut-law", expected="one of them")
-    if not additions and not strut_law and not auto:
+    if not names and not task.strut_law and not task.auto:
         raise InputError("nothing to update", expected="--add EFFECT, --strut-law or --auto")
-    lacking = int(np.isnan(data.stiffness).sum())
-    if len(data) < FEWEST or lacking:
+    lacking = int(np.isnan(task.data.stiffness).sum())
+    if len(task.data) < FEWEST or lacking:
         raise InputError(
-            f"{len(data)} readings, {lacking} without a stiffness",
+            f"{len(task.data)} readings, {lacking} without a stiffness",
             expected=f"at least {FEWEST} measured stiffnesses to update from",
         )
-    names = [addition.effect.name for addition in additions]
-    present = {entry.name for entry in (*machine.effects, *machine.instruments)}
-    if np.isfinite(machine.platform_bar_stiffness):
-        present.add("platform_flexibility")
-    for name in names:
-        if names.count(name) > 1 or name in present:
-            fault = "is given twice" if names.count(name) > 1 else f"is in machine {machine.name} already"
-            raise InputError(f"--add {name}: the effect {fault}", hint="a machine carries an effect once")
+    present = [entry.name for entry in (*task.machine.effects, *task.machine.instruments)]
+    if np.isfinite(task.machine.platform_bar_stiffness):
+        present.append("platform_flexibility")
+    for k, name in enumerate(names):
+        if name in (*present, *names[:k]):
+            raise InputError(
+                f"--add {name}: given twice, or in machine {task.machine.name} already",
+                hint="a machine carries an effect once",
+            )
 
 
 @dataclass(frozen=True)
@@ -160,20 +117,17 @@ class _Field:
 class _Work:
     """What one update passes from step to step."""
 
+    task: UpdateTask
     problem: Problem
     noise: Noise
-    law_free: bool
-    seed: int
-    effect_files: tuple[str | Path, ...]
-    say: Callable[[str], None]
     fields: dict[tuple[str, ...], _Field] = field(default_factory=dict)
 
     @property
-    def data(self) -> Readings:
-        return self.problem.predictor.data
+    def law_free(self) -> bool:
+        return not self.task.keep_strut_law
 
     def step(self, name: str, fit: Fit) -> LadderStep:
-        return LadderStep.of(name, fit, self.data)
+        return LadderStep.of(name, fit, self.task.data)
 
     def fitted(self, fit: Fit, groups: Iterable[Sequence[Candidate]]) -> Fit:
         """A fit with one effect of each group on top."""
@@ -181,12 +135,8 @@ class _Work:
             fit = add_effect(self.problem, fit, candidates, self.law_free)
         return fit
 
-    def added(self, before: LadderStep, candidates: Sequence[Candidate]) -> LadderStep:
-        """A rung higher."""
-        return self.together(before, [candidates])
-
     def together(self, before: LadderStep, groups: Sequence[Sequence[Candidate]]) -> LadderStep:
-        """Several effects as one step."""
+        """A rung higher: one effect, or several as one step."""
         fit = self.fitted(before.fit, groups)
         return self.step(f"+ {' + '.join(candidate.label for candidate in fit.candidates[-len(groups) :])}", fit)
 
@@ -194,8 +144,8 @@ class _Work:
         """Steps that add the effects asked for, each lower than the one before; one step if no order does."""
         rest, steps = list(wanted), [start]
         while rest:
-            self.say(f"fitting {', '.join(candidates[0].name for candidates in rest)}")
-            trials = [self.added(steps[-1], candidates) for candidates in rest]
+            self.task.progress(f"fitting {', '.join(candidates[0].name for candidates in rest)}")
+            trials = [self.together(steps[-1], [candidates]) for candidates in rest]
             best = min(range(len(rest)), key=lambda k: trials[k].error)
             lower = trials[best].error < steps[-1].error
             if len(wanted) > 1 and (not lower or trials[best].held.mean_error >= steps[-1].held.mean_error):
@@ -211,22 +161,22 @@ class _Work:
 
     def drawn(self, full: Fit) -> Drawn | None:
         """How the effects stand that were drawn from the readings, against the model without them."""
-        others = [[c] for c in full.candidates if not seen_readings([c.effect], self.data).any()]
+        others = [[c] for c in full.candidates if not seen_readings([c.effect], self.task.data).any()]
         if len(others) == len(full.candidates):
             return None
         fit = self.fitted(base_fit(self.problem, self.law_free), others)
-        return drawn(full, {" + ".join(fit.names) or "none": fit}, self.data)
+        return drawn(full, {" + ".join(fit.names) or "none": fit}, self.task.data)
 
     def field(self, others: Fit) -> _Field:
         """What an effect is judged against on a machine that carries the other effects."""
         key = tuple(candidate.label for candidate in others.candidates)
         if key not in self.fields:
-            self.say("searching all effects for what chance alone would gain")
+            self.task.progress("searching all effects for what chance alone would gain")
             carrying = fitted_machine(self.problem.predictor.machine, others, {"command": "", "data_sha256": ""})
-            problem = Problem.of(Predictor(carrying, self.data, self.effect_files), self.noise)
+            problem = Problem.of(Predictor(carrying, self.task.data, self.task.effect_files), self.noise)
             base, effects = problem.score_base(), testable_effects(problem.predictor)[0]
             tables = [table for effect in effects for table in tables_of(problem, effect)]
-            draws = simulate(self.noise, problem.scatter.covariance, self.seed)
+            draws = simulate(self.noise, problem.scatter.covariance, self.task.seed)
             threshold = gain_threshold(problem, base.jacobian, draws, signatures(problem, tables))
             self.fields[key] = _Field(problem, base, effects, threshold)
         return self.fields[key]
@@ -267,9 +217,9 @@ class _Work:
         others, tried = self.field(before.fit), list[Support]()
         families = score_families(others.problem, others.effects, others.base)
         for family in [f for f in families if f.best is not None][:TRIED]:
-            self.say(f"fitting {family.name}")
+            self.task.progress(f"fitting {family.name}")
             candidates = [table.candidate for table in family.tables]
-            step = self.added(before, candidates)
+            step = self.together(before, [candidates])
             tried.append(self.support(before, step.fit, len(step.fit.candidates) - 1, candidates))
             if tried[-1].supported:
                 return step, tuple(tried)

@@ -12,15 +12,13 @@ import numpy as np
 from toolpath_stiff.correction.machines import fitted_machine
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.strut_law import BarCurve, StrutLawSearch
+from toolpath_stiff.correction.task import LIKELIHOOD, UpdateTask
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.readings.measurements import Readings
 
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
-
-
 # Share of the mean error, or of what scatter alone leaves of it, by which it may rise: a likelier strut law can raise
 # it a little (9.62 to 9.72 % on the paper's Table 1).
 WORSE = 0.05
@@ -32,48 +30,39 @@ class UpdateOutcome:
 
     Attributes
     ----------
-    given, data, noise, problem
-        What was corrected, by what; the largest of the noise models; model and scatter.
+    task
+        What was to be corrected, by what, and how.
+    noise, problem
+        The largest of the noise models; model and scatter.
     steps
         The ladder, from the machine file as it stands to the last model; arrays in SI.
     refitted
         The strut law refitted alone: the second step, unless the law is kept.
     supports, turned_down
         Of every effect that was asked for, or that `auto` took; of those that it tried last and did not take.
-    forced, law_asked
-        As asked; True where a refitted strut law alone is an update.
-    objective
-        "likelihood", or "mean-error" for the paper's own estimation.
     question
         That these are hardly readings of this machine, and why; "" where nothing says so.
     drawn
         How effects stand whose form was read off these readings; None where there are none.
     search, bars
         Of the paper's own estimation: how its searches ended; its Figure 3. None otherwise.
-    seed, names, machine_file, provenance
-        For the record: names of the measurement files, and of the new machine file; where the fitted values come from.
+    provenance
+        Where the fitted values come from, for the record.
     next
         Commands that go on from here.
     """
 
-    given: Hexapod
-    data: Readings
+    task: UpdateTask
     noise: Noise
     problem: Problem
     steps: tuple[LadderStep, ...]
     refitted: LadderStep
     supports: tuple[Support, ...] = ()
     turned_down: tuple[Support, ...] = ()
-    forced: bool = False
-    law_asked: bool = False
-    objective: str = "likelihood"
     question: str = ""
     drawn: Drawn | None = None
     search: StrutLawSearch | None = None
     bars: BarCurve | None = None
-    seed: int = 0
-    names: tuple[str, ...] = ()
-    machine_file: str = "machine.toml"
     provenance: Mapping[str, Any] = field(default_factory=dict)
     next: Sequence[str] = ()
 
@@ -90,7 +79,7 @@ class UpdateOutcome:
     @property
     def changed(self) -> bool:
         """True where there is something to be written."""
-        return bool(self.steps[-1].fit.names) or self.law_asked
+        return bool(self.steps[-1].fit.names) or self.task.strut_law
 
     @property
     def worse(self) -> bool:
@@ -110,7 +99,7 @@ class UpdateOutcome:
     @property
     def accepted(self) -> bool:
         """True where a machine is to be written: the data support what was added, or it was forced."""
-        return self.changed and not self.worse and (self.forced or self.supported)
+        return self.changed and not self.worse and (self.task.force or self.supported)
 
     @property
     def verdict(self) -> str:
@@ -125,7 +114,7 @@ class UpdateOutcome:
     def widening(self) -> float:
         """Factor on standard deviations: how much wider the residuals are than the noise model says, at least 1."""
         # A bootstrap over points has the residuals' own width already.
-        return float(np.sqrt(dispersion(self.last.fit))) if self.objective == "likelihood" else 1.0
+        return float(np.sqrt(dispersion(self.last.fit))) if self.task.objective == LIKELIHOOD else 1.0
 
     @cached_property
     def corrected(self) -> Hexapod | None:
@@ -134,4 +123,6 @@ class UpdateOutcome:
 
     def fitted(self, provenance: Mapping[str, Any]) -> Hexapod:
         """The machine with the last model, which comes from there."""
-        return fitted_machine(self.given, self.last.fit, provenance, self.widening, self.data.setup.tolist())
+        return fitted_machine(
+            self.task.machine, self.last.fit, provenance, self.widening, self.task.data.setup.tolist()
+        )

@@ -43,7 +43,7 @@ def text(update: UpdateOutcome) -> str:
 def _errors(update: UpdateOutcome) -> str:
     """Mean error of every step; of a law that is kept also what refitting it would leave."""
     steps = [(step.name.replace("+ ", "with ", 1), 100.0 * step.error) for step in update.steps]
-    kept = update.refitted not in update.steps and update.objective == "likelihood"
+    kept = update.refitted not in update.steps and update.task.objective == "likelihood"
     law = [(f"({LAW_REFITTED} alone)", 100.0 * update.refitted.error)] if kept else []
     return errors_text(steps[0][1], None, [*law, *steps[1:]])
 
@@ -55,7 +55,7 @@ def assumptions(update: UpdateOutcome) -> list[str]:
         "as given, nothing is fitted, so leaving points out changes nothing: where the machine file's figures were "
         "fitted to these readings, its error at left-out points looks better than it is",
     ]
-    if update.objective != "likelihood":
+    if update.task.objective != "likelihood":
         return [
             *sentences,
             "smallest mean |modelled - measured| / measured, as the paper counts it; standard deviations by a "
@@ -77,7 +77,7 @@ def assumptions(update: UpdateOutcome) -> list[str]:
 def machine_heading(update: UpdateOutcome) -> str:
     """The remark above the machine file that an update writes."""
     return (
-        f"{fill(f'Machine {update.given.name}, updated. {text(update)}', 110)}\n"
+        f"{fill(f'Machine {update.task.machine.name}, updated. {text(update)}', 110)}\n"
         f"Command: {update.provenance['command']}\n"
         f"SHA-256 of the data: {update.provenance['data_sha256']}\n"
     )

@@ -26,7 +26,7 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import baseline, refine
 from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
 from toolpath_stiff.inference.left_out import held_out, of_readings
-from toolpath_stiff.inference.noise import JOINT_ERROR, noise_models
+from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.menu import Menu
@@ -53,11 +53,8 @@ def diagnose(
     *,
     noise: float | tuple[float, float] | None = None,
     strut_spread: float = STRUT_SPREAD,
-    joint_error: float = JOINT_ERROR,
     effect_files: Sequence[str | Path] = (),
     seed: int = 0,
-    plan_next: bool = True,
-    names: Sequence[str] = (),
     progress: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
     """Find out which physical effect the model lacks, if any: everything that `tps diagnose` says.
@@ -68,16 +65,12 @@ def diagnose(
         The model and n readings of the machine.
     noise
         Relative sd of one reading, re-clamping included, or (repeat, clamping); None: from the data.
-    strut_spread, joint_error
-        Relative sd of the struts' stiffnesses; m, sd of each joint coordinate.
+    strut_spread
+        Relative sd of the struts' stiffnesses.
     effect_files
         A user's own effects, which take part.
     seed
-        Of the bootstrap and of the poses of the plan.
-    plan_next
-        Whether to plan the next measurements where the verdict is `ambiguous`.
-    names
-        Of the measurement files, for the record.
+        Of the bootstrap.
     progress
         Told what is being done.
 
@@ -91,7 +84,7 @@ def diagnose(
     >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.readings.measurements import read_measurements
     >>> nist = load_machine("nist")
-    >>> found = diagnose(nist, read_measurements("nist-table1", nist), noise=0.10, plan_next=False)
+    >>> found = diagnose(nist, read_measurements("nist-table1", nist), noise=0.10)
     >>> found.verdict
     'ambiguous'
     """
@@ -104,13 +97,13 @@ def diagnose(
     def judged(data: Readings) -> Judged:
         predictor, judgements = Predictor(machine, data, effect_files), {}
         effects = testable_effects(predictor)[0]
-        for model in noise_models(data, noise, strut_spread, joint_error):
+        for model in noise_models(data, noise, strut_spread):
             progress(f"searching {len(effects)} effects, noise {model.name}")
             judgements[model.name] = judge(Problem.of(predictor, model), model, effects, seed)
         # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
         return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
 
-    judgements, main, data, suspects, shown = _without_slips(judged, data, progress)
+    judgements, main, data, suspects = _without_slips(judged, data, progress)
     progress("final fits, errors held out by point")
     effects, cannot = testable_effects(main.problem.predictor)
     tested = {family.name for family in main.families}
@@ -131,17 +124,11 @@ def diagnose(
         {name: left_out.of_readings(tip) for name, left_out in held.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
-        tuple(names) or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=suspects,
+        tuple(dict.fromkeys(data.file.tolist())), seed, suspects=suspects,
         unexcluded=tuple(hidden for hidden in unexcluded(main) if hidden.effect.name not in plausible),
-        slips=shown,
         loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
     )  # fmt: skip
-    diagnosis = replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis))
-    if not plan_next or diagnosis.verdict not in ("ambiguous", "described"):
-        return diagnosis
-    progress("planning the next measurements")
-    rows, remarks = next_measurements(diagnosis, seed=seed)
-    return replace(diagnosis, next_measurements=tuple(rows), remarks=tuple(remarks))
+    return replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis))
 
 
 Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise model; the one that is written out
@@ -149,11 +136,11 @@ Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise mo
 
 def _without_slips(
     judged: Callable[[Readings], Judged], data: Readings, progress: Callable[[str], None]
-) -> tuple[dict[str, Judgement], Judgement, Readings, tuple[slips.SuspectEntry, ...], tuple[slips.SlipSize, ...]]:
-    """Judgements of the readings without rows that are clearly mistyped, these readings, suspects, slips that show."""
+) -> tuple[dict[str, Judgement], Judgement, Readings, tuple[slips.SuspectEntry, ...]]:
+    """Judgements of the readings without rows that are clearly mistyped, these readings, suspects."""
     judgements, main = judged(data)
     if main.question or data.beside is not None:
-        return judgements, main, data, (), ()
+        return judgements, main, data, ()
     suspects = slips.suspect_rows(main.problem, main.likeliest)
     clear = [suspect for suspect in suspects if suspect.clear]
     clear = [suspect for suspect in clear if suspect not in slips.alone(data, clear)]
@@ -168,7 +155,7 @@ def _without_slips(
         progress("once more without the rows that look mistyped")
         data = data.select(kept)
         judgements, main = judged(data)
-    return judgements, main, data, tuple(entries), slips.slips_that_show(main.problem, main.likeliest)
+    return judgements, main, data, tuple(entries)
 
 
 def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:
@@ -225,10 +212,8 @@ POSES = 6
 PATH_STEP = 5e-3  # m between samples: the mean of a path needs no more
 
 
-def next_measurements(
-    diagnosis: Diagnosis, poses: int = POSES, seed: int = 0
-) -> tuple[list[dict[str, Any]], list[str]]:
-    """Rows of a plan that would tell the plausible explanations apart, each with its reason; and remarks.
+def with_plan(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda text: None) -> Diagnosis:
+    """With rows of a plan that would tell the plausible explanations apart, each with its reason; and remarks.
 
     Of an answer that is only `described`, what would confirm it. No rows with any other verdict than these two, and
     where they would gain nothing: the first remark says so.
@@ -236,21 +221,22 @@ def next_measurements(
     # Under several noise models the most demanding one that leaves rivals: a plan for it serves the others, too.
     open_ones = [j for j in diagnosis.judgements.values() if j.verdict == diagnosis.verdict]
     if diagnosis.verdict not in ("ambiguous", "described") or not open_ones:
-        return [], []
+        return diagnosis
+    progress("planning the next measurements")
     judgement = open_ones[-1]
     rivals = rivals_of(judgement)
     if len(rivals) < 2:
-        return [], []
+        return diagnosis
     noise = (float(np.sqrt(np.mean(judgement.noise.repeat**2))), judgement.noise.clamping)
     try:
         plan = plan_measurements(
-            diagnosis.machine, rivals, noise, poses, menu=Menu.of(diagnosis.data), seed=seed,
+            diagnosis.machine, rivals, noise, POSES, menu=Menu.of(diagnosis.data), seed=diagnosis.seed,
             effect_files=diagnosis.predictor.effect_files, strut_spread=judgement.noise.strut_spread,
         )  # fmt: skip
     except InputError as error:
-        return [], [f"no plan could be made: {error}"]
+        return replace(diagnosis, remarks=(f"no plan could be made: {error}",))
     if not plan.gains:
-        return [], [plan.nothing_gained]
+        return replace(diagnosis, remarks=(plan.nothing_gained,))
     rows = plan_rows(plan.visits, plan.chosen, set(diagnosis.data.point.tolist()))
     for row in rows:
         row["why"] = plan.why[int(row["clamp"]) - 1]
@@ -260,7 +246,7 @@ def next_measurements(
         for pair in plan.pairs
         if not pair.separable
     ]
-    return rows, remarks
+    return replace(diagnosis, next_measurements=tuple(rows), remarks=tuple(remarks))
 
 
 def choice_on_path(
@@ -271,7 +257,7 @@ def choice_on_path(
     Where the program is out of reach, or a model has no answer there, the reason instead. `given` is under what the
     program runs; unless it names a set-up, the one that an explanation belongs to: there the choice matters.
     """
-    from toolpath_stiff.analysis import analyze
+    from toolpath_stiff.analysis.results import analyze
     from toolpath_stiff.analysis.statistics import stiffness_figures
 
     names = [name for name in diagnosis.explanations if name == NONE or name in diagnosis.fits]

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.diagnosis.beside import beside_text, would_tell
 from toolpath_stiff.diagnosis.examination import Examination
 from toolpath_stiff.diagnosis.rows import HypothesisRow, HypothesisRows, percent_of, rounded_errors
-from toolpath_stiff.diagnosis.words import assumptions, doubts, next_steps, verdict_text, why
+from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why, would_tell
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.detectable import Detectable
@@ -74,9 +73,6 @@ def document_of(diagnosis: Examination, rows: HypothesisRows) -> dict[str, Any]:
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": [*diagnosis.data.notes, *doubts(diagnosis)],
         "suspect_rows": to_dict(diagnosis.suspects),
-        "detectable_slips": [
-            {"column": slip.column, "unit": slip.unit, "size": json_number(slip.size, 2)} for slip in diagnosis.slips
-        ],
         "seed": diagnosis.seed,
         "machine": diagnosis.machine.name,
         "effects": diagnosis.predictor.effects_that_act,

@@ -17,7 +17,7 @@ from toolpath_stiff.inference.judgement import Judgement
 from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.slips import SlipSize, SuspectEntry
+from toolpath_stiff.inference.slips import SuspectEntry
 from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.portrait.alike import Alike
@@ -65,8 +65,6 @@ class Examination:
         Effects that the readings neither show nor exclude beside the likeliest explanation, at a size that matters.
     suspects
         Rows that look mistyped; `data` no longer holds those that are clear.
-    slips
-        The smallest slips of a pose that these readings would show; none where rows were not looked at.
     loops
         Readings of indicators beside the tip against the likeliest explanation. Everything above with an entry a
         reading is of those of the tip.
@@ -97,7 +95,6 @@ class Examination:
     alike: Alike | None = None
     unexcluded: tuple[Unexcluded, ...] = ()
     suspects: tuple[SuspectEntry, ...] = ()
-    slips: tuple[SlipSize, ...] = ()
     loops: BesideTip = field(default_factory=BesideTip)
     inputs: tuple[str, ...] = ()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from toolpath_stiff.diagnosis.document import document_of
 from toolpath_stiff.diagnosis.examination import Examination
 from toolpath_stiff.diagnosis.rows import HypothesisRows, rows_of
-from toolpath_stiff.files import Content
 from toolpath_stiff.results import FolderResult
 
 if TYPE_CHECKING:
@@ -44,11 +42,6 @@ class Diagnosis(Examination, FolderResult):
         """The error as given, with the strut law refitted, and with each candidate."""
         figure: Figure = self.view.ladder_png.figure(self)
         return figure
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps diagnose`."""
-        files: Mapping[str, Content] = self.view.files(self, plots=plots)
-        return files
 
     def _short(self) -> str:
         names = ", ".join(self.plausible)

@@ -94,56 +94,56 @@ class HypothesisRows:
     best: HypothesisRow | None
 
 
-def rows_of(examination: Examination) -> HypothesisRows:
+def rows_of(diagnosis: Examination) -> HypothesisRows:
     """The rows of a diagnosis."""
-    main = examination.main
+    main = diagnosis.main
     # Nothing is fitted: leaving points out changes nothing.
-    error, title = percent_of(float(examination.as_given.errors.mean())), "the machine file as it stands"
+    error, title = percent_of(float(diagnosis.as_given.errors.mean())), "the machine file as it stands"
     as_given = HypothesisRow(
         AS_GIVEN, AS_GIVEN, title=title, mean_abs_error_percent=error, held_out_error_percent=error
     )
     refitted = replace(
-        _row(examination, NONE, main.base.log_evidence),
+        _row(diagnosis, NONE, main.base.log_evidence),
         label="strut law refitted (none)", title="no further effect", held_out_gain_in_se=None,
         adequate=main.base_gate.probability > FALSE_ALARM,
     )  # fmt: skip
     likely = main.probability
     chance = json_number(likely.get(OUTSIDE, 0.0))
     families = sorted(main.families, key=lambda f: (-likely.get(f.name, 0.0), -f.log_evidence, f.name))
-    candidates = [_candidate(examination, family) for family in families]
+    candidates = [_candidate(diagnosis, family) for family in families]
     pairs = [
         replace(
-            _row(examination, pair.name, pair.log_evidence),
+            _row(diagnosis, pair.name, pair.log_evidence),
             adequate=main.gates[pair.name].probability > ADEQUATE,
             adequate_probability=json_number(main.gates[pair.name].probability, 3),
         )
         for pair in main.pairs
-        if pair.name in examination.fits and pair.name in main.gates
+        if pair.name in diagnosis.fits and pair.name in main.gates
     ]
     pairs.sort(key=lambda row: (-(row.probability or 0.0), -(row.log_evidence or 0.0)))
     every = [*candidates, *pairs]
     offered = max((row for row in every if row.offered), key=lambda row: row.probability or 0.0, default=None)
     return HypothesisRows(
         as_given, refitted, HypothesisRow(OUTSIDE, OUTSIDE, title="a smooth unknown", probability=chance), tuple(pairs),
-        tuple(candidates), next((row for row in every if row.name == examination.best), offered),
+        tuple(candidates), next((row for row in every if row.name == diagnosis.best), offered),
     )  # fmt: skip
 
 
-def _row(examination: Examination, name: str, log_evidence: float) -> HypothesisRow:
+def _row(diagnosis: Examination, name: str, log_evidence: float) -> HypothesisRow:
     """A hypothesis with its final fit; the model alone where the effect fits best when it is absent."""
-    main, base = examination.main, examination.held_out_base
-    fit, held = examination.fits.get(name, examination.base), examination.held_out.get(name, base)
+    main, base = diagnosis.main, diagnosis.held_out_base
+    fit, held = diagnosis.fits.get(name, diagnosis.base), diagnosis.held_out.get(name, base)
     if not any(size.any() for size in fit.sizes):
-        fit, held = examination.base, base
+        fit, held = diagnosis.base, base
     labels = {candidate.name: candidate.label for candidate in fit.candidates}
     return HypothesisRow(
         name,
         " + ".join(labels.get(effect, effect) for effect in name.split(" + ")),
-        name in examination.explanations,
+        name in diagnosis.explanations,
         finding=joined(fit.findings) if fit.findings else "",
         probability=json_number(main.probability.get(name, 0.0)),
         log_evidence=json_number(log_evidence - main.base.log_evidence),
-        words=row_words(examination, name),
+        words=row_words(diagnosis, name),
         sizes=fitted_sizes(fit, next((family for family in main.families if family.name == name), None)),
         choice={candidate.name: dict(candidate.choice) for candidate in fit.candidates},
         mean_abs_error_percent=percent_of(float(fit.errors.mean())),
@@ -153,14 +153,14 @@ def _row(examination: Examination, name: str, log_evidence: float) -> Hypothesis
     )
 
 
-def _candidate(examination: Examination, family: Family) -> HypothesisRow:
+def _candidate(diagnosis: Examination, family: Family) -> HypothesisRow:
     """A single effect; where it fits best when it is absent, without sizes."""
-    gate = examination.main.gates.get(family.name)
-    base_passes = examination.main.base_gate.probability > FALSE_ALARM
-    row = replace(_row(examination, family.name, family.log_evidence), title=family.effect.title)
+    gate = diagnosis.main.gates.get(family.name)
+    base_passes = diagnosis.main.base_gate.probability > FALSE_ALARM
+    row = replace(_row(diagnosis, family.name, family.log_evidence), title=family.effect.title)
     if not row.sizes:
         return replace(row, adequate=base_passes, eligible=False, remark="fits best when it is absent")
-    bounded = examination.fits[family.name].at_upper_bound()
+    bounded = diagnosis.fits[family.name].at_upper_bound()
     remark = "not tested further" if gate is None and not base_passes else ""
     return replace(
         row,
@@ -171,9 +171,9 @@ def _candidate(examination: Examination, family: Family) -> HypothesisRow:
     )
 
 
-def row_words(examination: Examination, name: str) -> str:
+def row_words(diagnosis: Examination, name: str) -> str:
     """How a hypothesis stands: by its odds against the likeliest, unless a gate has settled it."""
-    main = examination.main
+    main = diagnosis.main
     probability = main.probability.get(name, 0.0)
     if main.base_gate.probability > FALSE_ALARM:
         return "enough" if name == NONE else "no more than chance" if probability >= SHOWN else "not needed"

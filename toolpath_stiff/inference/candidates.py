@@ -20,7 +20,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.splines import Spline
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import known_effects
@@ -189,6 +188,24 @@ def candidates_of(effect: Effect, data: Readings) -> list[Candidate]:
     return candidates
 
 
+def spline(knots: FloatArray, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Positions (...,) -> (..., n): the cubic spline through values (g, n) at knots (g,) in rising order.
+
+    Twice continuously differentiable, a single cubic over each two end pieces and beyond ("not-a-knot": de Boor 1978, A
+    Practical Guide to Splines, chapter IV): powers, and from each further knot on a cubic more.
+    """
+    start, reach = knots[0], knots[-1] - knots[0]
+    further = (knots[2:-2] - start) / reach
+
+    def columns(positions: FloatArray) -> FloatArray:
+        x = ((positions - start) / reach)[..., None]
+        powers = x ** np.arange(min(4, len(knots)))
+        return np.concatenate([powers, np.maximum(x - further, 0.0) ** 3], axis=-1)
+
+    weights = np.linalg.solve(columns(knots), values)
+    return lambda positions: np.asarray(columns(positions) @ weights)
+
+
 class CandidateTable:
     """`delta`, (n,) m/N that a candidate adds to the compliance of each reading, as a function of its sizes.
 
@@ -214,8 +231,8 @@ class CandidateTable:
         return self._knots()
 
     @cached_property
-    def _splines(self) -> dict[float, Spline]:
-        return {sign: Spline.through(logs, ratio) for sign, (logs, ratio) in self.knots.items()}
+    def _splines(self) -> dict[float, Callable[[FloatArray], FloatArray]]:
+        return {sign: spline(logs, ratio) for sign, (logs, ratio) in self.knots.items()}
 
     def reach(self, sign: float) -> float:
         """Largest size tabulated in that direction."""
@@ -227,12 +244,12 @@ class CandidateTable:
             return np.asarray(sizes @ self.columns.T)
         size = sizes[..., 0]
         out = np.zeros((*size.shape, len(self.columns)))
-        for sign, spline in self._splines.items():
+        for sign, course in self._splines.items():
             logs = self.knots[sign][0]
             where = size * sign > 0.0
             if where.any():
                 position = np.clip(np.log(np.abs(size[where])), logs[0], logs[-1])
-                out[where] = spline(position) * size[where][..., None]
+                out[where] = course(position) * size[where][..., None]
         return out
 
     def slope(self, sizes: FloatArray) -> FloatArray:

@@ -18,7 +18,8 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import Candidate, CandidateTable, Component
 from toolpath_stiff.inference.covariances import Precision
-from toolpath_stiff.inference.noise import Noise, NormalEquations, Scatter, covariance, gauss_newton, scaled_inverse
+from toolpath_stiff.inference.least_squares import NormalEquations, gauss_newton, scaled_inverse
+from toolpath_stiff.inference.noise import Noise, Scatter, covariance
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.size_priors import Sight, SizePrior, log_comparable
 from toolpath_stiff.stiffness.active import ActiveEffect

@@ -15,8 +15,8 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import Candidate, Component
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem, normal_equations
-from toolpath_stiff.inference.minima import bounded_step
-from toolpath_stiff.inference.noise import NormalEquations, Scatter, gauss_newton, scaled_inverse
+from toolpath_stiff.inference.least_squares import NormalEquations, bounded_step, gauss_newton, scaled_inverse
+from toolpath_stiff.inference.noise import Scatter
 
 STEPS = 8
 

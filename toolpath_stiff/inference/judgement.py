@@ -6,9 +6,9 @@
 | noise | `noise.noise_models` | `Noise`: how far readings scatter for reasons that no model explains |
 | | `evidence.Problem.of` | `Problem`: readings, model and scatter together |
 | candidates | `find_candidates` | `Candidates`: every effect fitted as far as a table of its compliance goes |
-| fits | `Fits` | `Fit`: the likely ones once more with the model itself, each when it is asked for |
+| fits | `fits.refine` | `Fit`: the likely ones once more with the model itself |
 | gates | `apply_gates` | `Gates`: which explanations leave no more than noise would |
-| probabilities | `weigh` | `Probabilities` of those that pass |
+| probabilities | `weigh` | of those that pass |
 | verdict | `decide` | `Judgement`: the verdict, the explanations that hold the truth, all of the above |
 
 `judge` takes the steps from the candidates on, under one noise model; `diagnosis.diagnose` all of them, under each
@@ -83,6 +83,9 @@ SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alo
 # Odds below which a second effect is not considered where one suffices: "positive" evidence begins at 3 (Kass and
 # Raftery 1995, Bayes factors).
 POSITIVE = 3.0
+
+
+Evidence = dict[tuple[str, ...], float]  # of effects, pairs and triples by their names
 
 
 @dataclass(frozen=True)
@@ -177,19 +180,18 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
         Of the simulated readings.
     """
     candidates = find_candidates(problem, effects)
-    fits = Fits(problem)
-    gates = apply_gates(problem, noise, candidates, fits, seed)
-    weighed = weigh(problem, noise, candidates, gates)
+    gates = apply_gates(problem, noise, candidates, seed)
+    probability, form = weigh(problem, noise, candidates, gates)
     doubtful = question(problem.predictor)
-    verdict, explanations = ("unexplained", ()) if doubtful else decide(gates, weighed)
+    verdict, explanations = ("unexplained", ()) if doubtful else decide(gates, probability)
     doubt, factor = ("", 1.0) if doubtful else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
-        described = drawn(fits.made[explanations[0]], {NONE: candidates.base, **fits.made}, problem.predictor.data)
+        described = drawn(gates.fits[explanations[0]], {NONE: candidates.base, **gates.fits}, problem.predictor.data)
         verdict = verdict if described is None or described.confirmed else "described"
     return Judgement(
-        verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
-        fits.made, gates.tried, dict(weighed.by_name), weighed.form, doubtful, noise.remark or doubt, factor, described,
+        verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, gates.by_name,
+        gates.fits, gates.tried, probability, form, doubtful, noise.remark or doubt, factor, described,
     )  # fmt: skip
 
 
@@ -212,9 +214,9 @@ class Candidates:
     forms: Forms
 
     @property
-    def offered(self) -> list[Family]:
-        """Effects that fit best when they are there."""
-        return [family for family in self.families if family.best is not None]
+    def offered(self) -> list[tuple[Family, Fit]]:
+        """Effects that fit best when they are there, with that fit."""
+        return [(family, family.best) for family in self.families if family.best is not None]
 
 
 def find_candidates(problem: Problem, effects: Sequence[Effect]) -> Candidates:
@@ -225,21 +227,7 @@ def find_candidates(problem: Problem, effects: Sequence[Effect]) -> Candidates:
     return Candidates(base, tuple(families), forms)
 
 
-@dataclass(frozen=True)
-class Fits:
-    """Final fits with the model itself; each is made when it is first asked for, since few of them are needed."""
-
-    problem: Problem
-    made: dict[str, Fit] = field(default_factory=dict)
-
-    def of(self, name: str, fit: Fit) -> Fit:
-        """The final fit of a hypothesis from what the search has found."""
-        if name not in self.made:
-            self.made[name] = refine(self.problem, fit)
-        return self.made[name]
-
-
-@dataclass(frozen=True)
+@dataclass
 class Gates:
     """Which explanations leave no more than noise would.
 
@@ -253,24 +241,42 @@ class Gates:
         Effects that pass, the most likely first; pairs that pass and beat each of their members.
     tried
         All pairs that were fitted, the most likely first.
-    by_name
-        Effect (or "a + b") -> its absolute test, where it was made.
+    by_name, fits
+        Effect (or "a + b") -> its absolute test; its fit with the model itself. Made for those that need it.
     """
 
     base: Gate
-    none_stands: bool
+    none_stands: bool = True
     singles: tuple[str, ...] = ()
     pairs: tuple[Combination, ...] = ()
     tried: tuple[Combination, ...] = ()
-    by_name: Mapping[str, Gate] = field(default_factory=dict)
+    by_name: dict[str, Gate] = field(default_factory=dict)
+    fits: dict[str, Fit] = field(default_factory=dict)
 
     @property
     def enough(self) -> bool:
         """Whether the model explains the data without a further effect."""
         return self.base.probability > FALSE_ALARM
 
+    def add(self, combinations: Sequence[Combination], evidence: Evidence, passes: Callable[[str, Fit], bool]) -> None:
+        """Try pairs or triples: those of the likeliest that beat each of their parts and pass stand.
 
-def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
+        What two effects do to each other is not in their tables: the final fit says how much more likely it makes the
+        data.
+        """
+        tried = list(combinations)
+        for k, combination in enumerate(combinations[:TESTED]):
+            parts = [log for names, log in evidence.items() if set(names) < set(combination.names)]
+            if combination.log_evidence <= max(parts) + SURVIVES:
+                continue
+            passed = passes(combination.name, combination.score)
+            more = self.fits[combination.name].log_posterior - combination.score.log_posterior
+            tried[k] = replace(combination, log_evidence=combination.log_evidence + more)
+            self.pairs += (tried[k],) if passed else ()
+        self.tried += tuple(sorted(tried, key=lambda several: (-several.log_evidence, several.names)))
+
+
+def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: int) -> Gates:
     """The model alone, then single effects, then all pairs, then triples where no single effect is enough."""
     draws = simulate(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
@@ -278,80 +284,46 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
     # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
     alone = absolute_gate(problem, base.residual, base.jacobian, draws, forms, signs, gain)
-    if alone.probability > FALSE_ALARM:
-        return Gates(alone, none_stands=True)
-    by_name: dict[str, Gate] = {}
+    gates = Gates(alone)
+    if gates.enough:
+        return gates
 
     def passes(name: str, fit: Fit) -> bool:
-        fit = fits.of(name, fit)
-        by_name[name] = absolute_gate(problem, fit.residual, fit.jacobian, draws, forms)
-        return by_name[name].probability > ADEQUATE
+        fit = gates.fits[name] = refine(problem, fit)
+        gates.by_name[name] = absolute_gate(problem, fit.residual, fit.jacobian, draws, forms)
+        return gates.by_name[name].probability > ADEQUATE
 
     singles: list[Family] = []
-    for count, family in enumerate(candidates.offered):
-        assert family.best is not None
+    for count, (family, best) in enumerate(candidates.offered):
         if count >= TESTED and (not singles or family.log_evidence < singles[0].log_evidence - FAR):
             break
-        if passes(family.name, family.best):
+        if passes(family.name, best):
             singles.append(family)
-    evidence: dict[tuple[str, ...], float] = {(f.name,): f.log_evidence for f in families}
-    tried, search = search_pairs(problem, families, base)
-    pairs, tried = _standing(tried, evidence, fits, passes)
+    gates.singles = tuple(family.name for family in singles)
+    evidence: Evidence = {(f.name,): f.log_evidence for f in families}
+    pairs, search = search_pairs(problem, families, base)
+    gates.add(pairs, evidence, passes)
     # What an effect beside another must add to be considered: its prior, and odds of 3 to 1.
     price = float(np.log(POSITIVE * _prior(families, 1) / _prior(families, 2)))
     least = singles[0].log_evidence + price if singles else -np.inf
-    if not singles or any(pair.log_evidence > least for pair in pairs):
+    if not singles or any(pair.log_evidence > least for pair in gates.pairs):
         # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
-        evidence |= {pair.names: pair.log_evidence for pair in tried}
-        triples, tried_triples = _standing(search_triples(search, bool(pairs)), evidence, fits, passes)
-        pairs, tried = [*pairs, *triples], [*tried, *tried_triples]
+        evidence |= {pair.names: pair.log_evidence for pair in gates.tried}
+        gates.add(search_triples(search, bool(gates.pairs)), evidence, passes)
     # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
-    none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
-    return Gates(alone, none_stands, tuple(f.name for f in singles), tuple(pairs), tuple(tried), by_name)
+    gates.none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
+    return gates
 
 
-def _standing(
-    combinations: Sequence[Combination],
-    evidence: Mapping[tuple[str, ...], float],
-    fits: Fits,
-    passes: Callable[[str, Fit], bool],
-) -> tuple[list[Combination], list[Combination]]:
-    """Those of the likeliest that beat each of their parts and pass; and all of them.
+def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) -> tuple[dict[str, float], str]:
+    """Probabilities of the explanations that pass, a further effect at odds of 3 to 1 only; 0 of those kept out.
 
-    What two effects do to each other is not in their tables: the final fit says how much more likely it makes the data.
-    """
-    standing, tried = [], list(combinations)
-    for k, combination in enumerate(combinations[:TESTED]):
-        parts = [log for names, log in evidence.items() if set(names) < set(combination.names)]
-        if combination.log_evidence <= max(parts) + SURVIVES:
-            continue
-        passed = passes(combination.name, combination.score)
-        more = fits.made[combination.name].log_posterior - combination.score.log_posterior
-        tried[k] = replace(combination, log_evidence=combination.log_evidence + more)
-        if passed:
-            standing.append(tried[k])
-    return standing, sorted(tried, key=lambda combination: (-combination.log_evidence, combination.names))
-
-
-@dataclass(frozen=True)
-class Probabilities:
-    """Hypothesis -> posterior probability: effects, `none`, "a + b", `OUTSIDE`; 0 for those that a gate keeps out.
-
-    `form` is the form of discrepancy that stands out, in words; "" if none was looked for.
-    """
-
-    by_name: Mapping[str, float]
-    form: str = ""
-
-
-def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) -> Probabilities:
-    """Probabilities of the explanations that pass, a further effect at odds of 3 to 1 only.
-
-    Where no single effect passes, something outside the catalogue is weighed, too.
+    Where no single effect passes, something outside the catalogue is weighed, too: then with the form of discrepancy
+    that stands out, in words, else "".
     """
     families = candidates.families
     if gates.enough:
-        return Probabilities(_posterior(problem, noise, candidates, True, [f.name for f in families]))
+        return _posterior(problem, noise, candidates, True, [f.name for f in families]), ""
     outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
 
     def posterior(standing: Sequence[Combination]) -> dict[str, float]:
@@ -364,7 +336,7 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
     posteriors = _sparing(gates, posterior)
     if gates.pairs and posteriors.get(OUTSIDE, 1.0) < STANDS:  # ruled out
         del posteriors[OUTSIDE]
-    return Probabilities(posteriors, form)
+    return posteriors, form
 
 
 def _sparing(gates: Gates, posterior: Callable[[Sequence[Combination]], dict[str, float]]) -> dict[str, float]:
@@ -388,9 +360,8 @@ def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
     """
     beside = PRIOR_PAIRS / PRIOR_SINGLES / max(len(candidates.families), 1)
     evidences = [discrepancy_evidence(problem, candidates.base, candidates.forms)]
-    for family in candidates.offered[:2]:
-        assert family.best is not None
-        evidence, words = discrepancy_evidence(problem, family.best, candidates.forms)
+    for _, best in candidates.offered[:2]:
+        evidence, words = discrepancy_evidence(problem, best, candidates.forms)
         evidences.append((evidence + float(np.log(beside)), words))
     _, likeliest = max(evidences, key=lambda pair: pair[0])
     return float(np.logaddexp.reduce([evidence for evidence, _ in evidences])), likeliest
@@ -437,9 +408,8 @@ def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit
     return log_evidence + 0.5 * squares - 0.5 * (freedom + n) * float(np.log1p(max(squares, 0.0) / freedom))
 
 
-def decide(gates: Gates, weighed: Probabilities) -> tuple[str, tuple[str, ...]]:
+def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str, ...]]:
     """The verdict, and the hypotheses that hold the truth with 95 % probability, the most likely first."""
-    posterior = dict(weighed.by_name)
     if gates.enough:
         likely = _smallest_set(posterior)
         return "adequate", likely if NONE in likely else (*likely, NONE)
@@ -472,7 +442,7 @@ def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
     return tuple(effect for effect in hidden if effect.effect.name not in judgement.plausible)
 
 
-def _smallest_set(posterior: dict[str, float], named: float = NAMED) -> tuple[str, ...]:
+def _smallest_set(posterior: Mapping[str, float], named: float = NAMED) -> tuple[str, ...]:
     """The one hypothesis that holds `named`, else the fewest that hold `HELD`."""
     ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
     if ranked and ranked[0][1] >= named:

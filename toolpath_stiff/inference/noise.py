@@ -17,9 +17,7 @@ guessed low and high.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +30,6 @@ from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats
 from toolpath_stiff.readings.measurements import Readings
-
-At = TypeVar("At")  # where a fit stands
-
 
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
 
@@ -203,8 +198,8 @@ def _noise_of_tip(
         origin += _percent(repeats.repeat, repeats.clamping)
         origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
         repeat, freedom = np.full(n, repeats.repeat), repeats.freedom
-        if rows.any() and not rows.all():  # of other readings, mostly: both count
-            repeat, freedom = _both(relative, rows, repeats, trusted=not remark)
+        if rows.any() and not rows.all():  # each stands for its own readings, trusted as far as the less certain one
+            repeat[rows], freedom = _parts(relative[rows])[0], min(STATED_FREEDOM, freedom)
             origin += f", and from sd_N_per_mm of {int(rows.sum())} readings, {_percent(*_shared(total))}"
         return (model("measured", repeat, repeats.clamping, freedom, origin, remark),)
     if rows.any():
@@ -228,24 +223,6 @@ def _parts(relative: FloatArray) -> tuple[FloatArray, float]:
     """Stated relative sds (n,) as repeat noise (n,) and clamping."""
     clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
     return np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2)), float(clamping)
-
-
-def _both(relative: FloatArray, rows: NDArray[np.bool_], repeats: Repeats, trusted: bool) -> tuple[FloatArray, float]:
-    """Repeat noise (n,) where some `rows` state theirs, and what it is worth.
-
-    Two estimates of one thing are weighed by their degrees of freedom. Where they contradict each other, each stands
-    for its own readings, and both are trusted as far as the less certain one.
-    """
-    repeat = np.full(len(relative), repeats.repeat)
-    repeat[rows] = _parts(relative[rows])[0]
-    if not trusted:
-        return repeat, min(STATED_FREEDOM, repeats.freedom)
-    level = float(np.sqrt(np.mean(repeat[rows] ** 2)))
-    freedom = STATED_FREEDOM + repeats.freedom
-    pooled = float(np.sqrt((STATED_FREEDOM * level**2 + repeats.freedom * repeats.repeat**2) / freedom))
-    repeat[rows] *= pooled / level
-    repeat[~rows] = pooled
-    return repeat, freedom
 
 
 def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str, used: str = "instead") -> str:
@@ -369,59 +346,3 @@ class Scatter:
         """(...,) of residuals (..., n), the price of wild readings included, without the constant n ln(2 pi) / 2."""
         squared = self.precision.squares(residual)
         return np.asarray(-0.5 * (squared + self.covariance.log_determinant) - len(self.wild) * self.price)
-
-
-@dataclass(frozen=True)
-class NormalEquations:
-    """At one point: jacobian (n, q) of ln k to q unknowns, information (q, q) and gradient (q,), priors included."""
-
-    jacobian: FloatArray
-    information: FloatArray
-    gradient: FloatArray
-
-    @property
-    def scale(self) -> FloatArray:
-        """(q,) of the unknowns, whose units may be very different."""
-        return np.sqrt(np.maximum(np.diag(self.information), 1e-300))
-
-
-def gauss_newton(
-    start: At,
-    equations: Callable[[At], NormalEquations],
-    move: Callable[[At, NormalEquations], tuple[At, FloatArray] | None],
-    steps: int,
-    tolerance: float,
-) -> tuple[At, NormalEquations]:
-    """Least squares step by step: on tables (`evidence`) and with the model itself (`fits`).
-
-    Parameters
-    ----------
-    start
-        Where to begin, whatever `equations` and `move` understand.
-    equations
-        The normal equations at a point.
-    move
-        The next point and the step (q,) that was wanted; None where no step helps.
-    steps, tolerance
-        At most so many, and until a step is so small in standard deviations.
-
-    Returns
-    -------
-    The last point, and the equations of the last step.
-    """
-    point = start
-    for _ in range(steps):
-        here = equations(point)
-        moved = move(point, here)
-        if moved is None:
-            break
-        point, step = moved
-        if np.abs(step * here.scale).max() < tolerance:
-            break
-    return point, here
-
-
-def scaled_inverse(matrix: FloatArray) -> FloatArray:
-    """Inverse of a covariance or information matrix (p, p) whose rows may have very different units."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))

@@ -6,6 +6,7 @@ machine does cancels.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,6 @@ from numpy.typing import NDArray
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.inference.covariances import Groups
-from toolpath_stiff.inference.minima import bounded_minimum
 from toolpath_stiff.readings.measurements import Readings
 
 # Share of wild readings where repeats do not tell, and how much wider they scatter; assumed. Where repeats tell, their
@@ -40,19 +40,28 @@ FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estima
 MOST_TRIMS = 8
 
 
+LARGEST_RATIO, ZOOMS = 5.0, 6  # of clamping to repeat noise; ever finer grids on which it is looked for
+
+
 # Standard deviations as which a larger deviation counts: how far off the wildest is tells nothing of the others.
 FARTHEST = 1.5 * OUTLIER_WIDTH
+
+
+ALIKE = ("position", "angles", "direction", "force", "tool_extension", "setup", "loop")  # columns of repeats
 
 
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
-def repeat_groups(data: Readings) -> NDArray[np.int64]:
-    """(n,) number of each reading's group: the same pose, direction, load, tool, set-up and loop."""
-    columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
-    columns += [data.force[:, None], data.tool_extension[:, None]]
-    for labels in (data.setup, data.loop):
-        columns.append(np.unique(labels, return_inverse=True)[1].reshape(-1, 1).astype(float))
+def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> NDArray[np.int64]:
+    """(n,) number of each reading's group: the same pose, direction, load, tool, set-up and loop.
+
+    `apart`: those of `ALIKE` in which the readings of a group may differ.
+    """
+    columns = []
+    for values in (getattr(data, name) for name in ALIKE if name not in apart):
+        numbers = values if values.dtype.kind == "f" else np.unique(values, return_inverse=True)[1] * 1.0
+        columns.append(np.round(numbers.reshape(len(data), -1), 6))
     groups = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
     return np.asarray(groups.reshape(-1), dtype=np.int64)
 
@@ -228,19 +237,13 @@ def _drifts(data: Readings, stiffness: FloatArray) -> FloatArray:
 
 def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
     """Repeat noise and clamping that make the contrasts most likely, and whether they tell of clamping at all."""
-    values, loads = contrasts.values, contrasts.loads
-    rest = max(float(contrasts.left @ contrasts.left) - float(loads.sum()), 0.0)
-
-    def repeat_at(ratio: float) -> float:
-        return float(np.sqrt((rest + (loads / (1.0 + ratio * values)).sum()) / contrasts.count))
-
-    def minus_log_likelihood(root: float) -> float:
-        ratio = root**2
-        volume = 0.5 * float(np.log1p(ratio * values).sum())
-        return contrasts.count * float(np.log(max(repeat_at(ratio), 1e-12))) + volume
-
-    if not contrasts.tells:
-        return repeat_at(0.0), 0.0, False
-    best = bounded_minimum(minus_log_likelihood, 0.0, 5.0)
-    root = best if minus_log_likelihood(best) < minus_log_likelihood(0.0) else 0.0
-    return repeat_at(root**2), root * repeat_at(root**2), True
+    loads, rest = contrasts.loads, max(float(contrasts.left @ contrasts.left) - float(contrasts.loads.sum()), 0.0)
+    low, high = 0.0, LARGEST_RATIO if contrasts.tells else 0.0
+    for _ in range(ZOOMS):
+        ratios = np.linspace(low, high, 41)  # of clamping to repeat noise
+        widths = 1.0 + ratios[:, None] ** 2 * contrasts.values
+        repeat = np.sqrt((rest + (loads / widths).sum(axis=1)) / contrasts.count)
+        volume = 0.5 * np.log(widths).sum(axis=1)
+        best = int(np.argmin(contrasts.count * np.log(np.maximum(repeat, 1e-12)) + volume))
+        low, high = ratios[max(best - 1, 0)], ratios[min(best + 1, len(ratios) - 1)]
+    return float(repeat[best]), float(ratios[best] * repeat[best]), contrasts.tells

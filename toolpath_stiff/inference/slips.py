@@ -15,7 +15,6 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.covariances import Groups, Precision, Rows
-from toolpath_stiff.inference.detectable import POWER_80
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.noise import Scatter
 from toolpath_stiff.inference.prediction import scaled_law
@@ -43,9 +42,6 @@ NEAR = 3.0  # standard deviations within which the mended rows must lie, root me
 
 # A digit typed wrongly; mm and degrees, assumed. Each further one costs all others a little: more is tried by chance.
 STEPS_MM, STEPS_DEG = (10.0,), (1.0, 5.0)
-
-
-MOST_STEPS = 10.0  # times the first of these up to which a change is in proportion to the slip
 
 
 LBF_PER_IN = 25.4 / 4.4482216152605  # of 1 N/mm; the inch is 25.4 mm, the pound-force 4.448... N, both exactly
@@ -229,41 +225,6 @@ def _words(data: Readings, ways: Sequence[Slip]) -> str:
 def _tried(data: Readings) -> int:
     """How many slips of single rows there may be."""
     return len(data) * len(list(_slips_of_row(data, np.array([0]))))
-
-
-@dataclass(frozen=True)
-class SlipSize:
-    """By how much a column of all readings of a clamping must be off for these to show it, four times of five.
-
-    `size` in mm or degrees, for the median clamping; inf where not even ten times the usual slip would show; nan where
-    no clamping has several readings, or where the machine cannot take a pose that is off by the usual slip.
-    """
-
-    column: str
-    unit: str
-    size: float
-
-
-def slips_that_show(problem: Problem, fit: Fit) -> tuple[SlipSize, ...]:
-    """How large a slip of each coordinate and angle must be to stand out as `suspect_rows` asks.
-
-    That one looks for slips of 10 mm, 1 and 5 degrees: where the size is larger, they pass unseen, and do as little
-    harm. Mending a slip of whitened length s gains s^2 / 2, in proportion to the square of its size, and has to pay for
-    every slip that is tried.
-    """
-    data = problem.predictor.data
-    wanted = float(np.sqrt(2.0 * np.log(_tried(data) / SLIPPED))) + POWER_80
-    projected = problem.projected(fit.jacobian)
-    blocks = [(rows, projected.block(rows)) for rows in Groups.by(data.clamp).members() if len(rows) > 1]
-    sizes = []
-    for names, field, (step, *_), si, unit in POSE_STEPS:
-        for k, name in enumerate(names):
-            moved = getattr(data, field) + step * si * np.eye(3)[k]
-            (change,) = _changes(problem, fit, [Slip(np.arange(len(data)), name, "", "", {field: moved})])
-            squares = np.array([change[rows] @ block @ change[rows] for rows, block in blocks])
-            middle = float(np.sqrt(np.median(squares))) if blocks else np.nan
-            sizes.append(SlipSize(name, unit, np.inf if middle * MOST_STEPS < wanted else step * wanted / middle))
-    return tuple(sizes)
 
 
 def _looked_at(problem: Problem, fit: Fit, taken: BoolArray) -> tuple[list[Rows], list[Rows]]:

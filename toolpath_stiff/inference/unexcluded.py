@@ -11,7 +11,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import LARGEST, SMALLEST, Candidate, CandidateTable
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
-from toolpath_stiff.inference.minima import bounded_step
+from toolpath_stiff.inference.least_squares import bounded_step
 from toolpath_stiff.inference.size_priors import LIKELY, log_expected, log_usual
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 

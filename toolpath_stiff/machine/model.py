@@ -283,7 +283,9 @@ class Hexapod:
         A longer tool puts the joints further above the tip, along the spindle axis.
         """
         length = np.asarray(tool_length, dtype=float)
-        if length.ndim == 0 and np.isnan(length):
+        if length.size and (np.isnan(length).all() or np.ptp(length) == 0.0):
+            length = length.flat[0]  # one for all: the kinematics is then cheaper
+        if np.ndim(length) == 0 and np.isnan(length):
             return self.platform_joints
         extension = np.where(np.isnan(length), 0.0, length - self.reference_tool_length)
         return np.asarray(self.platform_joints + extension[..., None, None] * np.array([0.0, 0.0, 1.0]))

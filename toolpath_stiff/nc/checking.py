@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, plain
+from toolpath_stiff.nc.controller import plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
@@ -25,93 +23,81 @@ from toolpath_stiff.nc.findings import (
     Checked,
     Finding,
     UsedCode,
-    finding_of,
     finding_of_unsupported,
     findings_of,
     in_order,
-)  # fmt: skip
+)
 from toolpath_stiff.nc.languages import foreign_program, refused_program
-from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc.inputs import split
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
+from toolpath_stiff.nc.moves import ReadProgram, Recorder
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.parametric.statements import uses_variables
-from toolpath_stiff.nc.posted import check_rotary_offsets, on_the_part
 from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun, Tally
-from toolpath_stiff.nc.reader import INTERPRETERS, feed_assumption, millimetre_warning, read
-from toolpath_stiff.nc.request import ZERO, Request
+from toolpath_stiff.nc.reader import INTERPRETERS, on_the_part, program_of, read
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import WORK_OFFSETS
 from toolpath_stiff.nc.words import looks_like_cutter_location
-from toolpath_stiff.units import Pose, m_from_mm, pose_in_si
 
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
 
 
-def check_lines(
-    lines: tuple[str, ...],
-    name: str,
-    *,
-    origin: Iterable[float] | None = None,
-    default_origin: Iterable[float] = ZERO,
-    block_delete: Switches = False,
-    controller: Controller = UNKNOWN_CONTROL,
-) -> Checked:
-    """Check a program; parameters as in `read_program`. Raises `InputError` for an empty program alone.
+def check(request: Request) -> Checked:
+    """Check a program by the interpreter that is asked for.
+
+    "auto" is the built-in check where that reads the whole program, or LinuxCNC's interpreter cannot. Raises
+    `InputError` for an empty program, or where "linuxcnc" is asked for and cannot be had.
 
     Examples
     --------
-    >>> checked = check_lines(("G21 G90 F600", "G1 X10", "G41 D1", "M30"), "slot.nc")
-    >>> checked.complete
-    False
+    >>> checked = check(Request(("G21 G90 F600", "G1 X10", "G41 D1", "M30"), "slot.nc"))
+    >>> checked.complete, checked.program.interpreter
+    (False, 'builtin')
     >>> [(code.code, code.text) for code in checked.used][-2:]
     [('G41', 'cutter compensation, tool on the left'), ('M30', 'end')]
     >>> checked.findings[0].line, checked.findings[0].severity
     (3, 'error')
     """
-    if not any(line.strip() for line in lines):
-        raise ProgramError("the program is empty", expected="an NC program", file=name)
-    if looks_like_cutter_location(lines, name):
-        return _check_cutter_location(lines, name, origin or default_origin, bool(block_delete), controller)
-    given = None if origin is None else _pose(origin)
-    request = Request(
-        lines,
-        name,
-        origin=given,
-        default_origin=_pose(default_origin),
-        block_delete=block_delete,
-        controller=controller,
-    )
+    if request.interpreter not in INTERPRETERS:
+        raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
+    if not any(line.strip() for line in request.lines):
+        raise ProgramError("the program is empty", expected="an NC program", file=request.name)
+    if request.interpreter == "linuxcnc":
+        return _check_by_linuxcnc(request)
+    if looks_like_cutter_location(request.lines, request.name):
+        return _check_cutter_location(request)
+    ours = _check_built_in(request)
+    if request.interpreter == "builtin" or ours.complete or not plain(request.block_delete, request.controller):
+        return ours
+    theirs = _check_by_linuxcnc(replace(request, interpreter="linuxcnc"), may_lack=True)
+    why = next(finding for finding in ours.findings if finding.severity == ERROR)
+    if not theirs.complete:
+        refused = theirs.findings[0]
+        other = replace(refused, code="not read", text=f"nor by LinuxCNC: {refused.text}")
+        return replace(ours, findings=in_order([*ours.findings, other]))
+    text = f"the built-in interpreter says: {why.text.partition('; ')[0]}"
+    note = Finding(why.line, why.column, "interpreter", text, NOTE)
+    return replace(theirs, findings=in_order([*theirs.findings, note]))
+
+
+def _check_built_in(request: Request) -> Checked:
     run, start, errors, ending = _checked_run(request)
-    state, frames, tally, posted = run.state, run.state.frames, run.tally, request.posted
+    state, tally = run.state, run.tally
     assert tally is not None
-    moves = state.recorder.moves() if len(state.recorder) else None
-    warnings = [*ending, *state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, lines)]
-    assumptions = [*state.assumptions, *feed_assumption(controller, moves)]
-    zero = pose_in_si(frames.origin)
-    if posted is not None:
-        x, y, z = (m_from_mm(v) for v in frames.origin[:3])
-        there: Pose | None = (x, y, z, 0.0, 0.0, 0.0) if frames.source == "program" else None
-        zero = request.default_origin if request.origin is None else request.origin
-        try:
-            if moves is not None:
-                check_rotary_offsets(frames.offsets, posted, name)
-                tools = state.used_tools.values()
-                moves, more, assumed = on_the_part(moves, posted, there, tools, name, state.tip_held)
-                warnings, assumptions = [*warnings, *more], [*assumptions, *assumed]
-        except InputError as error:
-            moves, errors = None, [*errors, error]
+    program = program_of(run, request, ending)
+    try:
+        program = on_the_part(program, request, state) if len(program.moves) else program
+    except InputError as error:
+        errors = [*errors, error]
+        program = replace(program, moves=Recorder().moves(), kinematics=request.posted.label if request.posted else "")
     return Checked(
+        program=program,
+        complete=not errors,
         used=_used_codes(tally),
         unsupported=tuple(finding_of_unsupported(word) for word in state.unsupported),
-        findings=findings_of(errors, warnings, assumptions),
+        findings=findings_of(errors, program),
         start=start,
         end=modal_state(state),
-        moves=moves,
-        origin=zero,
-        complete=not errors,
-        remarks={tool.number: tool.remark for tool in state.used_tools.values()},
-        jumps=tuple(run.jumps) if posted is None else None,
     )
 
 
@@ -155,29 +141,24 @@ def _used_codes(tally: Tally) -> tuple[UsedCode, ...]:
     )
 
 
-def _check_cutter_location(
-    lines: tuple[str, ...], name: str, origin: Iterable[float], block_delete: bool, controller: Controller
-) -> Checked:
-    state = CutterLocationState(name, copy.deepcopy(controller.tools), controller.feed)
-    start, errors = cutter_location.in_force(state), cutter_location.run(state, lines, MOST_ERRORS)
-    warnings = (*cutter_location.not_for(controller, controller.offsets, block_delete), *state.warnings)
+def _check_cutter_location(request: Request) -> Checked:
+    state = CutterLocationState(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
+    start, errors = cutter_location.in_force(state), cutter_location.run(state, request.lines, MOST_ERRORS)
+    program = cutter_location.program_of(state, request)
     changes = {word: "what is not known" if noted.doubtful else NO_CHANGE for word, noted in state.noted.items()}
     return Checked(
+        program=program,
+        complete=not errors,
         used=tuple(
             UsedCode(line, 1, word, meaning_of(word), NOTE, count) for word, (line, count) in state.used_words.items()
         ),
         unsupported=tuple(
             Finding(word.line, word.column, word.word, f"{word.reason}; it would change {changes[word.word]}", NOTE)
-            for word in cutter_location.unsupported(state)
+            for word in program.unsupported
         ),
-        findings=findings_of(errors, warnings, state.assumptions),
+        findings=findings_of(errors, program),
         start=start,
         end=cutter_location.in_force(state),
-        moves=state.recorder.moves() if len(state.recorder) else None,
-        origin=_pose(origin),
-        complete=not errors,
-        dialect=CUTTER_LOCATION,
-        marks=tuple(state.marks),
     )
 
 
@@ -205,91 +186,43 @@ def modal_state(state: State) -> dict[str, str]:
     }
 
 
-def check_by(
-    interpreter: str,
-    lines: tuple[str, ...],
-    name: str,
-    *,
-    rs274: str | None = None,
-    unconfined: bool = False,
-    origin: Iterable[float] | None = None,
-    default_origin: Iterable[float] = ZERO,
-    block_delete: Switches = False,
-    controller: Controller = UNKNOWN_CONTROL,
-) -> tuple[Checked, str]:
-    """Check a program by an interpreter; parameters as in `read_program`. Returns who read it, too.
-
-    "auto" is the built-in check where that reads the whole program, or LinuxCNC's interpreter cannot. Raises
-    `InputError` for an empty program, or where "linuxcnc" is asked for and cannot be had.
-
-    Examples
-    --------
-    >>> checked, reader = check_by("builtin", ("G21 G90 F600", "G1 X10", "M30"), "slot.nc")
-    >>> checked.complete, reader, checked.end["motion"]
-    (True, 'builtin', 'G1')
-    """
-    if interpreter not in INTERPRETERS:
-        raise ProgramError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))
-    options: dict[str, Any] = {"origin": origin, "default_origin": default_origin, "block_delete": block_delete}
-    run: dict[str, Any] = {"interpreter": "linuxcnc", "rs274": rs274, "unconfined": unconfined}
-    ours = None
-    if interpreter != "linuxcnc":
-        ours = check_lines(lines, name, controller=controller, **options)
-        second = plain(block_delete, controller) and not looks_like_cutter_location(lines, name)
-        if interpreter == "builtin" or ours.complete or not second:
-            return ours, "builtin"
+def _check_by_linuxcnc(request: Request, may_lack: bool = False) -> Checked:
+    """What LinuxCNC's interpreter says, which must be there unless it `may_lack`; codes as they stand, not run."""
     try:
-        program = read(Request(lines, name, controller=controller, **run, **options))
+        program, errors = read(request), list[InputError]()
     except InputError as error:
-        if ours is not None:
-            refused = finding_of(error)
-            other = Finding(refused.line, refused.column, "not read", f"nor by LinuxCNC: {refused.text}", ERROR)
-            return replace(ours, findings=in_order([*ours.findings, other])), "builtin"
-        if error.file is None:
+        if error.file is None and not may_lack:
             raise
-        zero = _pose(default_origin if origin is None else origin)
-        return Checked(_used(lines, name), (), (finding_of(error),), {}, {}, None, zero, False), "linuxcnc"
-    return _checked(program, lines, ours), "linuxcnc"
-
-
-def _checked(program: ReadProgram, lines: tuple[str, ...], ours: Checked | None) -> Checked:
-    """What LinuxCNC's interpreter made of a program, and why the built-in one did not read it (`ours`)."""
-    findings = findings_of((), program.warnings, program.assumptions)
-    if ours is not None:
-        why = next(finding for finding in ours.findings if finding.severity == ERROR)
-        text = f"the built-in interpreter says: {why.text.partition('; ')[0]}"
-        findings = in_order([*findings, Finding(why.line, why.column, "interpreter", text, NOTE)])
+        errors = [error]
+        program = ReadProgram(
+            request.name,
+            request.path,
+            request.lines,
+            Recorder().moves(),
+            request.default_origin if request.origin is None else request.origin,
+            interpreter="linuxcnc",
+            dialect=request.controller.label,
+        )
     return Checked(
-        used=_used(lines, program.name),
+        program=program,
+        complete=not errors,
+        used=_codes_in_lines(request),
         unsupported=tuple(
             Finding(word.line, word.column, word.word, f"{word.reason}; not acted upon", NOTE)
             for word in program.unsupported
         ),
-        findings=findings,
-        start={},
-        end={},
-        moves=program.moves,
-        origin=program.origin,
-        complete=True,
-        dialect=program.dialect,
-        remarks={tool.number: tool.remark for tool in program.tools},
-        marks=program.marks,
+        findings=findings_of(errors, program),
     )
 
 
-def _pose(origin: Iterable[float]) -> Pose:
-    x, y, z, a, b, c = origin
-    return (x, y, z, a, b, c)
-
-
-def _used(lines: tuple[str, ...], name: str) -> tuple[UsedCode, ...]:
+def _codes_in_lines(request: Request) -> tuple[UsedCode, ...]:
     """G and M codes as they stand in the lines, not how often they run; computed ones are not among them."""
     tally = Tally()
     try:
-        split_lines = split(lines, name)
+        lines = split(request.lines, request.name)
     except InputError:
         return ()
-    for line in split_lines:
+    for line in lines:
         for letter, digits in CODE.findall(line.plain):
             code = code_name(letter, float(digits))
             tally.first.setdefault(code, (line.number, 0))

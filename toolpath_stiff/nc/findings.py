@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.registry import would_change
-from toolpath_stiff.nc.moves import Jump, Moves, Unsupported
-from toolpath_stiff.units import Pose
+from toolpath_stiff.nc.moves import ReadProgram, Unsupported
+from toolpath_stiff.nc.state import START
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
 NO_CHANGE = "nothing of the path"
@@ -38,14 +38,9 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class UsedCode:
+class UsedCode(Finding):
     """A G or M code of the program: where it stands first, how often, and what it is taken for."""
 
-    line: int
-    column: int
-    code: str
-    text: str
-    severity: str
     count: int
 
 
@@ -55,6 +50,10 @@ class Checked:
 
     Attributes
     ----------
+    program
+        What was read; after an error the moves of the blocks that could be read.
+    complete
+        Whether the whole program was read.
     used
         Codes in the order of their first appearance.
     unsupported
@@ -63,43 +62,24 @@ class Checked:
         In the order of lines.
     start, end
         Modal state before the first block and after the last one, names to words.
-    moves
-        In the set-up frame; after an error the moves of the blocks that could be read, None if there are none.
-    origin
-        Where program zero sits, m and rad.
-    complete
-        Whether the whole program was read.
-    dialect
-        What the file was taken for, where that is not the control's dialect.
-    remarks
-        What the tool table says of the tools that were used, by number.
-    marks, jumps
-        Where operations begin, where the run left the order of the lines; as in `ReadProgram`.
     """
 
+    program: ReadProgram
+    complete: bool
     used: tuple[UsedCode, ...]
     unsupported: tuple[Finding, ...]
     findings: tuple[Finding, ...]
-    start: dict[str, str]
-    end: dict[str, str]
-    moves: Moves | None
-    origin: Pose
-    complete: bool
-    dialect: str = ""
-    remarks: dict[int, str] = field(default_factory=dict)
-    marks: tuple[tuple[int, str], ...] | None = None
-    jumps: tuple[Jump, ...] | None = None
+    start: dict[str, str] = field(default_factory=dict)
+    end: dict[str, str] = field(default_factory=dict)
 
 
-def findings_of(
-    errors: Iterable[InputError], warnings: Iterable[str], assumptions: Iterable[str]
-) -> tuple[Finding, ...]:
+def findings_of(errors: Iterable[InputError], program: ReadProgram) -> tuple[Finding, ...]:
     """All findings about a program, in the order of lines."""
     return in_order(
         [
             *(finding_of(error) for error in errors),
-            *(Finding(line_in(text), 0, "warning", text, WARNING) for text in warnings),
-            *(Finding(0, 0, "assumption", text, NOTE) for text in assumptions),
+            *(Finding(line_in(text), 0, "warning", text, WARNING) for text in program.warnings),
+            *(Finding(0, 0, "assumption", text, NOTE) for text in program.assumptions if text != START),
         ]
     )
 

@@ -182,7 +182,7 @@ class ReadProgram:
         (line, name) where operations begin, ascending, in a language that marks them otherwise than by comment
         lines; None: the comment lines of `source` mark them.
     jumps
-        Where the run left the order of the lines, for a subprogram or back from it; None: not known.
+        Where the run left the order of the lines, for a subprogram or back from it.
     parametric
         Whether variables, expressions or loops made the moves.
 
@@ -210,7 +210,7 @@ class ReadProgram:
     dialect: str = "generic"
     kinematics: str = ""
     marks: tuple[tuple[int, str], ...] | None = None
-    jumps: tuple[Jump, ...] | None = None
+    jumps: tuple[Jump, ...] = ()
     parametric: bool = False
 
     def __repr__(self) -> str:

@@ -15,12 +15,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, IntArray
+from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.nc.moves import RAPID, Jump, Moves, ReadProgram
 
 NAMED, MARKED, TOOL = "named", "marked", "tool"
@@ -130,12 +129,6 @@ def _last_dash(frame: str) -> str:
 
 
 MOST_OPERATIONS = 1000  # beyond, comments name passes or moves, not operations: the tools are taken
-# A call, a return, a loop or a condition: M97, M98, M99 and LinuxCNC's O words (`o100 call`, `o<name> while`).
-LEAVES = re.compile(
-    r"\s*+(?:/\s*+\d?\s*+)?(?:N\s*+\d++\s*+)?(?:O\s*(?:\d+\s*[A-Z]|[<#\[])|[^O(;]*?M\s*+0*9[789](?!\d))", re.IGNORECASE
-)
-# Where a run arrives only from elsewhere: the head of a subprogram, and what follows the end of a program.
-HEAD = re.compile(r"\s*+(?:/?\s*[O:]\s*\d+\s*+(?:[(;]|$)|[^(;]*?M\s*+0*(?:2|30)(?!\d))", re.IGNORECASE)
 BARE = re.compile(r"\s*+(?:%|[O:]\s*+\d++|N\s*+\d++)?\s*+", re.IGNORECASE)
 CHANGES_TOOL = re.compile(r"M\s*0*6(?!\d)|T\s*\d", re.IGNORECASE)
 
@@ -187,44 +180,18 @@ def operations(program: ReadProgram) -> Operations:
     >>> found.of_move.tolist()
     [0, 0, 0, 1, 1, 1]
     """
-    remarks = {tool.number: tool.remark for tool in program.tools}
-    return find_operations(program.source, program.moves, program.name, remarks, program.marks, program.jumps)
-
-
-def find_operations(
-    lines: Sequence[str],
-    moves: Moves,
-    name: str,
-    remarks: dict[int, str] | None = None,
-    marks: Sequence[tuple[int, str]] | None = None,
-    jumps: Sequence[Jump] | None = None,
-) -> Operations:
-    """The operations of moves.
-
-    Parameters
-    ----------
-    lines
-        The program's text.
-    moves
-        With the lines that asked for them.
-    name
-        Of the program, for an operation that nothing else names.
-    remarks
-        What the tool table says of tools, by number.
-    marks
-        (line, name) where operations begin, ascending, on the line of their first move or before it: of a language
-        that marks them otherwise than by comment lines.
-    jumps
-        Where the run left the order of the lines; None: not known, then calls and loops are looked for in the text.
-    """
+    moves, marks = program.moves, program.marks
     cuts = np.flatnonzero(moves.motion != RAPID)
     if not len(cuts):
         return Operations((), np.zeros(len(moves), dtype=np.int64))
-    title, heads = _title_and_headings(lines) if marks is None else ("", [Heading(*mark, MARKED) for mark in marks])
-    way = _Way(lines, moves, jumps if marks is None else ())
+    title, heads = "", [Heading(*mark, MARKED) for mark in marks or ()]
+    if marks is None:
+        title, heads = _title_and_headings(program.source)
+    way = _Way(program.source, moves, program.jumps)
     begins = _beginnings(way, moves, cuts, heads, MOST_OPERATIONS) or _beginnings(way, moves, cuts, [])
     first = [begin.move for begin in begins]
-    names = [_name(begin, title, remarks or {}, alone=len(begins) == 1) or name for begin in begins]
+    remarks = {tool.number: tool.remark for tool in program.tools}
+    names = [_name(begin, title, remarks, alone=len(begins) == 1) or program.name for begin in begins]
     of_move = np.repeat(np.arange(len(first)), np.diff([*first, len(moves)]))
     low, high = np.minimum.reduceat(moves.line, first), np.maximum.reduceat(moves.line, first)
     rows = [
@@ -274,36 +241,14 @@ def _title_and_headings(lines: Sequence[str]) -> tuple[str, list[Heading]]:
 class _Way:
     """The lines that a run passes between two moves, as stretches: their first line left out, their last one in it."""
 
-    def __init__(self, lines: Sequence[str], moves: Moves, jumps: Sequence[Jump] | None) -> None:
+    def __init__(self, lines: Sequence[str], moves: Moves, jumps: Sequence[Jump]) -> None:
         self.lines, self.jumps = lines, jumps
         self.line = np.concatenate([[0], moves.line])  # that of move i is at i + 1
-        self.jump_moves = np.array([jump.moves for jump in jumps or ()], dtype=np.int64)
-        self.leaves = self._lines_of(LEAVES) if jumps is None else np.empty(0, dtype=np.int64)
-
-    def _lines_of(self, pattern: re.Pattern[str]) -> IntArray:
-        return np.array([number for number, text in enumerate(self.lines, 1) if pattern.match(text)], dtype=np.int64)
-
-    @cached_property
-    def enters(self) -> IntArray:
-        """Lines at which a run can arrive from elsewhere: calls and loops, heads and ends of programs."""
-        return np.union1d(self.leaves, self._lines_of(HEAD))
-
-    def turns(self) -> BoolArray:
-        """(n,) whether the run does not come straight on to a move from the one before."""
-        if self.jumps is not None:
-            turns = np.zeros(len(self.line) - 1, dtype=bool)
-            turns[self.jump_moves[self.jump_moves < len(turns)]] = True
-            return turns
-        return np.asarray((np.diff(self.line) < 0) | (np.diff(np.searchsorted(self.leaves, self.line)) != 0))
+        self.jump_moves = np.array([jump.moves for jump in jumps], dtype=np.int64)
 
     def passed(self, last: int, move: int) -> list[tuple[int, int]]:
         """From move `last` (-1: from the start of the file) to a later one."""
         start, end = int(self.line[last + 1]), int(self.line[move + 1])
-        if self.jumps is None:  # up to where the run leaves for a call or a loop, and from where it arrives
-            leaves = self.leaves[np.searchsorted(self.leaves, start) :][:1].tolist()
-            arrive = self.enters[: np.searchsorted(self.enters, end)][-1:].tolist()
-            stop = leaves[0] if leaves else len(self.lines) + 1
-            return [(start, end)] if start <= end <= stop else [(start, stop), (arrive[0] if arrive else 0, end)]
         first, stop = np.searchsorted(self.jump_moves, [last + 1, move + 1]).tolist()
         stretches = []
         for jump in self.jumps[first:stop]:
@@ -356,17 +301,16 @@ def _beginnings(
 
 def _headings_passed(way: _Way, heads: list[Heading]) -> dict[int, Sequence[int]]:
     """Move -> headings (rows of `heads`) passed right before it."""
+    if not heads:
+        return {}
     lines = np.array([head.line for head in heads], dtype=np.int64)
+    below = np.searchsorted(lines, way.line, side="right")
     seen: dict[int, Sequence[int]] = {}
-    below, odd = np.searchsorted(lines, way.line, side="right"), way.turns()
-    straight = np.flatnonzero(~odd & (np.diff(below) != 0))
-    for move, low, high in zip(straight.tolist(), below[straight].tolist(), below[straight + 1].tolist(), strict=True):
-        seen[move] = range(low, high)
-    for move in np.flatnonzero(odd).tolist() if heads else ():
+    for move in np.flatnonzero(np.diff(below)).tolist():
+        seen[move] = range(below[move], below[move + 1])
+    for move in np.unique(way.jump_moves[way.jump_moves < len(below) - 1]).tolist():
         spans = [np.searchsorted(lines, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
-        between = [row for low, high in spans for row in range(low, high)]
-        if between:
-            seen[move] = between
+        seen[move] = [row for low, high in spans for row in range(low, high)]
     return seen
 
 

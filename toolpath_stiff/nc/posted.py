@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, tool_poses
-from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram, ToolUse
+from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.recovery import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
@@ -47,72 +47,42 @@ def recovered(
     Raises
     ------
     InputError
-        See `on_the_part`.
-    """
-    zero = program.origin if program.origin_source == "program" else None
-    moves, warnings, assumptions = on_the_part(program.moves, kinematics, zero, program.tools, program.name, tip_held)
-    return replace(
-        program,
-        moves=moves,
-        origin=origin,
-        origin_source=source,
-        warnings=(*program.warnings, *warnings),
-        assumptions=(*program.assumptions, *assumptions),
-        kinematics=kinematics.label,
-        jumps=None,  # they count the moves of the other machine
-    )
-
-
-def on_the_part(
-    moves: Moves,
-    kinematics: PostedKinematics,
-    zero: Pose | None,
-    tools: Iterable[ToolUse],
-    name: str,
-    tip_held: Sequence[tuple[int, bool]] = (),
-) -> tuple[Moves, list[str], list[str]]:
-    """Moves of the posted machine, recovered on the part, and the warnings and assumptions that go with them.
-
-    Parameters
-    ----------
-    moves
-        Of the posted machine's axes, relative to G54's zero.
-    kinematics
-        Of the posted machine.
-    zero
-        G54's zero in the posted machine's coordinates, m; None: not known.
-    tools
-        The tools of the program, with their lengths.
-    name
-        The program's name, for messages.
-    tip_held
-        Numbers of moves before which tool centre point control was switched on or off.
-
-    Raises
-    ------
-    InputError
         The program does not suit the kinematics, points in machine coordinates need G54, or a cut goes to a point
         that is not known on the part.
     """
+    moves, name = program.moves, program.name
+    zero = program.origin if program.origin_source == "program" else None
     placed = _points_at(kinematics, zero, name)
     known, warnings, assumptions = _known_points(moves, placed, zero, name)
     kept = moves if known.all() else moves.take(known)
     held = np.full(len(moves), kinematics.tcp)
     for first, on in tip_held:
         held[first:] = on or kinematics.tcp
-    assumptions = [kinematics.assumption(switched=any(on for _, on in tip_held)), *assumptions]
     if zero is not None:
         assumptions.append(OWN_ZERO)
     far = turns_far(kept, kinematics)
     if far:
         line, letter, degrees = far[0]
-        warnings.append(
-            f"line {line}: {letter} turns by {degrees:.0f} degrees within one cut"
-            + (f", and {len(far) - 1} more cuts turn as far" if far[1:] else "")
-            + f"; if the control takes the shorter way, set rollover = true for {letter} in the controller file"
-        )
-    lengths = {tool.number: tool.length for tool in tools}
-    return recover_moves(kept, placed, lengths, name, held[known]), warnings, assumptions
+        others = f", and {len(far) - 1} more cuts turn as far" if far[1:] else ""
+        advice = f"if the control takes the shorter way, set rollover = true for {letter} in the controller file"
+        warnings.append(f"line {line}: {letter} turns by {degrees:.0f} degrees within one cut{others}; {advice}")
+    lengths = {tool.number: tool.length for tool in program.tools}
+    on_part, of_kept = recover_moves(kept, placed, lengths, name, held[known])
+    of_move = np.flatnonzero(known)[of_kept]
+    return replace(
+        program,
+        moves=on_part,
+        origin=origin,
+        origin_source=source,
+        warnings=(*program.warnings, *warnings),
+        assumptions=(
+            *program.assumptions,
+            kinematics.assumption(switched=any(on for _, on in tip_held)),
+            *assumptions,
+        ),
+        kinematics=kinematics.label,
+        jumps=tuple(jump._replace(moves=int(np.searchsorted(of_move, jump.moves))) for jump in program.jumps),
+    )
 
 
 def check_rotary_offsets(offsets: Offsets, kinematics: PostedKinematics, name: str) -> None:
@@ -191,7 +161,7 @@ def _known_points(
     shown = ", ".join(str(line) for line in lines[:MOST_LINES])
     more = f" and {len(lines) - MOST_LINES} more" if len(lines) > MOST_LINES else ""
     warning = (
-        f"line{'s' if len(lines) > 1 else ''} {shown}{more}: rapids to or from points of the machine that the program "
+        f"lines {shown}{more}: rapids to or from points of the machine that the program "
         f"was posted for (G53, G28, G30, another tool length while the tool leans) are left out of the path: {reason}"
     )
     return ~fixed, [warning], []

@@ -17,7 +17,7 @@ from toolpath_stiff.nc.languages import foreign_program, refused_program
 from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
 from toolpath_stiff.nc.linuxcnc.runner import find_rs274
-from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
+from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.parametric.statements import uses_variables
@@ -116,7 +116,7 @@ def read(request: Request) -> ReadProgram:
         raise refused
     if native:
         check_plain(request.block_delete, request.controller)
-        return _on_the_part(linuxcnc.read(request), request)
+        return on_the_part(linuxcnc.read(request), request)
     try:
         return _read_built_in(request)
     except InputError as error:
@@ -126,7 +126,7 @@ def read(request: Request) -> ReadProgram:
         if request.interpreter == "builtin" or not plain(request.block_delete, request.controller):
             raise
         _check_second(error, request)
-    return _on_the_part(linuxcnc.read(request), request)
+    return on_the_part(linuxcnc.read(request), request)
 
 
 def _check_second(error: InputError, request: Request) -> None:
@@ -159,14 +159,19 @@ def _run_built_in(
     request: Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
 ) -> ReadProgram:
     run = begin(request.start(), request.lines, request.name, request.switches)
-    state, frames, warnings = run.state, run.state.frames, run.run()
-    if not state.recorder.cuts:
+    ending = run.run()
+    if not run.state.recorder.cuts:
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
+    return on_the_part(program_of(run, request, ending), request, run.state)
+
+
+def program_of(run: ProgramRun, request: Request, ending: Sequence[str]) -> ReadProgram:
+    """What a run made of a program, with the warnings of its end; of a posted one the moves of its own machine."""
+    state, frames, warnings = run.state, run.state.frames, [*ending]
     if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
         warnings.append(ORIGIN_WINS)
     moves = state.recorder.moves()
-    warnings += [*state.warnings, *lathe_warning(state.turning, moves), *millimetre_warning(state, run.lines)]
-    program = ReadProgram(
+    return ReadProgram(
         name=request.name,
         path=request.path,
         source=request.lines,
@@ -174,31 +179,39 @@ def _run_built_in(
         origin=pose_in_si(frames.origin),
         origin_source=frames.source,
         unsupported=tuple(state.unsupported),
-        warnings=tuple(warnings),
+        warnings=(
+            *warnings,
+            *state.warnings,
+            *lathe_warning(state.turning, moves),
+            *millimetre_warning(state, run.lines),
+        ),
         assumptions=(START, *state.assumptions),
         tools=tuple(state.used_tools.values()),
         dialect=request.controller.label,
         jumps=tuple(run.jumps),
     )
-    return _on_the_part(program, request, state.tip_held, frames.offsets)
 
 
-def _with_feed(program: ReadProgram, request: Request) -> ReadProgram:
-    assumed = feed_assumption(request.controller, program.moves)
-    return replace(program, assumptions=(*program.assumptions, *assumed))
-
-
-def _on_the_part(
-    program: ReadProgram, request: Request, tip_held: Sequence[tuple[int, bool]] = (), offsets: Offsets | None = None
-) -> ReadProgram:
-    """A program with the moves of the tool on the part, if it was posted for another machine."""
+def on_the_part(program: ReadProgram, request: Request, state: State | None = None) -> ReadProgram:
+    """A program with the moves of the tool on the part, if it was posted for another machine; the state at its end."""
     program = _with_feed(program, request)
     if request.posted is None:
         return program
-    check_rotary_offsets(offsets or request.work_offsets, request.posted, program.name)
+    offsets = request.work_offsets if state is None else state.frames.offsets
+    check_rotary_offsets(offsets, request.posted, program.name)
+    tip_held = () if state is None else state.tip_held
     if request.origin is None:
         return recovered(program, request.posted, tip_held, request.default_origin, "default")
     return recovered(program, request.posted, tip_held, request.origin, "option")
+
+
+def _with_feed(program: ReadProgram, request: Request) -> ReadProgram:
+    """Noted that the first cuts have the feed that was asked for."""
+    feed, cuts = request.controller.feed, program.moves.feed[program.moves.motion != RAPID][:1]
+    if feed is None or not len(cuts) or abs(mm_per_min_from_m_per_s(float(cuts[0])) - feed) > 1e-9 * feed:
+        return program
+    assumed = f"cuts before the first feed of the program have {feed:g} mm/min, as asked for"
+    return replace(program, assumptions=(*program.assumptions, assumed))
 
 
 _LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)
@@ -219,13 +232,3 @@ def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
     if whole is None or not any("." in word for word in words) or any(word[-1] == "." for word in words):
         return []
     return [f"{whole} stands beside numbers with decimals, and none ends with its point: {hint}"]
-
-
-def feed_assumption(controller: Controller, moves: Moves | None) -> list[str]:
-    """That the first cuts have the feed that was asked for."""
-    if controller.feed is None or moves is None:
-        return []
-    cuts = moves.feed[moves.motion != RAPID][:1]
-    if not len(cuts) or abs(mm_per_min_from_m_per_s(float(cuts[0])) - controller.feed) > 1e-9 * controller.feed:
-        return []
-    return [f"cuts before the first feed of the program have {controller.feed:g} mm/min, as asked for"]

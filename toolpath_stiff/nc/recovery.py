@@ -40,7 +40,7 @@ def recover_moves(
     tool_lengths: Mapping[int, float],
     name: str = "program",
     tip_held: BoolArray | bool = False,
-) -> Moves:
+) -> tuple[Moves, IntArray]:
     """Moves of the tool on the part, from those of the machine that the program was posted for.
 
     Parameters
@@ -62,7 +62,8 @@ def recover_moves(
     where rotary axes turn, so that straight pieces (arcs under tool centre point control: arcs) stay within
     `kinematics.tolerance` of the true curve and no piece turns by more than a degree; each keeps its move's line, and
     their times add up to the move's. Arcs with standing rotary axes are turned as a whole. What moves neither tip nor
-    tool axis has no row; its time is added to the dwell before it. `from_machine` is False throughout.
+    tool axis has no row; its time is added to the dwell before it. `from_machine` is False throughout. Of each row the
+    move that it is a part of.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def recover_moves(
         A letter that the kinematics does not have turns; a head's tool has no length; too many pieces.
     """
     if not len(moves):
-        return moves
+        return moves, np.zeros(0, dtype=np.int64)
     _check_letters(moves, kinematics, name)
     moves = _shorter_way(moves, kinematics)
     held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(moves),))
@@ -78,6 +79,7 @@ def recover_moves(
     some = [slice(first, first + MOVES_AT_A_TIME) for first in range(0, len(moves), MOVES_AT_A_TIME)]
     count = np.concatenate([_pieces(moves.take(rows), kinematics, held[rows], length[rows]) for rows in some])
     _check_pieces(count, moves, kinematics, name)
+    lines, moves = moves.line, replace(moves, line=np.arange(len(moves)))
     recovered, filled = _room(moves, int(count.sum())), 0
     before: FloatArray | None = None
     for rows in some:
@@ -87,7 +89,8 @@ def recover_moves(
         for column in fields(Moves):
             getattr(recovered, column.name)[filled : filled + len(part)] = getattr(part, column.name)
         filled += len(part)
-    return recovered.take(slice(0, filled))
+    recovered = recovered.take(slice(0, filled))
+    return replace(recovered, line=lines[recovered.line]), recovered.line
 
 
 def _check_pieces(count: IntArray, moves: Moves, kinematics: PostedKinematics, name: str) -> None:

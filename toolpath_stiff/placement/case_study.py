@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis import Analysis, analyze
+from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import ProgramError, TableError, UnreachableError

@@ -237,7 +237,7 @@ class Placement(FolderResult):
                 "offset_blocks": {name: getattr(offsets, name) or None for name in OFFSETS},
                 "written": self.written,
                 "search": self.search,
-                "assumptions": self.best.assumptions,
+                "assumptions": self.best.to_dict()["assumptions"],
             }
         )
         return document

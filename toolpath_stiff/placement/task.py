@@ -13,7 +13,7 @@ from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.paths import Read
-from toolpath_stiff.rewriting.program import check_decimals, check_rewritable
+from toolpath_stiff.rewriting.program import check_rewritable
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import Pose, mm_from_m
 
@@ -91,7 +91,6 @@ class PlacementTask:
         """Raise `InputError` for what can be told before a search."""
         if self.rewriting is None:
             return
-        check_decimals(self.rewriting.decimals)
         check_rewritable(self.program)
         if self.program.interpreter != "builtin":
             raise InputError(

@@ -115,7 +115,6 @@ class Campaign:
 def first_campaign(
     machine: Hexapod,
     n: int = 24,
-    *,
     menu: Menu | None = None,
     seed: int = 0,
     effects: Mapping[str, Effect] | None = None,

@@ -11,7 +11,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.noise import JOINT_ERROR
 from toolpath_stiff.inference.prediction import JOINT_STEP, Predictor
@@ -95,10 +94,6 @@ def forecast_all(
     The last is (m, k), a factor of the covariance that the struts' spread (relative sd) and the joints' errors (m, sd
     of each coordinate) cause.
 
-    Raises
-    ------
-    InputError
-        A rival's covariance does not fit its parameters; the machine is wrong.
     """
     predictor = Predictor(machine, readings, effect_files)
     forecasts = [_forecast(rival, predictor) for rival in rivals]
@@ -152,20 +147,14 @@ def _forecast(rival: Rival, predictor: Predictor) -> Forecast:
     mean = _answers(predictor, law, rival.effects)
     if rival.covariance is None:
         return Forecast(rival.name, rival.weight, mean, np.zeros((len(mean), 0)))
-    components = rival.components
     covariance = np.asarray(rival.covariance, dtype=float)
-    if covariance.shape != (2 + len(components),) * 2:
-        raise InputError(
-            f"rival {rival.name}: a covariance of shape {covariance.shape}",
-            expected=f"{2 + len(components)} rows and columns: the strut law's two and the free parameters",
-        )
     columns = []
     for k in range(2):
         moved = law.copy()
         moved[k] += LAW_STEP
         columns.append((_answers(predictor, moved, rival.effects) - mean) / LAW_STEP)
     deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
-    for (k, component), sd in zip(components, deviations, strict=True):
+    for (k, component), sd in zip(rival.components, deviations, strict=True):
         columns.append(_slope(rival, k, component, float(sd), predictor, law, mean))
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
     factor = np.stack(columns, axis=1) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
@@ -205,11 +194,6 @@ def _answers(predictor: Predictor, law: FloatArray, effects: Sequence[ActiveEffe
     logs = predictor.log_stiffness(law, effects)
     if not np.isnan(logs).all() or len(logs) <= 1:
         return logs
-    half = len(logs) // 2
-    parts = (np.arange(half), np.arange(half, len(logs)))
-    return np.concatenate(
-        [
-            _answers(Predictor(predictor.machine, predictor.data.select(part), predictor.effect_files), law, effects)
-            for part in parts
-        ]
-    )
+    parts = (predictor.data.select(rows) for rows in np.array_split(np.arange(len(logs)), 2))
+    halves = (Predictor(predictor.machine, part, predictor.effect_files) for part in parts)
+    return np.concatenate([_answers(half, law, effects) for half in halves])

@@ -112,8 +112,9 @@ class Menu:
             raise InputError(f"a plan with loads of {loads or 'no'} N", expected=f"{LOADS[0]:g} to {LOADS[1]:g} N")
 
     def with_options(self, **changes: Any) -> Menu:
-        """The menu with those options that are not None. Who names the heights knows how low a set-up may be used."""
-        given: dict[str, Any] = {n: tuple(v) if isinstance(v, list) else v for n, v in changes.items() if v is not None}
+        """The menu with those options that are given. Who names the heights knows how low a set-up may be used."""
+        lists: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in changes.items()}
+        given: dict[str, Any] = {name: value for name, value in lists.items() if value is not None and value != ()}
         return replace(self, **given | ({"floors": {}} if "heights" in given else {}))
 
     @classmethod

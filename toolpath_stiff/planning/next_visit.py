@@ -22,7 +22,7 @@ from toolpath_stiff.files import write_atomically
 from toolpath_stiff.planning.choice import choose, why_of
 from toolpath_stiff.planning.forecasts import Forecast, principal
 from toolpath_stiff.planning.gaps import pair_shares
-from toolpath_stiff.planning.outlook import SETTLED
+from toolpath_stiff.planning.outlook import SETTLED, percent
 from toolpath_stiff.planning.rows import POSE, PlanRow, plan_csv, plan_rows
 from toolpath_stiff.planning.tables import Tables
 from toolpath_stiff.planning.visits import Visits
@@ -105,7 +105,7 @@ class NextVisit(Result):
     @property
     def sentences(self) -> list[str]:
         """Sentences on where the plan stands, and what is next."""
-        chances = ", ".join(f"{name} {_percent(weight)}" for name, weight in self.weights.items())
+        chances = ", ".join(f"{name} {percent(weight)}" for name, weight in self.weights.items())
         lines = [f"after {len(self.taken.rows)} readings of this plan: {chances}"]
         if self.unlike:
             return [*lines, "too many readings are far off under each of these: ask tps diagnose what else it could be"]
@@ -151,13 +151,6 @@ class NextVisit(Result):
     def _short(self) -> str:
         count = len(self.taken.rows)
         return f"{count} reading{'' if count == 1 else 's'}, {'settled' if self.settled else 'open'}"
-
-
-def _percent(share: float) -> str:
-    """Never "100 %" or "0 %"."""
-    if share > 0.99:
-        return "more than 99 %"
-    return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
 
 
 def next_visit(

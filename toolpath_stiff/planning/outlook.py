@@ -16,6 +16,13 @@ SETTLED = 0.95  # probability of one rival at which visits are enough: on the sa
 DRAWS = 400  # simulated results a rival
 
 
+def percent(share: float) -> str:
+    """Never "100 %" or "0 %" for what is only expected."""
+    if share > 0.99:
+        return "more than 99 %"
+    return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
+
+
 @dataclass(frozen=True)
 class Expectation:
     """Expected outcome of readings.

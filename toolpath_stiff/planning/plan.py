@@ -17,12 +17,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.defaults import STRUT_SPREAD
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.noise import LEAST
@@ -32,7 +32,7 @@ from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all
 from toolpath_stiff.planning.gaps import GapShares, ReadingNoise, pair_shares, repeat_and_clamping
 from toolpath_stiff.planning.indicators import loops_between, with_indicators
 from toolpath_stiff.planning.menu import Menu
-from toolpath_stiff.planning.outlook import SETTLED, Expectation, expected_outcome
+from toolpath_stiff.planning.outlook import SETTLED, Expectation, expected_outcome, percent
 from toolpath_stiff.planning.visits import Matters, Visits, possible_visits
 
 MOST_RIVALS = 6  # a plan that separates more would separate none well
@@ -176,15 +176,9 @@ class RivalPlan:
     @cached_property
     def repeats(self) -> int | None:
         """The repeats of each visit, clamped anew, that this takes; None: not even `MOST_REPEATS` do."""
-
-        def settles(repeats: int) -> bool:
-            return self.expected(repeats=repeats).truth >= SETTLED
-
-        if self.after.truth >= SETTLED:
-            return 1
-        if not settles(MOST_REPEATS):
-            return None
-        return bisect_left(range(MOST_REPEATS + 1), True, lo=1, hi=MOST_REPEATS, key=settles)
+        chance = range(MOST_REPEATS + 2)
+        fewest = bisect_left(chance, SETTLED, lo=1, hi=MOST_REPEATS + 1, key=lambda n: self.expected(repeats=n).truth)
+        return None if fewest > MOST_REPEATS else fewest
 
     @property
     def gains(self) -> bool:
@@ -194,32 +188,26 @@ class RivalPlan:
 
     @property
     def _rise(self) -> str:
-        """Never "100 %" for what is only expected."""
-        before, after = (_percent(expected.truth) for expected in (self.before, self.after))
-        return f"from {before} to {after}"
+        return f"from {percent(self.before.truth)} to {percent(self.after.truth)}"
 
     @property
     def _work(self) -> str:
-        count = len(self.chosen)
-        return f"{count} pose{'s' if count > 1 else ''}, about {self.minutes:.0f} minutes"
+        return f"{len(self.chosen)} poses, about {self.minutes:.0f} minutes"
 
     @property
     def sentences(self) -> list[str]:
         """The promises of the plan."""
-        lines = [
+        rises = (
             f"{self._work}: the probability of the right explanation is expected to rise {self._rise}, "
-            f"and the verdict to be settled in {_percent(self.after.settled)} of cases"
-        ]
-        if not self.gains:
-            lines = [self.nothing_gained]
-        elif self.enough is not None and self.enough < len(self.chosen):
-            lines.append(f"{self.enough} of the poses should do for {100 * SETTLED:.0f} %; the others are in reserve")
-        elif self.repeats is None:
-            lines.append(
-                f"{100 * SETTLED:.0f} % is not expected from repeats of these poses, up to {MOST_REPEATS} of them"
-            )
-        elif self.repeats > 1:
-            lines.append(f"{100 * SETTLED:.0f} % is expected after {self.repeats} repeats of each, clamped anew")
+            f"and the verdict to be settled in {percent(self.after.settled)} of cases"
+        )
+        lines, sure = [rises if self.gains else self.nothing_gained], f"{100 * SETTLED:.0f} %"
+        if self.gains and self.enough is not None and self.enough < len(self.chosen):
+            lines.append(f"{self.enough} of the poses should do for {sure}; the others are in reserve")
+        elif self.gains and self.repeats is None:
+            lines.append(f"{sure} is not expected from repeats of these poses, up to {MOST_REPEATS} of them")
+        elif self.gains and self.repeats != 1:
+            lines.append(f"{sure} is expected after {self.repeats} repeats of each, clamped anew")
         for pair in self.pairs:
             if not pair.separable:
                 places = "; or ".join(f"{link}: {place}" for link, place in pair.indicator_across.items())
@@ -245,7 +233,7 @@ class RivalPlan:
         parts += dict.fromkeys(place.removeprefix("none: ") for place in places if place.startswith("none: "))
         return f"{'; '.join(parts)}. {self._work}, would bring the probability of the right explanation {self._rise}"
 
-    def head(self) -> dict[str, Any]:
+    def head(self) -> Document:
         """The first entries of plan.json."""
         return {
             "kind": "rivals",
@@ -336,20 +324,13 @@ def plan_measurements(
 
 def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
     """The most probable ones, weights adding up to 1, and what was left out."""
-    if len({rival.name for rival in rivals}) < max(len(rivals), 2):
-        raise InputError(
-            f"{len(rivals)} rivals to tell apart: {', '.join(rival.name for rival in rivals) or 'none'}",
-            expected="two or more, of different names",
-        )
+    if len(rivals) < 2:
+        raise InputError(f"{len(rivals)} rivals to tell apart", expected="two or more")
     order = sorted(rivals, key=lambda rival: -rival.weight)
     notes = []
-    if len(order) > MOST_RIVALS:
-        out = ", ".join(rival.name for rival in order[MOST_RIVALS:])
-        notes.append(f"the plan is for the {MOST_RIVALS} most probable rivals, not for {out}")
-        order = order[:MOST_RIVALS]
+    if out := ", ".join(rival.name for rival in order[MOST_RIVALS:]):
+        notes, order = [f"the plan is for the {MOST_RIVALS} most probable rivals, not for {out}"], order[:MOST_RIVALS]
     total = sum(rival.weight for rival in order)
-    if not (min(rival.weight for rival in order) > 0.0 and np.isfinite(total)):
-        raise InputError("rivals with a weight that is not above 0", expected="probabilities")
     return tuple(replace(rival, weight=rival.weight / total) for rival in order), notes
 
 
@@ -361,8 +342,3 @@ def matters(rivals: Sequence[Rival]) -> Matters:
     chosen = {str(active.values[p.name]) for active in actives for p in active.effect.parameters if p.kind == "text"}
     loaded = any(active.effect.load_dependent for rival in rivals for active in rival.effects)
     return Matters(load=loaded or "force_N" in needs, setup="setup" in needs or bool(chosen), time="time_min" in needs)
-
-
-def _percent(share: float) -> str:
-    """Never "100 %" for what is only expected."""
-    return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.documents import to_dict
+from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.judgement import Judgement, judge
@@ -67,17 +67,7 @@ class Plan(FolderResult):
         return plan_rows(self.choice.visits, self.choice.chosen, () if self.data is None else self.data.point.tolist())
 
     @property
-    def sentences(self) -> list[str]:
-        """The promises of the plan."""
-        return self.choice.sentences
-
-    @property
-    def notes(self) -> list[str]:
-        """Assumptions, and what was left out."""
-        return list(self.choice.notes)
-
-    @property
-    def visits(self) -> list[dict[str, Any]]:
+    def visits(self) -> list[Document]:
         """One entry a clamping: where, how, what is read, why."""
         choice = self.choice
         return visit_entries(choice.visits, choice.chosen, self.rows, choice.kinds, choice.why)
@@ -88,8 +78,8 @@ class Plan(FolderResult):
             to_dict(
                 {
                     **self.choice.head(),
-                    "text": self.sentences,
-                    "notes": self.notes,
+                    "text": self.choice.sentences,
+                    "notes": self.choice.notes,
                     "visits": self.visits,
                     "machine": self.machine.name,
                     "data": self.names,
@@ -113,8 +103,8 @@ class Plan(FolderResult):
         return figure
 
     def _short(self) -> str:
-        kind, count = "rivals" if isinstance(self.choice, RivalPlan) else "campaign", len(self.choice.chosen)
-        return f"{kind}, {count} clamping{'' if count == 1 else 's'}"
+        kind = "rivals" if isinstance(self.choice, RivalPlan) else "campaign"
+        return f"{kind}, {len(self.choice.chosen)} clampings"
 
 
 def plan(
@@ -163,9 +153,7 @@ def plan(
     planned_for: float | tuple[float, float] = CAMPAIGN_NOISE if noise is None else noise
     if data is None and not between:
         poses = CAMPAIGN_POSES if n is None else n
-        campaign = first_campaign(
-            machine, poses, menu=menu, seed=seed, effects=effects, noise=planned_for, effect_files=effect_files
-        )
+        campaign = first_campaign(machine, poses, menu, seed, effects, planned_for, effect_files)
         return Plan(machine, data, campaign, tuple(effect_files), seed)
     verdict, errors = "", dict[str, float]()
     if data is None:
@@ -173,19 +161,21 @@ def plan(
         notes = ["no data: the rivals are taken at their usual sizes"]
         notes += [] if noise is not None else [f"noise of a reading: {100 * CAMPAIGN_NOISE:g} % assumed"]
     else:
-        if judgement is not None:
-            scatter, problem = judgement.noise, judgement.problem
-        else:
-            # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
-            scatter = noise_models(data, noise, strut_spread)[-1]
-            problem = Problem.of(Predictor(machine, data, effect_files), scatter)
+        # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
+        scatter = judgement.noise if judgement else noise_models(data, noise, strut_spread)[-1]
+        problem = judgement.problem if judgement else Problem.of(Predictor(machine, data, effect_files), scatter)
         notes = [*filter(None, [question(problem.predictor)]), f"noise: {scatter.origin}"]
         if between:
             rivals = fitted_rivals(problem, between, effects)
         else:
             judgement = judgement or judge(problem, scatter, testable_effects(problem.predictor)[0], seed)
             rivals, verdict = rivals_of(judgement), judgement.verdict
-            notes += _answered(verdict)
+            if verdict == "described":
+                notes.append("the answer is only described: the plan goes where it would show, or fail")
+            elif verdict != "ambiguous":
+                notes.append(
+                    f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next"
+                )
         planned_for, errors = (scatter.typical_repeat, scatter.clamping), errors_so_far(problem, rivals)
     choice = plan_measurements(
         machine, rivals, planned_for, PLAN_POSES if n is None else n, menu=menu, seed=seed,
@@ -198,12 +188,3 @@ def plan(
 def usual_menu(data: Readings | None) -> Menu:
     """The menu unless anyone says otherwise: what the data have, before any a bare table and a riser."""
     return Menu(setups=(TABLE, RISER)) if data is None else Menu.of(data)
-
-
-def _answered(verdict: str) -> list[str]:
-    """The purpose of a plan where the diagnosis has an answer."""
-    if verdict == "described":
-        return ["the answer is only described: the plan goes where it would show, or fail"]
-    if verdict == "ambiguous":
-        return []
-    return [f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next"]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import count
-from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.documents import Document
 from toolpath_stiff.planning.visits import AXES, VECTORS, Visits
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m
 
@@ -72,22 +72,23 @@ def _round(value: float) -> float:
 
 def visit_entries(
     visits: Visits, chosen: Sequence[int], rows: Sequence[PlanRow], kinds: Sequence[str], why: Sequence[str]
-) -> list[dict[str, Any]]:
+) -> list[Document]:
     """One entry a clamping: where, how, what is read, why."""
-    first = {row["clamp"]: row for row in reversed(rows)}
-    entries = []
+    first, entries = {row["clamp"]: row for row in reversed(rows)}, list[Document]()
     for clamp, (visit, kind, reason) in enumerate(zip(chosen, kinds, why, strict=True), 1):
         taken = visits.rows(visit)
-        entry: dict[str, Any] = {key: first[clamp][key] for key in ("clamp", "point", *POSE, "tool_extension_mm")}
-        entry |= {
-            "setup": str(visits.setup[visit]),
-            "forces_N": sorted(set(map(_round, visits.readings.force[taken]))),
-            "directions": list(dict.fromkeys(visits.names[taken].tolist())),
-            "loops": [loop for loop in dict.fromkeys(visits.readings.loop[taken].tolist()) if loop],
-            "kind": kind,
-            "why": reason,
-        }
-        entries.append(entry)
+        loops = dict.fromkeys(visits.readings.loop[taken].tolist())
+        entries.append(
+            {key: first[clamp][key] for key in ("clamp", "point", *POSE, "tool_extension_mm")}
+            | {
+                "setup": str(visits.setup[visit]),
+                "forces_N": sorted(set(map(_round, visits.readings.force[taken]))),
+                "directions": list(dict.fromkeys(visits.names[taken].tolist())),
+                "loops": [loop for loop in loops if loop],
+                "kind": kind,
+                "why": reason,
+            }
+        )
     return entries
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
-from toolpath_stiff.errors import FileError, InputError
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.planning.forecasts import Forecast
 from toolpath_stiff.planning.gaps import ReadingNoise
 from toolpath_stiff.planning.menu import Costs, Menu
@@ -25,13 +25,10 @@ from toolpath_stiff.planning.plan import RivalPlan
 from toolpath_stiff.planning.visits import Visits, planned_readings
 
 TABLES = "plan_tables.npz"  # in the plan's folder
-VERSION = 1
 OF_VISITS = ("pose", "extension", "wait", "setup", "label", "names", "rounds", "members", "starts", "loop")
 # Digits of the largest value that are kept: coarse enough that the differences of processors, some 1e-12 in 1e5 values,
 # hardly ever turn one; 0.02 % of a standard deviation, 1e-5 of a stiffness.
 DIGITS_OF_FACTOR, DIGITS_OF_MEAN = 4, 7
-
-
 INDEPENDENT = 1e-4  # of the largest row, by which a row has a direction of its own
 
 
@@ -77,7 +74,6 @@ def tables_of(plan: RivalPlan) -> bytes:
         arrays[f"mean_{k}"] = _certain(forecast.mean, DIGITS_OF_MEAN)
         arrays[f"factor_{k}"] = _certain(_canonical(forecast.factor), DIGITS_OF_FACTOR)
     heading = {
-        "version": VERSION,
         "rivals": [[forecast.name, forecast.weight] for forecast in plan.forecasts],
         "noise": [plan.scatter.repeat, plan.scatter.clamping],
         "costs": vars(menu.costs),
@@ -103,23 +99,15 @@ class Tables:
 
     @classmethod
     def read(cls, folder: str | Path) -> Tables:
-        """The tables in a plan's folder. Raises `InputError` where it holds none, or those of another version."""
+        """The tables in a plan's folder. Raises `InputError` where it holds none."""
         path = Path(folder) / TABLES
         try:
-            with np.load(io.BytesIO(read_bytes(path, "the plan's tables")), allow_pickle=False) as file:
+            with np.load(path, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
-            heading = json.loads(arrays.pop("said").tobytes())
-            if heading["version"] != VERSION:
-                raise ValueError
-            return cls._of(arrays, heading)
-        except FileError as error:
-            raise InputError(
-                error.found, expected="the folder of a plan between rivals", hint="make one with tps plan"
-            ) from None
-        except (ValueError, KeyError, OSError, EOFError):
-            raise InputError(
-                f"{path} is no table of a plan", expected="what tps plan of this version wrote", hint="plan again"
-            ) from None
+            return cls._of(arrays, json.loads(arrays.pop("said").tobytes()))
+        except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile):
+            expected = "what tps plan wrote for a plan between rivals"
+            raise InputError(f"{path} is no table of a plan", expected=expected, hint="plan again") from None
 
     @classmethod
     def _of(cls, arrays: Mapping[str, AnyArray], heading: Mapping[str, Any]) -> Tables:

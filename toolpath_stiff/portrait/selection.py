@@ -18,7 +18,8 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Precision, inverse_root
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem, law_prior
 from toolpath_stiff.inference.gates import set_wild_aside, simulate
-from toolpath_stiff.inference.noise import Noise, Scatter, scaled_inverse
+from toolpath_stiff.inference.least_squares import scaled_inverse
+from toolpath_stiff.inference.noise import Noise, Scatter
 from toolpath_stiff.portrait.columns import Ground, shapes_near
 from toolpath_stiff.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of, products
 from toolpath_stiff.stiffness.terms import Factor, Term

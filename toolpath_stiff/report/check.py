@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from toolpath_stiff.analysis.program_check import ProgramCheck
+from toolpath_stiff.analysis.program_check import Figures, OperationRow, ProgramCheck, ToolRow
 from toolpath_stiff.report.words import aligned, duration, first_column_fitted, plain
 from toolpath_stiff.units import number
 
@@ -14,16 +13,16 @@ MOST_ROWS = 40  # all are in --json
 CHECK_FIGURES = ("cutting mm", "time", "X", "Y", "Z")
 
 
-def check_tables(tools: Sequence[Mapping[str, Any]], operations: Sequence[Mapping[str, Any]]) -> list[str]:
+def check_tables(tools: Sequence[ToolRow], operations: Sequence[OperationRow]) -> list[str]:
     """One row a tool that cuts, one row an operation, with the extents of the cuts; no table of a single row."""
     shown = operations[:MOST_ROWS]
     digits = len(str(len(shown)))
-    by_tool = [[f"{_tool(row)} {plain(row['remark'])}".rstrip(), *_figures(row)] for row in tools if row["extents_mm"]]
+    by_tool = [[f"{_tool(row.tool)} {plain(row.remark)}".rstrip(), *_figures(row)] for row in tools if row.extents_mm]
     by_operation = [
         [
-            f"{row['operation']:>{digits}} {plain(row['name'])}",
-            _tool(row),
-            f"{row['first_line']}-{row['last_line']}",
+            f"{row.operation:>{digits}} {plain(row.name)}",
+            _tool(row.tool),
+            f"{row.first_line}-{row.last_line}",
             *_figures(row),
         ]
         for row in shown
@@ -37,57 +36,54 @@ def check_tables(tools: Sequence[Mapping[str, Any]], operations: Sequence[Mappin
     return tables
 
 
-def _tool(row: Mapping[str, Any]) -> str:
-    return f"T{row['tool']}" if row["tool"] else "-"
+def _tool(number: int) -> str:
+    return f"T{number}" if number else "-"
 
 
-def _figures(row: Mapping[str, Any]) -> list[str]:
-    extents = (row["extents_mm"].get(axis) for axis in "xyz")
+def _figures(row: Figures) -> list[str]:
+    extents = (row.extents_mm.get(axis) for axis in "xyz")
     return [
-        number(row["lengths_mm"]["cutting"], 1),
-        duration(row["times_s"]["total"]),
+        number(row.lengths_mm["cutting"], 1),
+        duration(row.times_s["total"]),
         *("-" if ends is None else f"{number(ends[0], 1)}..{number(ends[1], 1)}" for ends in extents),
     ]
 
 
 def text(check: ProgramCheck) -> str:
     """The document of `--json`, for people."""
-    document = check.to_dict()
-    posted = f", posted for {document['kinematics']}" if document["kinematics"] else ""
-    lines = [f"{document['program']}, read as {document['dialect']}{posted}"]
-    if document["interpreter"] != "builtin":
+    posted = f", posted for {check.kinematics}" if check.kinematics else ""
+    lines = [f"{check.program}, read as {check.dialect}{posted}"]
+    if check.interpreter != "builtin":
         lines.append("read by LinuxCNC's interpreter: codes are counted where they stand, modal states are not known")
-    if not document["complete"]:
+    if not check.complete:
         lines.append("NOT READ TO ITS END AS IT STANDS: figures are those of the blocks that could be read")
     findings = []
-    for finding in document["findings"]:
-        place = f"{finding['line']}:{finding['column']}" if finding["column"] else f"{finding['line'] or '-'}"
-        findings.append(f"{finding['severity']:<7} {place:>9}  {finding['text']}")
+    for finding in check.findings:
+        place = f"{finding.line}:{finding.column}" if finding.column else f"{finding.line or '-'}"
+        findings.append(f"{finding.severity:<7} {place:>9}  {finding.text}")
     extents = [
         f"{axis.upper()}  {low:10.3f} to {high:10.3f} {unit}"
-        for unit in ("mm", "deg")
-        for axis, (low, high) in document[f"extents_{unit}"].items()
+        for unit, ends in (("mm", check.whole.extents_mm), ("deg", check.whole.extents_deg))
+        for axis, (low, high) in ends.items()
     ]
-    times, speed = document["times_s"], document["fastest_strut"]
-    lengths = [f"{key:<8} {length:12.1f} mm {times[key]:10.1f} s" for key, length in document["lengths_mm"].items()]
-    if "dwell" in times:
-        lengths.append(f"dwell    {'':12}    {times['dwell']:10.1f} s")
+    times, speed = check.whole.times_s, check.fastest_strut
+    lengths = [f"{key:<8} {length:12.1f} mm {times[key]:10.1f} s" for key, length in check.whole.lengths_mm.items()]
+    lengths.append(f"dwell    {'':12}    {times['dwell']:10.1f} s")
     if speed:
         lengths.append(f"fastest strut in a cut: {speed['mm_per_min']:.0f} mm/min, line {speed['line']}")
-    ignored = [f"{word['code']:<7} {word['line']}:{word['column']}  {word['text']}" for word in document["unsupported"]]
-    ends = document["modal_end"]
+    ignored = [f"{word.code:<7} {word.line}:{word.column}  {word.text}" for word in check.unsupported]
     by_part = "extents of cuts in mm, by tool and operation"
     sections = {
         "findings": findings or ["none"],
         "not acted upon": ignored or ["nothing"],
         "codes used (times, first line)": [
-            f"{code['code']:<6} {code['count']:>7}  {code['line']:>7}  {code['text']}" for code in document["used"]
+            f"{code.code:<6} {code.count:>7}  {code.line:>7}  {code.text}" for code in check.used
         ],
         "extents of cuts": extents,
         "lengths and times": lengths,
-        by_part: check_tables(document["tools"], document["operations"]),
+        by_part: check_tables(check.tools, check.operations),
         "modal state at the start, at the end": [
-            f"{key:<18} {value:<10} {ends[key]}" for key, value in document["modal_start"].items()
+            f"{key:<18} {value:<10} {check.modal_end[key]}" for key, value in check.modal_start.items()
         ],
     }
     for title, rows in sections.items():

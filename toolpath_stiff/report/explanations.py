@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from toolpath_stiff.diagnosis.beside import beside_text
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.rows import SHOWN, FittedSize, HypothesisRow, percent_of
-from toolpath_stiff.diagnosis.words import assumptions, next_steps, verdict_text, why
+from toolpath_stiff.diagnosis.words import assumptions, beside_text, next_steps, verdict_text, why
 from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import parted
 from toolpath_stiff.inference.detectable import Detectable

@@ -196,7 +196,7 @@ def files(plan: Plan, *, plots: bool = True) -> dict[str, Content]:
 
 def text(plan: Plan) -> str:
     """The visits in measuring order, then what is to be expected; that before them where it is nothing."""
-    promise, between = plan.sentences, isinstance(plan.choice, RivalPlan)
+    promise, between = plan.choice.sentences, isinstance(plan.choice, RivalPlan)
     lines = [promise.pop(0), ""] if isinstance(plan.choice, RivalPlan) and not plan.choice.gains else []
     lines += [
         f"{'':>4} {'x':>7} {'y':>7} {'z':>7} mm {'a':>6} {'b':>6} deg {'tool':>5} mm  load N     set-up, directions"
@@ -211,4 +211,4 @@ def text(plan: Plan) -> str:
         )
         if between:
             lines.append(f"{'':>5}{visit['why']}")
-    return "\n".join([*lines, "", *promise, *(f"note: {note}" for note in plan.notes)])
+    return "\n".join([*lines, "", *promise, *(f"note: {note}" for note in plan.choice.notes)])

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.path import Path
 
-    from toolpath_stiff.analysis import Analysis
+    from toolpath_stiff.analysis.results import Analysis
 
 
 WIDTH, HEIGHT = 14.0, 6.2  # inches

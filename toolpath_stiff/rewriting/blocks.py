@@ -14,16 +14,12 @@ from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import Flow
-from toolpath_stiff.nc.words import AXES, POLAR, Block, read_block
+from toolpath_stiff.nc.words import AXES, CORNERS, POLAR, Block
 from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
 from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, points_between
 
-HALF_CIRCLE = 0.999  # chord over diameter, from which R magnifies a rounded end more than twenty times
-NEAR = 2.0  # units by which the centre of an arc given by R may miss its place; beyond, I, J, K are written
 Piece = tuple[str, list[float], float]  # G0 or G1, end in the set-up frame, dwell after it in s
 SLASH = re.compile(r"\s*/\d*")
-SUBPROGRAM = "a subprogram (M98, M99) cannot be rewritten: it may run at several places"
-COMPENSATION = "cutter compensation (G41, G42) cannot be rewritten"
 LINEARISE = (
     f"give {both_names('--linearise', 'MM')} to have straight moves within MM of it, "
     "or place the work without that turn"
@@ -39,14 +35,19 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     controls.trace.clear()
     first, first_out = len(source.recorder.line), len(out.recorder.line)
     controls.current = current = begin(source, block)
-    if current.flow is not Flow.NEXT:
-        raise controls.refusal(SUBPROGRAM, "expand the subprograms first")
-    if "M modal state" in current.groups:
-        raise controls.refusal("saved modes (M70 to M73) cannot be rewritten", "write the modes out")
-    if {source.motion, current.groups.get("motion")} & {"G33", "G33.1"}:
-        raise controls.refusal("spindle-synchronised motion (G33) cannot be rewritten", "leave it out")
-    if source.cutter is not None:
-        raise controls.refusal(COMPENSATION, "post the program with the path of the tool centre")
+    letters = {word.letter for word in block.words}
+    refused = {
+        "a subprogram (M98, M99), which may run at several places,": current.flow is not Flow.NEXT,
+        "saved modes (M70 to M73)": "M modal state" in current.groups,
+        "spindle-synchronised motion (G33)": bool({source.motion, current.groups.get("motion")} & {"G33", "G33.1"}),
+        "cutter compensation (G41, G42)": source.cutter is not None,
+        "polar words (G16, @, ^)": source.polar is not None or bool(letters & set(POLAR)),
+        "a corner with the next block (,R ,C)": bool(letters & set(CORNERS)),
+        "a block with a slash in its middle": block.rest is not None,
+    }
+    for what, holds in refused.items():
+        if holds:
+            raise controls.refusal(f"{what} cannot be rewritten", "post the moves of the tool centre, one a block")
     controls.axes = [letter for letter in AXES if current.has(letter)]
     plane_before = out.plane
     begin(out, block)
@@ -64,20 +65,13 @@ def _lines(controls: Controls, once: str | None, plane: str, first: int) -> tupl
     if not controls.trace:
         return [controls.emit()], False
     last = controls.trace[-1]
-    if source.polar is not None or any(word.letter in POLAR for word in controls.block.words):
-        raise controls.refusal(
-            "polar words (G16, @, ^) cannot be rewritten", "post the program in Cartesian coordinates"
-        )
-    if once == "G53":
-        controls.note("moves of G53 keep their machine coordinates")
-    elif once is not None and CODES[once].takes_axes:
-        controls.note("the reference points of G28 and G30 stay where they are; intermediate points move with the work")
+    if once is not None and once != "G53" and CODES[once].takes_axes:
         _home(controls)
-    elif source.motion in CYCLES:
+    elif once != "G53" and source.motion in CYCLES:
         if controls.matrix[geometry.PLANES[source.plane][2], geometry.PLANES[source.plane][2]] != 1.0:
             return _one_by_one(controls, _cycle_in_moves(controls, first)), False
         _cycle(controls, plane)
-    else:
+    elif once != "G53":
         count = _piece_count(controls)
         if count > 1:
             start, end = (source.frames.to_setup(point) for point in (last.start, last.end))
@@ -96,13 +90,10 @@ def _home(controls: Controls) -> None:
     axes = controls.axes
     if not axes:
         return
-    mixed = controls.matrix != 0.0
-    named = [AXES.index(letter) for letter in axes]
-    missing = [
-        AXES[other]
-        for other in range(3)
-        if other not in named and any(axis < 3 and (mixed[axis, other] or mixed[other, axis]) for axis in named)
-    ]
+    named, mixed = [AXES.index(letter) for letter in axes], controls.matrix != 0.0
+    linear = [axis for axis in named if axis < 3]
+    others = (axis for axis in range(3) if axis not in named)
+    missing = [AXES[axis] for axis in others if mixed[axis, linear].any() or mixed[linear, axis].any()]
     if missing:
         raise controls.refusal(
             f"G28 or G30 of {', '.join(axes)} without {', '.join(missing)}: the turned work has no such axis alone",
@@ -123,63 +114,26 @@ def _arc(controls: Controls, plane: str) -> None:
     code = code if sign > 0.0 else ARCS[1 - ARCS.index(code)]
     controls.motion_word(code)
     first, second, normal = geometry.PLANES[name]
-    target = controls.target(last.end)
-    start, end = (source.frames.to_program(point) for point in (last.start, last.end))
-    chord = math.dist(*([point[axis] for axis in geometry.PLANES[source.plane][:2]] for point in (start, end)))
-    if chord >= SAME:
-        controls.go(target, axes)
-    else:  # a circle ends on its own start to the last digit, or it is none: words that cannot say so are left out
-        here = controls.out.frames.to_program(controls.out.frames.position)
-        for axis in (axis for axis in range(3) if axis != normal and AXES[axis] in axes):
-            place = here[axis] / controls.scale(axis)
-            if controls.out.absolute and abs(round(place, controls.digits) - place) > SAME:
-                edit.remove(AXES[axis])
-            else:
-                edit.write(AXES[axis], place if controls.out.absolute else 0.0)
-        along = [normal, 3, 4, 5]
-        controls.go(target, [letter for letter in axes if AXES.index(letter) in along], only=along)
-    _center(controls, last.arc.center, code == "G2", (first, second), chord)
+    start, end = (source.frames.to_program(point)[:3] for point in (last.start, last.end))
+    only = list(range(6))
+    if max(abs(start[axis] - end[axis]) for axis in geometry.PLANES[source.plane][:2]) < SAME:
+        edit.remove((AXES[first], AXES[second]))  # a circle ends where it begins, whatever is rounded
+        only = [normal, 3, 4, 5]
+    controls.go(controls.target(last.end), [letter for letter in axes if AXES.index(letter) in only], only=only)
+    _center(controls, last.arc.center, (first, second))
 
 
-def _center(
-    controls: Controls, center: Sequence[float], clockwise: bool, plane: tuple[int, int], exact_chord: float
-) -> None:
-    """I, J, K of a centre (set-up frame of the untouched program); R stays where it says the same."""
+def _center(controls: Controls, center: Sequence[float], plane: tuple[int, int]) -> None:
+    """I, J, K of a centre (set-up frame of the untouched program), in place of R too."""
     out, edit = controls.out, controls.edit
     there = out.frames.to_program(controls.of_setup([*center, 0.0, 0.0, 0.0]))
     here = out.frames.to_program(out.frames.position)
-    if edit.word("R") is not None:
-        by_radius = _center_by_radius(controls, here, clockwise, plane, exact_chord)
-        if by_radius and math.dist(by_radius, [there[axis] for axis in plane]) <= NEAR * controls.unit:
-            return
-        edit.remove("R")
     letters = [geometry.CENTER_WORDS[axis] for axis in plane]
-    edit.remove(letter for letter in geometry.CENTER_WORDS if letter not in letters)
+    edit.remove(("R", *(letter for letter in geometry.CENTER_WORDS if letter not in letters)))
     for axis, letter in zip(plane, letters, strict=True):
         value = (there[axis] if out.arc_absolute else there[axis] - here[axis]) / controls.scale(axis)
         if edit.word(letter) is not None or out.arc_absolute or abs(value) > OFF * 10.0**-controls.digits:
             edit.write(letter, value)
-
-
-def _center_by_radius(
-    controls: Controls, here: Sequence[float], clockwise: bool, plane: tuple[int, int], exact_chord: float
-) -> geometry.Point2 | None:
-    """The centre that R gives with the rounded ends; None near half circles, where R magnifies the rounding."""
-    end, size = list(here), 0.0
-    for word in read_block(controls.edit.render(), controls.block.line, controls.source.name).words:
-        if word.letter in AXES:
-            axis = AXES.index(word.letter)
-            end[axis] = word.value * controls.scale(axis) + (0.0 if controls.out.absolute else here[axis])
-        elif word.letter == "R":
-            size = word.value * controls.scale(plane[0])
-    first, last = ((point[plane[0]], point[plane[1]]) for point in (here, end))
-    chord = math.dist(first, last)
-    if abs(chord - exact_chord) > SAME and chord > HALF_CIRCLE * 2.0 * abs(size):
-        return None
-    try:
-        return geometry.center_from_radius(first, last, size, clockwise)
-    except geometry.ArcError:
-        return None
 
 
 def _cycle(controls: Controls, plane: str) -> None:
@@ -211,7 +165,6 @@ def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
         raise controls.refusal(
             f"{source.motion} drills along {axis}, and the placement turns the work out of it", LINEARISE
         )
-    controls.note("drilling cycles are written as their single moves")
     moves = zip(rows.motion[first:], rows.end[first:], rows.dwell[first:], strict=True)
     return [("G0" if motion == RAPID else "G1", end, dwell) for motion, end, dwell in moves]
 
@@ -219,23 +172,17 @@ def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
 def _piece_count(controls: Controls) -> int:
     """Number of pieces into which a move must be cut; those that must be are refused, unless it was asked for."""
     motion, start, end, arc = controls.trace[-1]
-    off_plane = arc is not None and controls.image(controls.source.plane) is None
-    leaning = 0.0
+    plane, leaning, problem = controls.source.plane, 0.0, ""
+    off_plane = arc is not None and controls.image(plane) is None
     if motion != RAPID and controls.turn.turns and start[3:] != end[3:]:
         written = controls.out.frames.position[3:], controls.target(end)[3:]
         leaning = lean(controls.turn, (start[3:], end[3:]), written)
-    if controls.linearise is None:
-        if off_plane:
-            plane = controls.source.plane
-            raise controls.refusal(
-                f"an arc of {plane}, turned with the work, lies in none of the planes G17, G18, G19", LINEARISE
-            )
-        if leaning > LEAN:
-            raise controls.refusal(
-                f"between its ends the tool would lean {leaning:.3g} degrees away from its placed direction, as a "
-                "control interpolates A, B and C",
-                LINEARISE,
-            )
+    if off_plane:
+        problem = f"an arc of {plane}, turned with the work, lies in none of the planes G17, G18, G19"
+    elif leaning > LEAN:
+        problem = f"as a control interpolates A, B and C, the tool would lean {leaning:.3g} degrees between its ends"
+    if problem and controls.linearise is None:
+        raise controls.refusal(problem, LINEARISE)
     if controls.linearise is None or (not off_plane and leaning == 0.0):
         return 1
     tolerance = controls.linearise - controls.unit

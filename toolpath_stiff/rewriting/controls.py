@@ -10,7 +10,6 @@ Edits replace, add and take out words of one line; everything else of it stays a
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, ProgramError
@@ -18,11 +17,9 @@ from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.state import CurrentBlock, Segment, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
-from toolpath_stiff.rewriting.turn import AXIS, END, START, cutting_rows, differences
+from toolpath_stiff.rewriting.turn import Turn, cutting_rows, differences
 from toolpath_stiff.units import MM_PER_INCH
 
-if TYPE_CHECKING:
-    from toolpath_stiff.rewriting.turn import Turn
 SAME = 1e-9  # mm, inch or degrees: a word whose number changes by less keeps its text
 FEED_DECIMALS = 6
 
@@ -46,12 +43,13 @@ class LineEdit:
     def __init__(self, text: str, block: Block, decimals: int) -> None:
         self.block, self.decimals = block, decimals
         self._words = list(block.words)
-        self._texts = [word.text for word in block.words]
-        ends = [0, *(word.column - 1 + len(word.text) for word in block.words)]
-        starts = [*(word.column - 1 for word in block.words), len(text)]
-        self._gaps = [text[end:start] for end, start in zip(ends, starts, strict=True)]
-        packed = len(self._gaps) > 2 and "" in self._gaps[1:-1]
-        self._between = "" if packed else " "
+        self._parts, end = list[str](), 0  # what stands before the first word, that, what stands before the next...
+        for word in block.words:
+            start = word.column - 1
+            self._parts += [text[end:start], word.text]
+            end = start + len(word.text)
+        self._parts.append(text[end:])
+        self._between = "" if "" in self._parts[2:-1:2] else " "
         self._points = any("." in word.text for word in block.words if word.letter in NUMBERS)
         self._lower = bool(block.words) and block.words[0].text[0].islower()
 
@@ -74,7 +72,7 @@ class LineEdit:
 
     def replace(self, word: Word, text: str) -> None:
         """Put other text in a word's place."""
-        self._texts[self._words.index(word)] = text
+        self._parts[2 * self._words.index(word) + 1] = text
 
     def add_code(self, code: str) -> None:
         """Add a G code, `G1` say, before the other words."""
@@ -86,17 +84,17 @@ class LineEdit:
             word = self.word(letter)
             if word is not None:
                 index = self._words.index(word)
-                del self._words[index], self._texts[index]
-                before, after = self._gaps[index], self._gaps.pop(index + 1)
+                before, _, after = self._parts[2 * index : 2 * index + 3]
                 if not before.strip() and index > 0:
                     before = ""
                 elif not after.strip():
                     after = ""
-                self._gaps[index] = before + after
+                self._parts[2 * index : 2 * index + 3] = [before + after]
+                del self._words[index]
 
     def render(self) -> str:
         """The line as edited."""
-        return "".join(gap + text for gap, text in zip(self._gaps, [*self._texts, ""], strict=True))
+        return "".join(self._parts)
 
     def next_line(self, lead: str) -> LineEdit:
         """A further line in this one's style, with no words yet; `lead` stands before them."""
@@ -110,18 +108,14 @@ class LineEdit:
         return any(word.letter in AXES for word in self._words)
 
     def _add(self, letter: str, text: str) -> None:
-        rank, index = ORDER.index(letter), 0
-        if letter != "G":
-            ranks = [(ORDER.index(w.letter), i) for i, w in enumerate(self._words) if w.letter in NUMBERS]
-            before, after = [i for r, i in ranks if r < rank], [i for r, i in ranks if r > rank]
-            codes = [i for i, w in enumerate(self._words) if w.letter == "G"] or [len(self._words) - 1]
-            index = before[-1] + 1 if before else after[0] if after else codes[-1] + 1
-        self._words.insert(index, Word(letter, 0.0, 0, text))
-        self._texts.insert(index, text)
+        rank = ORDER.index(letter)
+        ranks = [ORDER.index(word.letter) if word.letter in ORDER else rank for word in self._words]
+        index = 1 + max((i for i, other in enumerate(ranks) if other < rank), default=-1)
         if index:
-            self._gaps.insert(index, self._between)
+            self._parts[2 * index : 2 * index] = [self._between, text]
         else:  # what stands before the first word stays there
-            self._gaps.insert(1, self._between if len(self._words) > 1 else "")
+            self._parts[1:1] = [text, self._between if self._words else ""]
+        self._words.insert(index, Word(letter, 0.0, 0, text))
 
 
 DECIMALS_MM, DECIMALS_INCH = 4, 5
@@ -271,12 +265,9 @@ class Controls:
         # The steps of a cycle with L in G91 repeat one rounding.
         repeats = next((word.value for word in self.block.words if word.letter == "L"), 1.0)
         difference = differences(self.turn, wanted, written, unit * max(repeats, 1.0))
-        if difference is None:
-            return
-        unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
-        hint = "" if difference.kind == END else "give more --decimals"
-        if unknown:
-            hint = f"position {unknown} in rapid before the first cutting move"
-        elif difference.kind in (START, AXIS):
-            hint = "position X, Y, Z and the rotary axes in rapid before it"
-        raise self.refusal(f"the block cannot be rewritten: its cutting move {difference.words}", hint)
+        if difference:
+            unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
+            hint = "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
+            if unknown:
+                hint = f"position {unknown} in rapid before the first cutting move"
+            raise self.refusal(f"the block cannot be rewritten: its cutting move {difference}", hint)

@@ -12,16 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
-from toolpath_stiff.nc.words import read_block
 from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m
 
 OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
-# What can hold a work offset or G10 once comments and blanks are out: tells the lines that are worth reading again.
-MAY_BE_OFFSET, COMMENTS = re.compile(r"[Gg]\+?0*[15]\d"), re.compile(r"\([^)]*\)")
+G_WORD, COMMENTS = re.compile(r"[Gg]\+?(0*1\d{1,2}|0*5\d(?:\.\d)?)"), re.compile(r"\([^)]*\)|;.*")
 VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
 NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
 USE_WRITE = "use --write, which transforms the program itself"
@@ -103,25 +100,13 @@ def _not_about_z(program: ReadProgram, placement: Pose) -> str:
 def _not_g54_alone(program: ReadProgram) -> str:
     """The reason why setting G54 would not move the whole program, or ""."""
     for number, text in enumerate(program.source, 1):
-        if not MAY_BE_OFFSET.search("".join(COMMENTS.sub("", text).split())):
-            continue
-        for code in _codes(text, number, program):
+        for digits in G_WORD.findall("".join(COMMENTS.sub("", text).split())):
+            code = code_name("G", float(digits))
             if code in OTHER_OFFSETS:
                 return f"the program uses {code} beside G54 (line {number}), which would stay where it is: {USE_WRITE}"
             if code == "G10":
                 return f"the program sets offsets itself (G10, line {number}): {USE_WRITE}"
     return ""
-
-
-def _codes(text: str, number: int, program: ReadProgram) -> list[str]:
-    """G codes of a line, and its other words; what LinuxCNC's interpreter read holds words that ours does not know."""
-    try:
-        words = read_block(text, number, program.name).words
-    except InputError:
-        if program.interpreter == "builtin" and not program.parametric:
-            raise
-        return [code_name("G", float(digits)) for digits in re.findall(r"[Gg]\s*(\d+(?:\.\d)?)", text)]
-    return [code_name(word.letter, word.value) for word in words]
 
 
 def _number(value: float, decimals: int) -> str:

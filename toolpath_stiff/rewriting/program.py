@@ -13,17 +13,18 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, switches_on
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.reader import Options
 from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.tables import Offsets, ToolEntry
-from toolpath_stiff.nc.words import CORNERS, Block, read_block, read_text, split_lines
+from toolpath_stiff.nc.tables import Offsets
+from toolpath_stiff.nc.words import read_block, read_text, split_lines
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
@@ -31,7 +32,6 @@ from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm
 
 LINE_END = re.compile("\r\n|\n|\r")
-FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # coarser than 0.01 mm is not machining; beyond nine a double has no more digits
 PLAIN_DIALECTS = ("generic", "linuxcnc")
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
@@ -94,9 +94,7 @@ def rewrite_program(
     *,
     decimals: int | None = None,
     linearise: float | None = None,
-    offsets: Offsets | None = None,
-    tools: dict[int, ToolEntry] | None = None,
-    block_delete: Switches = False,
+    **read_as: Unpack[Options],
 ) -> RewrittenProgram:
     r"""Write a program so that at the original origin it does what it does, untouched, at a placement.
 
@@ -111,8 +109,8 @@ def rewrite_program(
     linearise
         m: arcs that lie in no plane any more, cycles that the set-up tilts and large turns of the tool are written as
         straight moves that stay within this of them. Unless given they are refused.
-    offsets, tools, block_delete
-        What the program was read with, as in `parse_program`.
+    read_as
+        Offsets, tools and block-delete switches that the program was read with, as in `parse_program`.
 
     Raises
     ------
@@ -132,59 +130,37 @@ def rewrite_program(
     X100 Y40
     M30
     """
-    check_decimals(decimals)
     check_rewritable(program)
-    if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
-        raise ProgramError(
-            "a program is rewritten by the words of the built-in interpreter in the dialects "
-            f"{' and '.join(PLAIN_DIALECTS)}; this one was read by {program.interpreter!r} as {program.dialect!r}",
-            hint="place it without --write",
-            file=program.name,
-        )
+    offsets, tools = read_as.get("offsets") or Offsets(), read_as.get("tools")
+    switches = switches_on(read_as.get("block_delete", False), UNKNOWN_CONTROL)
     placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
     source, out = (
-        State(program.name, Frames(copy.deepcopy(offsets or Offsets()), origin, origin), copy.deepcopy(tools))
+        State(program.name, Frames(copy.deepcopy(offsets), origin, origin), copy.deepcopy(tools))
         for origin in (placement, original)
     )
     tolerance = None if linearise is None else mm_from_m(linearise)
     controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
     text, encoding = read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
-    lines = list(_rewritten_lines(controls, text, program.name, switches_on(block_delete, UNKNOWN_CONTROL)))
+    if placement == original:
+        return RewrittenProgram(program.name, text, encoding, [])
+    lines = list(_rewritten_lines(controls, text, program.name, switches))
     return RewrittenProgram(program.name, "".join(lines), encoding, controls.notes)
 
 
 def check_rewritable(program: ReadProgram) -> None:
-    """Raise `InputError` for a file that is not a program of a control, or is one of another machine's."""
+    """Raise `InputError` for a program whose blocks are not what a control of this machine executes."""
+    what, hint = "", "place it without --write"
     if program.kinematics:
-        problem = (
-            f"a program posted for another kinematics ({program.kinematics}) is not rewritten: its words are those of "
-            "that machine's axes"
-        )
-        hint = "place it without --write, set the work so in the CAM system, and post it for this machine"
+        what = f"posted for another kinematics ({program.kinematics})"
+        hint += ", set the work so in the CAM system, and post it for this machine"
     elif program.parametric:
-        problem = "a program with variables cannot be rewritten: its numbers are worked out as it runs"
-        hint = "place it without --write, and set the work offset that is printed (G10)"
+        what, hint = "with variables", f"{hint}, and set the work offset that is printed (G10)"
     elif program.dialect == CUTTER_LOCATION:
-        problem = "a cutter-location file is not rewritten: it is not a program that a control runs"
-        hint = "place it without --write, set the work so in the CAM system, or place the posted program"
-    else:
-        return
-    raise ProgramError(problem, hint=hint, file=program.name)
-
-
-def check_decimals(decimals: int | None) -> None:
-    """Raise `InputError` for a number of decimals that makes no program.
-
-    Examples
-    --------
-    >>> check_decimals(4)
-    >>> check_decimals(12)
-    Traceback (most recent call last):
-        ...
-    toolpath_stiff.errors.ProgramError: 12 decimals; expected 2 to 9
-    """
-    if decimals is not None and not FEWEST_DECIMALS <= decimals <= MOST_DECIMALS:
-        raise ProgramError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
+        what, hint = "for a post processor (a cutter-location file)", f"{hint}, or place the posted program"
+    elif program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
+        what = f"read by {program.interpreter!r} as {program.dialect!r}, not as one of {', '.join(PLAIN_DIALECTS)},"
+    if what:
+        raise ProgramError(f"a program {what} cannot be rewritten", hint=hint, file=program.name)
 
 
 def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
@@ -199,7 +175,9 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
         block = read_block(line, number, name)
         left_out = block.optional and block.switch in switches
         written = [line]
-        _check_block(block, left_out, name)
+        if left_out and block.words and not block.percent:  # it would be wrong once the switch is off
+            problem = "a block that --block-delete leaves out cannot be rewritten"
+            raise Place(name, number).fail(problem, hint="take it out of the program, or do without --block-delete")
         if block.percent:
             running, started = not started, True
         elif not left_out:
@@ -208,24 +186,3 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
             if block.optional and written != [line]:
                 controls.note(SLASHED)
         yield raw + end if written == [line] else (end or ends[0] or "\n").join(written) + end
-
-
-def _check_block(block: Block, left_out: bool, name: str) -> None:
-    """Raise `InputError` for a block that cannot be written on its own.
-
-    It has a slash in its middle or makes a corner of the next one; or --block-delete leaves it out: it would stay as
-    it was, and be wrong once the switch is off.
-    """
-    corner = next((word for word in block.words if word.letter in CORNERS), None)
-    if corner is not None:
-        problem = f"{corner.text} makes a corner with the next block, which cannot be rewritten"
-        hint = "post the corner's moves"
-    elif block.rest is not None:
-        problem = "a block with a slash in its middle cannot be rewritten"
-        hint = "put what follows the slash into a block of its own"
-    elif left_out and block.words and not block.percent:
-        problem = "a block that --block-delete leaves out cannot be rewritten"
-        hint = "take it out of the program, or do without --block-delete"
-    else:
-        return
-    raise Place(name, block.line).fail(problem, hint=hint)

@@ -129,11 +129,10 @@ def angle_between(first: FloatArray, second: FloatArray) -> float:
     return 2.0 * math.degrees(math.asin(min(chord, 1.0)))
 
 
-# In units of the last decimal written. Ends: half a unit per axis, three axes, and the same of the start; a centre
-# given by I, J, K adds that of its own words, one given by R what `blocks.NEAR` allows.
-END_UNITS, CENTER_UNITS = 2.0, 6.0
+# In units of the last decimal written. Ends: half a unit per axis, three axes, and the same of the start. On an arc a
+# centre and a sweep add what their own words are rounded by.
+END_UNITS, MIDDLE_UNITS = 2.0, 24.0
 SHORTEST_UNITS = 4.0
-START, END, AXIS, SHAPE = "start", "end", "tool axis", "shape"
 
 
 class CuttingMove(NamedTuple):
@@ -148,6 +147,12 @@ class CuttingMove(NamedTuple):
         moved = max(abs(e - s) for s, e in zip(self.start, self.end, strict=True))
         return self.arc is None and moved < SHORTEST_UNITS * unit
 
+    def point(self, share: float) -> Sequence[float]:
+        """The point at a share of it, x, y, z in mm."""
+        if self.arc is not None:
+            return point_on_arc(self.arc, self.start, self.end, share)
+        return [s + share * (e - s) for s, e in zip(self.start[:3], self.end[:3], strict=True)]
+
 
 def cutting_rows(recorder: Recorder, first: int) -> list[CuttingMove]:
     """Cutting moves recorded from `first` on."""
@@ -155,62 +160,33 @@ def cutting_rows(recorder: Recorder, first: int) -> list[CuttingMove]:
     return [CuttingMove(start, end, arc) for start, end, arc, motion in rows if motion != RAPID]
 
 
-class Difference(NamedTuple):
-    """A difference of a written move from the placed one: its kind (`START`, `END`, `AXIS`, `SHAPE`), its words."""
-
-    kind: str
-    words: str
-
-
-def differences(turn: Turn, wanted: list[CuttingMove], written: list[CuttingMove], unit: float) -> Difference | None:
-    """The first difference of a block's written cutting moves from the placed ones beyond the rounding to `unit` mm.
+def differences(turn: Turn, wanted: list[CuttingMove], written: list[CuttingMove], unit: float) -> str:
+    """How a block's written cutting moves differ from the placed ones beyond the rounding to `unit` mm; "" if nowhere.
 
     Straight moves of a few units may vanish by rounding, or come to be.
     """
-    left, right = list(wanted), list(written)
-    while left and right:
-        what = difference(turn, left[0], right[0], unit)
-        if what is None:
-            del left[0], right[0]
-        elif left[0].short(unit):
-            del left[0]
-        elif right[0].short(unit):
-            del right[0]
-        else:
-            return what
-    if all(row.short(unit) for row in (*left, *right)):
-        return None
-    return Difference(SHAPE, f"would be {len(written)} moves and not {len(wanted)}")
+    if len(wanted) != len(written):
+        wanted, written = ([row for row in rows if not row.short(unit)] for rows in (wanted, written))
+    if len(wanted) != len(written):
+        return f"would be {len(written)} moves and not {len(wanted)}"
+    pairs = zip(wanted, written, strict=True)
+    return next((what for placed, row in pairs if (what := _difference(turn, placed, row, unit))), "")
 
 
-def difference(turn: Turn, wanted: CuttingMove, written: CuttingMove, unit: float) -> Difference | None:
-    """The difference of a written cutting move from the placed one beyond the rounding to `unit` mm.
-
-    For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them.
-    """
-    ends = ((wanted.start, written.start, START), (wanted.end, written.end, END))
-    for placed, point, kind in ends:
+def _difference(turn: Turn, wanted: CuttingMove, written: CuttingMove, unit: float) -> str:
+    """For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them."""
+    ends = (("starts", wanted.start, written.start), ("ends", wanted.end, written.end))
+    for what, placed, point in ends:
         apart = math.dist(turn.point(placed[:3]), point[:3])
         if apart > END_UNITS * unit:
-            return Difference(kind, f"{kind}s {apart:.4g} mm off")
-    for placed, point, _ in ends:
+            return f"{what} {apart:.4g} mm off"
         if placed[3:] != point[3:] or not turn.keeps(placed[3:]):
             goal = turn.rotations(np.array([placed[3:]]))[0]
             angle = angle_between(goal, rotation_matrices(np.radians(point[3:])))
             if angle > END_UNITS * unit:
-                return Difference(AXIS, f"has its tool axis {angle:.4g} degrees off")
-    arc, other = wanted.arc, written.arc
-    if arc is None or other is None:
-        return None if arc is other else Difference(SHAPE, "is another kind of move")
-    normal = turn.turn @ np.array(arc.normal)
-    sense = float(normal @ np.array(other.normal))
-    if abs(abs(sense) - 1.0) > 1e-9:
-        return Difference(SHAPE, "lies in another plane")
-    between = np.array(turn.point(arc.center)) - np.array(other.center)
-    off = float(np.linalg.norm(between - (between @ normal) * normal))
-    if off > CENTER_UNITS * unit:
-        return Difference(SHAPE, f"has its centre {off:.4g} mm off")
-    swept = abs(arc.sweep - math.copysign(1.0, sense) * other.sweep)
-    if swept * math.dist(written.start[:3], other.center) > 4.0 * CENTER_UNITS * unit:
-        return Difference(SHAPE, f"has its sweep {math.degrees(swept):.4g} degrees off")
-    return None
+                return f"has its tool axis {angle:.4g} degrees off"
+    for share in BETWEEN.tolist() if wanted.arc or written.arc else ():
+        apart = math.dist(turn.point(wanted.point(share)), written.point(share))
+        if apart > MIDDLE_UNITS * unit:
+            return f"is {apart:.4g} mm off on its way"
+    return ""

@@ -60,14 +60,9 @@ def paper_campaign() -> Table:
     poses = [(x, y, z, setup) for z, setup in PAPER_HEIGHTS for x, y in PAPER_POINTS]
     rows = [(*pose, number, axis) for number, pose in enumerate(poses, 1) for axis in AXES]
     x, y, z, setup, point, direction = zip(*rows, strict=True)
-    zeros = np.zeros(len(rows))
     return {
-        "x_mm": np.array(x, dtype=float),
-        "y_mm": np.array(y, dtype=float),
-        "z_mm": np.array(z),
-        "a_deg": zeros,
-        "b_deg": zeros,
-        "c_deg": zeros,
+        **{name: np.array(values, dtype=float) for name, values in zip(POSE[:3], (x, y, z), strict=True)},
+        **dict.fromkeys(POSE[3:], np.zeros(len(rows))),
         "direction": list(direction),
         "setup": list(setup),
         "point": np.array(point),
@@ -78,42 +73,24 @@ def tilted_campaign(nominal: Nominal, rng: Generator) -> Table:
     """24 tilted poses, X, Y, Z, two loads, two repeats: 288 rows; poses in random order, each repeat clamped anew."""
     poses = _tilted_poses(nominal, rng)
     visits = [(pose, repeat) for repeat in range(1, TILTED_REPEATS + 1) for pose in rng.permutation(TILTED_POSES)]
-    columns: dict[str, list[Any]] = {name: [] for name in (*POSE, *_TILTED_COLUMNS)}
+    rows = []
     for clamp, (pose, repeat) in enumerate(visits, 1):
         jobs = [(axis, load) for axis in AXES for load in TILTED_LOADS]
+        setup = "riser" if pose % RISER_EVERY == 0 else DEFAULT_SETUP
+        warm = round(20.0 + 1.5 * np.sin(np.pi * clamp / len(visits)), 1)  # a shop that warms up over the day
         minutes = 0.0
         for job in rng.permutation(len(jobs)):
             # A reading takes half a minute to a minute and a half after the indicator was zeroed.
             minutes = round(minutes + float(rng.uniform(0.5, 1.5)), 1)
-            axis, load = jobs[job]
-            for name, value in zip(POSE, poses[pose], strict=True):
-                columns[name].append(value)
-            cells = (
-                axis,
-                load,
-                "riser" if pose % RISER_EVERY == 0 else DEFAULT_SETUP,
-                clamp,
-                repeat,
-                int(pose) + 1,
-                minutes,
-                _extension(int(pose)),
-                round(20.0 + 1.5 * np.sin(np.pi * clamp / len(visits)), 1),  # a shop that warms up over the day
-            )
-            for name, value in zip(_TILTED_COLUMNS, cells, strict=True):
-                columns[name].append(value)
-    return {name: values if name in ("direction", "setup") else np.array(values) for name, values in columns.items()}
+            placed = (setup, clamp, repeat, int(pose) + 1, minutes, _extension(int(pose)), warm)
+            rows.append((*poses[pose], *jobs[job], *placed))
+    columns = zip((*POSE, *_TILTED_COLUMNS), zip(*rows, strict=True), strict=True)
+    return {name: list(values) if name in ("direction", "setup") else np.array(values) for name, values in columns}
 
 
 _TILTED_COLUMNS = (
-    "direction",
-    "force_N",
-    "setup",
-    "clamp",
-    "repeat",
-    "point",
-    "time_min",
-    "tool_extension_mm",
-    "temperature_C",
+    *("direction", "force_N", "setup", "clamp", "repeat"),
+    *("point", "time_min", "tool_extension_mm", "temperature_C"),
 )
 
 
@@ -132,17 +109,8 @@ def _tilted_poses(nominal: Nominal, rng: Generator) -> FloatArray:
         radius, azimuth = TILTED_RADIUS * np.sqrt(rng.random()), rng.uniform(0.0, 2.0 * np.pi)
         tilt, about = rng.uniform(5.0, 25.0), rng.uniform(0.0, 2.0 * np.pi)
         height = TILTED_HEIGHTS[pose % len(TILTED_HEIGHTS)]
-        trial = np.round(
-            [
-                radius * np.cos(azimuth),
-                radius * np.sin(azimuth),
-                height,
-                tilt * np.cos(about),
-                tilt * np.sin(about),
-                rng.uniform(-10.0, 10.0),
-            ],
-            1,
-        )
+        across, tilted = ((size * np.cos(at), size * np.sin(at)) for size, at in ((radius, azimuth), (tilt, about)))
+        trial = np.round([*across, height, *tilted, rng.uniform(-10.0, 10.0)], 1)
         extension = np.array([m_from_mm(_extension(pose))])
         if reachable(nominal, m_from_mm(trial[None, :3]), rad_from_deg(trial[None, 3:]), extension)[0]:
             poses.append(trial)

@@ -20,20 +20,18 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE, with_effect
 from toolpath_stiff.rig.hidden import (
-    ODDITIES,
-    OUTSIDE,
     HiddenMachine,
     Nuisances,
     disturb_machine,
     disturb_readings,
-    reading_sd,
     readings,
 )
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
+from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
 from toolpath_stiff.rig.sizes import scale_of
-from toolpath_stiff.rig.unknowns import UNKNOWNS
+from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 # How often a blind draw hides what, where nothing is said (assumed).
@@ -52,7 +50,8 @@ def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows
 
     if "dx" in table:
         direction = np.stack([column(name, 0.0) for name in ("dx", "dy", "dz")], axis=1)
-        direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+        with np.errstate(invalid="ignore"):  # nan of no length
+            direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
     else:
         direction = np.array([AXES[name] for name in table["direction"]])
     return Rows(
@@ -94,6 +93,8 @@ class DrawnCase:
         `links` and `variables`, what a description may name.
     nominal, machine, nuisances
         To measure the same machine again.
+    seed, layout
+        As asked.
     """
 
     rows: Table
@@ -101,6 +102,8 @@ class DrawnCase:
     nominal: Nominal
     machine: HiddenMachine
     nuisances: Nuisances
+    seed: int = 0
+    layout: str = ""
 
 
 def effects_of_layout(layout: str) -> tuple[str, ...]:
@@ -119,11 +122,10 @@ def draw_case(
     seed: int,
     layout: str = "tilted",
     hidden: str | Sequence[str] | None = None,
-    noise: float = 0.02,
+    noise: float | Nuisances = 0.02,
     machine: str | Nominal = defaults.MACHINE,
     plan: Mapping[str, Any] | None = None,
     size: float | Sequence[float] | None = None,
-    nuisances: Nuisances | None = None,
 ) -> DrawnCase:
     """A blind campaign on a machine that hides something; the same arguments give the same rows.
 
@@ -137,7 +139,7 @@ def draw_case(
         None: drawn blindly; `none`, `one`, `two`, `three`, `outside`, `unknown`; or names of effects (oddities and
         unknowns included). An unknown is never drawn where nothing is said.
     noise
-        Relative repeat noise of one reading.
+        Relative repeat noise of one reading, beside the standard nuisances; or others than these.
     machine
         Nominal machine: name, file, or as loaded.
     plan
@@ -145,8 +147,6 @@ def draw_case(
     size
         Rms change of ln stiffness that each effect makes, instead of a draw; less where its bound is reached. Several:
         one for each effect, in the order of `truth["hidden"]`.
-    nuisances
-        Instead of the standard ones; `noise` is then not used.
 
     Raises
     ------
@@ -155,10 +155,9 @@ def draw_case(
     """
     if seed < 0:
         raise InputError(f"seed {seed}", expected="0 or more")
-    if nuisances is None:
-        if not 0.0 <= noise <= 0.5:
-            raise InputError(f"repeat noise of {100.0 * noise:g} %", expected="0 to 50 %")
-        nuisances = Nuisances(repeat=noise)
+    nuisances = noise if isinstance(noise, Nuisances) else Nuisances(repeat=noise)
+    if not 0.0 <= nuisances.repeat <= 0.5:
+        raise InputError(f"repeat noise of {100.0 * nuisances.repeat:g} %", expected="0 to 50 %")
     nominal = load_nominal(machine) if isinstance(machine, str) else machine
     streams = {name: np.random.default_rng([seed, i]) for i, name in enumerate(_STREAMS)}
     table = campaign(layout, nominal, plan, streams["campaign"])
@@ -172,16 +171,18 @@ def draw_case(
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
             parameters, strength = scale.draw(name, wanted, rng)
             true = with_effect(true, name, parameters)
-            effects.append({"effect": name, "parameters": parameters, **strength, **_looks(name)})
+            effects.append({"effect": name, "parameters": parameters, **strength})
+            if name in UNKNOWNS:  # what a description may name
+                effects[-1]["links"] = sorted(UNKNOWNS[name].links)
+                effects[-1]["variables"] = sorted(UNKNOWNS[name].variables)
     true = disturb_machine(true, nuisances, streams["machine"])
     measured = measure(nominal, true, table, rows, nuisances, streams["noise"], stated_sd=layout == "paper")
-    outside = any(name in (*OUTSIDE, *UNKNOWNS) for name in names)
     truth = {
         "hidden": list(names),
-        "kind": "outside" if outside else ("none", "one", "two", "three")[min(len(names), 3)],
+        "kind": "outside" if {*names} & {*OUTSIDE} else ("none", "one", "two", "three")[min(len(names), 3)],
         "effects": effects,
     }
-    return DrawnCase(measured, truth, nominal, true, nuisances)
+    return DrawnCase(measured, truth, nominal, true, nuisances, seed, layout)
 
 
 def measure(
@@ -208,7 +209,8 @@ def measure(
         if name in ("direction", "dz") and "stiffness_N_per_mm" not in measured:
             measured["stiffness_N_per_mm"] = n_per_mm_from_n_per_m(stiffness)
             if stated_sd and max(nuisances.repeat, nuisances.clamping) > 0.0:
-                measured["sd_N_per_mm"] = np.round(n_per_mm_from_n_per_m(reading_sd(stiffness, nuisances)))
+                one_reading = np.hypot(nuisances.repeat, nuisances.clamping)
+                measured["sd_N_per_mm"] = np.round(n_per_mm_from_n_per_m(stiffness * one_reading))
     return with_loops(nominal, machine, measured, rows, nuisances, rng) if "loop" in measured else measured
 
 
@@ -248,38 +250,17 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
     if hidden == "unknown":
         return (str(rng.choice([name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)])),)
     if hidden == "outside":
-        return (str(rng.choice(list(ODDITIES) if layout == "paper" else list(OUTSIDE))),)
+        return (str(rng.choice([*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME)])),)
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
-    _check_named(names, table)
+    everything = (*CATALOGUE, *OUTSIDE)
+    if unknown := [name for name in names if name not in everything]:
+        expected = f"none, one, two, three, outside, unknown, or of {', '.join(everything)}"
+        raise InputError(f"nothing called {unknown[0]!r} to hide", expected=expected)
+    if len(set(names)) < len(names) or sum(name in OUTSIDE for name in names) > 1:
+        raise InputError(f"hidden effects {', '.join(names)}", expected="each once, at most one outside the catalogue")
+    needed = {column: name for name in names if name in OUTSIDE for column in OUTSIDE[name].columns}
+    needed |= {"time_min": "thermal_drift"} if "thermal_drift" in names else {}
+    for column, name in needed.items():
+        if column not in table:
+            raise InputError(f"{name} needs the column {column}", expected="layout tilted, or a plan with that column")
     return names
-
-
-def _check_named(names: Sequence[str], table: Table) -> None:
-    """Raise `InputError` for names that are unknown, cannot be together, or need a column that is missing."""
-    all_names = (*CATALOGUE, *OUTSIDE, *UNKNOWNS)
-    for name in names:
-        if name not in all_names:
-            raise InputError(
-                f"nothing called {name!r} to hide",
-                expected=f"none, one, two, three, outside, unknown, or of {', '.join(all_names)}",
-            )
-    if len(set(names)) < len(names) or sum(name in (*OUTSIDE, *UNKNOWNS) for name in names) > 1:
-        raise InputError(
-            f"hidden effects {', '.join(names)}", expected="each once, and at most one outside the catalogue"
-        )
-    if "thermal_drift" in names and "time_min" not in table:
-        raise InputError(
-            "thermal_drift needs the column time_min", expected="layout tilted, or a plan with that column"
-        )
-    for name in names:
-        if lacking := [c for c in (UNKNOWNS[name].columns if name in UNKNOWNS else ()) if c not in table]:
-            raise InputError(
-                f"{name} needs the column {', '.join(lacking)}", expected="layout tilted, or a plan with that column"
-            )
-
-
-def _looks(name: str) -> dict[str, Any]:
-    """What an unknown looks like from outside: the links that could do it and what it varies with."""
-    if name not in UNKNOWNS:
-        return {}
-    return {"links": sorted(UNKNOWNS[name].links), "variables": sorted(UNKNOWNS[name].variables)}

@@ -14,47 +14,32 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from toolpath_stiff.rig.hidden import HiddenMachine, Oddity
-from toolpath_stiff.rig.unknown import Unknown, signed
-from toolpath_stiff.rig.unknowns import UNKNOWNS
+from toolpath_stiff.rig.hidden import HiddenMachine
+from toolpath_stiff.rig.unknown import Shape, Unknown
+from toolpath_stiff.rig.unknowns import OUTSIDE
 from toolpath_stiff.units import m_from_mm, m_from_um, per_s_from_per_min
 
-Parameters = dict[str, Any]
 NM_PER_N = 1e-9  # m/N in nm/N
 
 # Largest compliances that are tried, nm/N: far beyond 30 % of a tip that gives 8 to 31 nm/N.
 SOFT = 60.0
 
 
-# Sizes at strength 1: ratios, or m/N where the oddity is a compliance.
-ODDITY_LIMITS = {
-    "loose_preload": SOFT * NM_PER_N,
-    "cracked_bed": SOFT * NM_PER_N,
-    "saddle_overhang": SOFT * NM_PER_N,
-    "screw_pitch_error": 0.8,
-    "ball_screw_torsion": 1.0,
-    "strut_crosstalk": 0.95,
-    "cable_drag": 0.5,
-    "warming_leg": 1.0,
-    "joint_friction": 1.0,
-}
+Draw = Callable[[Generator, int, list[str]], Shape]  # of how many vertices the frame has, which set-ups there are
 
 
-Draw = Callable[[Generator, int, list[str]], Parameters]  # of how many vertices the frame has, which set-ups there are
-
-
-def _no_shape(rng: Generator, vertices: int, setups: list[str]) -> Parameters:
+def _no_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
     return {}
 
 
-def _sign(rng: Generator, vertices: int, setups: list[str]) -> Parameters:
+def _sign(rng: Generator, vertices: int, setups: list[str]) -> Shape:
     return {"sign": float(rng.choice([-1.0, 1.0]))}
 
 
 def _shares(*names: str) -> Draw:
     """Relative sizes of several components: one is 1, each other one is absent in a third of the cases."""
 
-    def draw(rng: Generator, vertices: int, setups: list[str]) -> Parameters:
+    def draw(rng: Generator, vertices: int, setups: list[str]) -> Shape:
         weights = np.where(rng.random(len(names)) < 1.0 / 3.0, 0.0, rng.uniform(0.2, 1.0, len(names)))
         weights[rng.integers(len(names))] = 1.0
         return dict(zip(names, weights.tolist(), strict=True))
@@ -62,18 +47,18 @@ def _shares(*names: str) -> Draw:
     return draw
 
 
-def _frame_shape(rng: Generator, vertices: int, setups: list[str]) -> Parameters:
+def _frame_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
     shares = _shares("radial", "vertical")(rng, vertices, setups)
     # All vertices alike in half of the cases, else a single one.
     return {"vertex": 0 if rng.random() < 0.5 else int(rng.integers(1, vertices + 1)), **shares}
 
 
-def _setup_shape(rng: Generator, vertices: int, setups: list[str]) -> Parameters:
+def _setup_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
     shares = _shares(*"xyz")(rng, vertices, setups)
     return {"setup": str(rng.choice(setups)), **shares}
 
 
-def _gauge_shape(rng: Generator, vertices: int, setups: list[str]) -> Parameters:
+def _gauge_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
     """The direction or the set-up whose readings are scaled."""
     target = str(rng.choice(["X", "Y", "Z", *(setups if len(setups) > 1 else [])]))
     axis = target in ("X", "Y", "Z")
@@ -81,7 +66,7 @@ def _gauge_shape(rng: Generator, vertices: int, setups: list[str]) -> Parameters
     return direction | _sign(rng, vertices, setups)
 
 
-Grow = Callable[[float, Parameters], Parameters]
+Grow = Callable[[float, Shape], Shape]
 
 
 def _scaled(name: str, limit: float, *kept: str) -> Grow:
@@ -112,7 +97,7 @@ class Hideable:
         What is drawn beside the strength: which strut, which axis, which sign, which proportions.
     """
 
-    change: Callable[[HiddenMachine, Mapping[str, Any]], Parameters]
+    change: Callable[[HiddenMachine, Mapping[str, Any]], Shape]
     grow: Grow
     draw: Draw = _no_shape
 
@@ -166,38 +151,20 @@ CATALOGUE: dict[str, Hideable] = {
 }  # fmt: skip
 
 
-# What is drawn of an oddity beside its strength.
-ODDITY_SHAPES: dict[str, Callable[[Generator], Parameters]] = {
-    "screw_pitch_error": lambda rng: {
-        "wavelength": float(rng.uniform(0.08, 0.4)), "phase": float(rng.uniform(0.0, 2.0 * np.pi))
-    },
-    "warming_leg": lambda rng: {"strut": int(rng.integers(0, 6))},
-    "cable_drag": signed,
-    "strut_crosstalk": signed,
-}  # fmt: skip
-
-
-def draw_shape(name: str, rng: Generator, vertices: int, setups: list[str]) -> Parameters:
+def draw_shape(name: str, rng: Generator, vertices: int, setups: list[str]) -> Shape:
     """What is drawn of anything that can be hidden, beside its strength."""
-    if name in CATALOGUE:
-        return CATALOGUE[name].draw(rng, vertices, setups)
-    if name in UNKNOWNS:
-        return UNKNOWNS[name].shape(rng)
-    return ODDITY_SHAPES[name](rng) if name in ODDITY_SHAPES else {}
+    return CATALOGUE[name].draw(rng, vertices, setups) if name in CATALOGUE else OUTSIDE[name].shape(rng)
 
 
-def at_strength(name: str, shape: Parameters, strength: float) -> Parameters:
-    """Parameters in shop units, by the catalogue's names, for a strength in (0, 1]."""
+def at_strength(name: str, shape: Shape, strength: float) -> Shape:
+    """Shape in shop units, by the catalogue's names, for a strength in (0, 1]."""
     if name in CATALOGUE:
         return CATALOGUE[name].grow(strength, shape)
-    limit = UNKNOWNS[name].limit if name in UNKNOWNS else ODDITY_LIMITS[name]
-    return _scaled("size", limit, *(key for key in shape if key != "sign"))(strength, shape)
+    return _scaled("size", OUTSIDE[name].limit, *(key for key in shape if key != "sign"))(strength, shape)
 
 
 def with_effect(hidden: HiddenMachine, name: str, parameters: Mapping[str, Any]) -> HiddenMachine:
     """The machine with one more effect; parameters in shop units by the catalogue's names."""
     if name in CATALOGUE:
         return dataclasses.replace(hidden, **CATALOGUE[name].change(hidden, parameters))
-    if name in UNKNOWNS:
-        return dataclasses.replace(hidden, unknown=Unknown(name, parameters["size"], dict(parameters)))
-    return dataclasses.replace(hidden, oddity=Oddity(kind=name, **parameters))
+    return dataclasses.replace(hidden, unknown=Unknown(name, parameters["size"], dict(parameters)))

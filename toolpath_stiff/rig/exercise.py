@@ -9,7 +9,6 @@ and preceded by a keyed digest.
 from __future__ import annotations
 
 import csv
-import dataclasses
 import hashlib
 import hmac
 import io
@@ -24,27 +23,22 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.errors import FileError, InputError, InputErrors
+from toolpath_stiff.documents import to_dict
+from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import Content, read_bytes, read_text, write_atomically
-from toolpath_stiff.results_folder import Rules, check_folder, write_folder
-from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table
-from toolpath_stiff.rig.case import DrawnCase, again, clamp_of, draw_case
+from toolpath_stiff.results_folder import Rules, write_folder
+from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
+from toolpath_stiff.rig.case import DrawnCase, again, clamp_of, draw_case, rows_of
 from toolpath_stiff.rig.effects import CATALOGUE
-from toolpath_stiff.rig.hidden import LOOP_PATTERN, LOOP_WORDS, OUTSIDE, HiddenMachine, Nuisances, Oddity
+from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
+from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
 from toolpath_stiff.rig.unknown import Unknown
-from toolpath_stiff.rig.unknowns import UNKNOWNS
-from toolpath_stiff.units import m_from_mm, rad_from_deg
+from toolpath_stiff.rig.unknowns import OUTSIDE
 
 MAGIC = b"tps-rig-sealed-1\n"
-
-
 KEY = b"toolpath_stiff.rig: not a secret, only a blindfold"
-
-
 DIGEST = hashlib.sha256().digest_size
-
-
 BLOCK = 8192  # bytes; several times what one case needs
 
 
@@ -59,47 +53,30 @@ NUMBERS: dict[str, tuple[float, float, float | None]] = {
     "temperature_C": (-50.0, 100.0, 20.0),
     "length_mm": (1.0, 1e5, np.nan),
 }
-
-
-WHOLE = ("clamp",)
-
-
-LABELS = ("repeat", "point")  # any text
-
-
-WORDS = ("setup", "loop")
-
-
+TEXTS = {  # column -> what matches, in words as well
+    "direction": ("[XYZ]", "X, Y or Z"),
+    "loop": (LOOP_PATTERN, LOOP_WORDS),
+    "clamp": ("[0-9]{1,9}", "a whole number"),
+    **dict.fromkeys(("repeat", "point", "setup"), ("(?s).*", "any text")),
+}
 RESULTS = ("stiffness_N_per_mm", "sd_N_per_mm", "displacement_um")
 
 
 # Claims, verdicts of a diagnosis among them: that nothing is hidden, and that something is which the catalogue lacks.
 # Of a `described` effect the form was drawn from the readings: it is none of the catalogue.
 SOUND, OTHER = ("none", "adequate"), ("outside", "unexplained", "described")
-
-
 MEASUREMENTS, MACHINE, SEALED = FILES = "measurements.csv", "machine.toml", "sealed.bin"
-
-
 NO_OTHER = Rules(fresh=True)
 
 
-def seal(case: DrawnCase, seed: int, layout: str) -> bytes:
+def seal(case: DrawnCase) -> bytes:
     """Content of `sealed.bin`; the same case gives the same bytes."""
-    machine = {
-        field.name: value.tolist() if isinstance(value := getattr(case.machine, field.name), np.ndarray) else value
-        for field in dataclasses.fields(case.machine)
-    }
-    if case.machine.oddity is not None:
-        machine["oddity"] = dataclasses.asdict(case.machine.oddity)
-    if case.machine.unknown is not None:
-        machine["unknown"] = dataclasses.asdict(case.machine.unknown)
     content = {
-        "seed": seed,
-        "layout": layout,
+        "seed": case.seed,
+        "layout": case.layout,
         "truth": case.truth,
-        "machine": machine,
-        "nuisances": dataclasses.asdict(case.nuisances),
+        "machine": to_dict(case.machine),
+        "nuisances": to_dict(case.nuisances),
         "nominal": {"name": case.nominal.name, "text": case.nominal.text},
         "columns": list(case.rows),
         "clamps": int(max(case.rows.get("clamp", [0]))),
@@ -113,28 +90,19 @@ def seal(case: DrawnCase, seed: int, layout: str) -> bytes:
 
 def unseal(file: str | Path) -> tuple[DrawnCase, dict[str, Any]]:
     """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
-    try:
-        content = read_bytes(file, "the sealed truth")
-    except FileError as error:
-        raise InputError(error.found, hint="give the folder that `tps rig new` wrote") from None
+    content = read_bytes(file, "the sealed truth")
     digest = content[len(MAGIC) : len(MAGIC) + DIGEST]
     body = _scrambled(content[len(MAGIC) + DIGEST :], digest)
     if not content.startswith(MAGIC) or not hmac.compare_digest(digest, hmac.digest(KEY, body, "sha256")):
-        raise InputError(
-            "the seal is broken: the file was changed or is no sealed truth",
-            hint="make the exercise anew with `tps rig new`",
-            file=str(file),
-        )
+        raise InputError("the seal is broken: the file was changed or is no sealed truth", file=str(file))
     sealed: dict[str, Any] = json.loads(zlib.decompress(body[4 : 4 + int.from_bytes(body[:4], "big")]))
     machine: dict[str, Any] = {k: np.array(v) if isinstance(v, list) else v for k, v in sealed["machine"].items()}
     machine["spindle"] = tuple(sealed["machine"]["spindle"])
-    if sealed["machine"]["oddity"] is not None:
-        machine["oddity"] = Oddity(**sealed["machine"]["oddity"])
-    if sealed["machine"].get("unknown") is not None:
+    if sealed["machine"]["unknown"] is not None:
         machine["unknown"] = Unknown(**sealed["machine"]["unknown"])
     nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
-    case = DrawnCase({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"]))
-    return case, sealed
+    nuisances = Nuisances(**sealed["nuisances"])
+    return DrawnCase({}, sealed["truth"], nominal, HiddenMachine(**machine), nuisances), sealed
 
 
 def _scrambled(body: bytes, nonce: bytes) -> bytes:
@@ -152,7 +120,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
     claimed = set(claim) - set(SOUND)
     truth = set(hidden)
     if claimed & set(OTHER):
-        claimed = (claimed - set(OTHER)) | ((truth & {*OUTSIDE, *UNKNOWNS}) or {"outside"})
+        claimed = (claimed - set(OTHER)) | ((truth & {*OUTSIDE}) or {"outside"})
     if not truth:
         return "wrong" if claimed else "correctly none"
     if claimed == truth:
@@ -178,11 +146,14 @@ def read_plan(file: str, nominal: Nominal) -> Table:
     InputError, InputErrors
         Not a table of poses; or every bad cell and unreachable pose, named.
     """
-    lines = _rows(read_text(file, "the plan"), file)
+    reader = csv.reader(io.StringIO(read_text(file, "the plan"), newline=None))  # whatever the line ends are
+    try:
+        lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
+    except csv.Error as error:  # a quote that never ends, a cell beyond 131,072 characters
+        raise InputError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
     if len(lines) < 2:
         raise InputError("no poses", expected="a heading (x_mm,y_mm,z_mm,direction ...) and rows", file=file)
     (first, heading), body = lines[0], lines[1:]
-    heading = [name.strip() for name in heading]
     _check_heading(heading, file, first)
     errors: list[InputError] = []
     table: Table = {}
@@ -191,59 +162,50 @@ def read_plan(file: str, nominal: Nominal) -> Table:
             continue
         values = []
         for line, row in body:
-            cell = row[column].strip() if column < len(row) else ""
+            cell = row[column] if column < len(row) else ""
             try:
                 values.append(_value(name, cell))
             except ValueError as error:
                 errors.append(InputError(f"{name} {cell!r}", expected=str(error), file=file, line=line))
-        table[name] = values if name in (*LABELS, *WORDS, "direction") else np.array(values)
+        table[name] = np.array(values) if name == "clamp" or name in NUMBERS else values
     if errors:
         raise InputErrors(errors)
-    _check_rows(table, [line for line, _ in body], nominal, file)
+    rows = rows_of(table)
+    for fault, wrong in {
+        f"machine {nominal.name} cannot reach this pose": ~reachable(
+            nominal, rows.position, rows.angles, rows.extension
+        ),
+        "a direction of no length": ~np.isfinite(rows.direction).all(axis=1),
+    }.items():
+        errors += [InputError(fault, file=file, line=body[k][0]) for k in np.flatnonzero(wrong)]
+    if errors:
+        raise InputErrors(errors)
     return table
 
 
-def _rows(text: str, file: str) -> list[tuple[int, list[str]]]:
-    """Line and cells of every row that is not empty, whatever the line ends are."""
-    reader = csv.reader(io.StringIO(text, newline=None))
-    try:
-        return [(reader.line_num, row) for row in reader if any(row)]
-    except csv.Error as error:  # a quote that never ends, a cell beyond 131,072 characters
-        raise InputError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
-
-
 def _check_heading(heading: list[str], file: str, line: int) -> None:
-    known = (*NUMBERS, *WHOLE, *LABELS, *WORDS, *RESULTS, "direction")
+    known = (*NUMBERS, *TEXTS, *RESULTS)
+    fault = ""
     for name in heading:
         if name not in known or heading.count(name) > 1:
-            wrong = "unknown column" if name not in known else "column given twice:"
-            raise InputError(f"{wrong} {name!r}", expected=", ".join(known), file=file, line=line)
-    vectors = [name for name in ("dx", "dy", "dz") if name in heading]
-    if ("direction" in heading) == bool(vectors) or len(vectors) not in (0, 3):
-        raise InputError("directions unclear", expected="either direction or dx,dy,dz", file=file, line=line)
-    for name in POSE[:3]:
-        if name not in heading:
-            raise InputError(f"column {name} is missing", expected="x_mm,y_mm,z_mm", file=file, line=line)
+            fault = f"unknown column {name!r}" if name not in known else f"column given twice: {name!r}"
+    missing = [name for name in POSE[:3] if name not in heading]
+    vectors = sum(name in heading for name in ("dx", "dy", "dz"))
+    if missing:
+        fault = f"column {missing[0]} is missing"
+    elif vectors != (0 if "direction" in heading else 3):
+        fault = "directions unclear: either direction or dx,dy,dz"
+    if fault:
+        raise InputError(fault, expected=f"columns of {', '.join(known)}", file=file, line=line)
 
 
 def _value(name: str, cell: str) -> float | int | str:
     """The value of a cell; ValueError says what was expected."""
-    if name == "direction":
-        if cell not in AXES:
-            raise ValueError("X, Y or Z")
-        return cell
-    if name == "loop":
-        if not LOOP_PATTERN.fullmatch(cell):
-            raise ValueError(LOOP_WORDS)
-        return cell
-    if name in LABELS:
-        return cell
-    if name == "setup":
-        return cell or DEFAULT_SETUP
-    if name in WHOLE:
-        if not re.fullmatch("[0-9]{1,9}", cell):
-            raise ValueError("a whole number")
-        return int(cell)
+    if name in TEXTS:
+        pattern, expected = TEXTS[name]
+        if not re.fullmatch(pattern, cell):
+            raise ValueError(expected)
+        return int(cell) if name == "clamp" else cell or (DEFAULT_SETUP if name == "setup" else "")
     low, high, default = NUMBERS[name]
     if not cell and default is not None:
         return default
@@ -256,51 +218,27 @@ def _value(name: str, cell: str) -> float | int | str:
     return value
 
 
-def _check_rows(table: Table, lines: list[int], nominal: Nominal, file: str) -> None:
-    """Directions that are none and poses that the machine cannot take."""
-    count = len(lines)
-    poses = np.column_stack([table.get(name, np.zeros(count)) for name in POSE])
-    extension = m_from_mm(np.asarray(table.get("tool_extension_mm", np.zeros(count))))
-    reached = reachable(nominal, m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), extension)
-    errors = [
-        InputError(f"machine {nominal.name} cannot reach this pose", file=file, line=line)
-        for line, good in zip(lines, reached, strict=True)
-        if not good
-    ]
-    if "dx" in table:
-        length = np.linalg.norm([table[name] for name in ("dx", "dy", "dz")], axis=0)
-        errors += [
-            InputError("a direction of no length", expected="dx, dy, dz not all 0", file=file, line=line)
-            for line, size in zip(lines, length, strict=True)
-            if size < 1e-9
-        ]
-    if errors:
-        raise InputErrors(errors)
-
-
-def new_exercise(
-    folder: str | Path,
+def blind_case(
     seed: int,
     layout: str = "tilted",
     hidden: str | None = None,
     noise: float = 0.02,
     machine: str = defaults.MACHINE,
     plan_file: str | None = None,
-    rules: Rules = NO_OTHER,
-) -> int:
+) -> DrawnCase:
+    """A case as of `draw_case`, with the poses of a file. Raises `InputError`."""
+    nominal = load_nominal(machine)
+    return draw_case(seed, layout, hidden, noise, nominal, None if plan_file is None else read_plan(plan_file, nominal))
+
+
+def new_exercise(folder: str | Path, case: DrawnCase, rules: Rules = NO_OTHER) -> int:
     """Write a blind exercise; returns the number of rows. Raises `InputError`; then nothing is written.
 
     `rules`: what must not be replaced. An exercise in the folder is not, by default: its sealed truth would be lost.
     """
-    check_folder(folder, FILES, rules)
-    nominal = load_nominal(machine)
-    plan = None if plan_file is None else read_plan(plan_file, nominal)
-    case = draw_case(seed, layout, hidden, noise, nominal, plan)
     contents: dict[str, Content] = {
-        MACHINE: nominal.text,
-        MEASUREMENTS: csv_text(case.rows),
-        SEALED: seal(case, seed, layout),
-    }
+        MACHINE: case.nominal.text, MEASUREMENTS: csv_text(case.rows), SEALED: seal(case),
+    }  # fmt: skip
     write_folder(folder, contents, command="rig new", rules=rules)
     return len(case.rows["x_mm"])
 
@@ -335,7 +273,7 @@ def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
     """What was hidden, and how the claim scores: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
-    known = (*SOUND, *OTHER, *CATALOGUE, *OUTSIDE, *UNKNOWNS)
+    known = (*SOUND, *OTHER, *CATALOGUE, *OUTSIDE)
     for name in claims:
         if name not in known:
             raise InputError(f"a claim {name!r}", expected=f"one or several of {', '.join(known)}")

@@ -1,19 +1,13 @@
 """The hidden machine: everything in which the true machine differs from the nominal one, and what it then shows.
 
 `HiddenMachine` holds the differences; all of them zero is the nominal machine. `true_stiffness` turns it and the
-rows of a campaign into stiffnesses, `readings` adds what the instruments do to them.
-
-Oddities are physics that no effect of the catalogue describes, for testing the verdict "something else is missing".
-Each is one formula on struts, joints, table or readings; `size` scales it. They are invented for the purpose, with
-the shapes that damaged or badly set machines show; no source gives figures for them.
-
-`Nuisances` are what every real campaign adds, whether or not something is hidden.
+rows of a campaign into stiffnesses, `readings` adds what the instruments do to them. `Nuisances` are what every real
+campaign adds, whether or not something is hidden.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -23,127 +17,15 @@ from numpy.random import Generator
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.nominal import Nominal, commanded_lengths, platform_points, rotations, true_poses
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import Geometry, Links, secant_compliance
+from toolpath_stiff.rig.structure import End, Geometry, Links, solved
 from toolpath_stiff.rig.unknown import CommandedRows, Unknown
-from toolpath_stiff.rig.unknowns import UNKNOWNS
+from toolpath_stiff.rig.unknowns import OUTSIDE
 from toolpath_stiff.units import n_per_m_from_n_per_mm, n_per_mm_from_n_per_m
 
-REACH = 0.3  # m, half the width of the workspace that the paper measured
-
-
-REFERENCE_LOAD = 1000.0  # N
-
-
-# Name -> what it is. The second group needs columns (time, several loads) that only some campaigns have.
-ODDITIES = {
-    "loose_preload": "joints softer in tension than in compression",
-    "screw_pitch_error": "strut stiffness varies periodically with length",
-    "cracked_bed": "the workpiece side gives way where y is positive only",
-    "ball_screw_torsion": "struts softer towards positive x, as if their screws twisted with the carriage",
-    "strut_crosstalk": "the load of strut 1 moves strut 4 and the other way round",
-    "saddle_overhang": "the workpiece side gives way along X, growing with the square of y",
-    "cable_drag": "a cable pulls along X in proportion to x, and the gauge reads it",
-}
-
-
-ODDITIES_IN_TIME = {
-    "warming_leg": "one strut softens in the course of the campaign",
-    "joint_friction": "sticking joints: stiffer at small loads",
-}
-
-
-OUTSIDE = (*ODDITIES, *ODDITIES_IN_TIME)
-
-
 HERTZ_LOAD = 500.0  # N, load at which contact_nonlinearity's compliance is quoted (assumed; effects catalogue)
-
-
 SLACK_LOAD = 0.1  # N, below which a joint's secant compliance is held: far below any load of a campaign
-
-
-# Resolution of what is printed: whole N/mm, as in the paper's Table 1 (published).
-PRINTED_N_PER_MM = 1.0
-
-
-LOOP_PATTERN = re.compile(
-    r"|tip|spindle|platform|table|strut [1-6]( alone)?|joint [1-6]( (platform|frame))?|frame [1-3]( (radial|vertical))?"
-)
-
-
-LOOP_WORDS = "tip, spindle, platform, table, strut 1 (alone), joint 1 (platform, frame), frame 1 (radial, vertical)"
-
-
-@dataclass(frozen=True)
-class Oddity:
-    """One of the oddities.
-
-    Attributes
-    ----------
-    kind
-        Its name.
-    size
-        Relative change (1: 100 %), or compliance in m/N for `loose_preload`, `cracked_bed`, `saddle_overhang`.
-    strut
-        Number of the strut concerned, from 0 (`warming_leg`).
-    wavelength, phase
-        m and rad, of `screw_pitch_error`.
-    """
-
-    kind: str
-    size: float
-    strut: int = 0
-    wavelength: float = 0.15
-    phase: float = 0.0
-
-
-def strut_block(odd: Oddity | None, stiffness: FloatArray, lengths: FloatArray, rows: Rows) -> FloatArray:
-    """(n, 6, 6) N/m from the struts' own stiffnesses (n, 6)."""
-    factor: FloatArray = np.ones(stiffness.shape)
-    if odd is not None and odd.kind == "screw_pitch_error":
-        factor += odd.size * np.sin(2.0 * np.pi * lengths / odd.wavelength + odd.phase)
-    if odd is not None and odd.kind == "ball_screw_torsion":
-        # Compliance greater by `size` at the right edge of the workspace, by less and less towards the left.
-        factor /= 1.0 + odd.size * np.exp(rows.position[:, :1] / REACH - 1.0)
-    if odd is not None and odd.kind == "warming_leg":
-        factor[:, odd.strut] = 1.0 / (1.0 + odd.size * rows.elapsed)
-    block = (stiffness * factor)[:, :, None] * np.eye(6)
-    if odd is not None and odd.kind == "strut_crosstalk":
-        # Flexibility with an off-diagonal term; below 1 the block stays positive definite.
-        first, second = 0, 3  # struts 1 and 4
-        coupled = odd.size * np.sqrt(1.0 / (stiffness[:, first] * stiffness[:, second]))
-        flexibility = (1.0 / stiffness)[:, :, None] * np.eye(6)
-        flexibility[:, first, second] = flexibility[:, second, first] = coupled
-        return np.asarray(np.linalg.inv(flexibility))
-    return block
-
-
-def extra_joint(odd: Oddity | None, forces: FloatArray) -> FloatArray:
-    """(n, 6) m/N along the struts, for strut forces (n, 6) N, tension positive."""
-    if odd is None or odd.kind != "loose_preload":
-        return np.zeros_like(forces)
-    return np.where(forces > 0.0, odd.size, 0.0)
-
-
-def extra_table(odd: Oddity | None, rows: Rows) -> FloatArray:
-    """(n, 3) m/N along the base axes, on the workpiece side."""
-    extra = np.zeros((len(rows.force), 3))
-    y = rows.position[:, 1]
-    if odd is not None and odd.kind == "cracked_bed":
-        extra[:, :2] = np.where(y > 0.0, odd.size, 0.0)[:, None]
-    if odd is not None and odd.kind == "saddle_overhang":
-        extra[:, 0] = odd.size * (y / REACH) ** 2
-    return extra
-
-
-def reading_factor(odd: Oddity | None, rows: Rows) -> FloatArray:
-    """(n,) on the stiffness that is read."""
-    factor = np.ones(len(rows.force))
-    if odd is not None and odd.kind == "cable_drag":
-        factor += odd.size * rows.position[:, 0] / REACH * np.abs(rows.direction[:, 0])
-    if odd is not None and odd.kind == "joint_friction":
-        # Friction carries a share of the load that shrinks as the load grows.
-        factor += odd.size * REFERENCE_LOAD / (REFERENCE_LOAD + rows.force)
-    return factor
+PRINTED_N_PER_MM = 1.0  # resolution of what is printed: whole N/mm, as in the paper's Table 1 (published)
+AXES = np.eye(3)
 
 
 def _zeros(*shape: int) -> FloatArray:
@@ -184,8 +66,8 @@ class HiddenMachine:
         `X`, `Y`, `Z` or the name of a set-up, whose readings are multiplied.
     drift
         m/s of the indicator.
-    oddity, unknown
-        Something outside the catalogue: one of the oddities here, or one of `unknowns`.
+    unknown
+        Something outside the catalogue.
     """
 
     frame_errors: FloatArray = field(default_factory=lambda: _zeros(6, 3))
@@ -209,7 +91,6 @@ class HiddenMachine:
     gauge_target: str = ""
     gauge_factor: float = 1.0
     drift: float = 0.0
-    oddity: Oddity | None = None
     unknown: Unknown | None = None
 
 
@@ -217,8 +98,8 @@ def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m that the gauge and the indicator show, before noise: k = factor F / (F / k_true + drift t)."""
     stiffness = true_stiffness(nominal, hidden, rows)
     shown = rows.force / (rows.force / stiffness + hidden.drift * rows.time)
-    shown = shown * _gauge(hidden, rows) * reading_factor(hidden.oddity, rows)
-    if hidden.unknown is not None and (read := UNKNOWNS[hidden.unknown.kind].read) is not None:
+    shown = shown * _gauge(hidden, rows)
+    if hidden.unknown is not None and (read := OUTSIDE[hidden.unknown.kind].read) is not None:
         shown = shown * read(rows, hidden.unknown)
     return np.asarray(shown)
 
@@ -226,28 +107,22 @@ def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
 def true_stiffness(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m, secant stiffness between tool and workpiece along the load."""
     first, which = _distinct(hidden, rows)
-    return np.asarray(_stiffness_row_by_row(nominal, hidden, rows.take(first))[which])
+    distinct = rows.take(first)
+    place, links = assembled(nominal, hidden, distinct)
+    return np.asarray(1.0 / solved(place, links, distinct.direction, distinct.force).compliance)[which]
 
 
 def _distinct(hidden: HiddenMachine, rows: Rows) -> tuple[IntArray, IntArray]:
     """First row of each mechanical state and the state of each row: repeats are solved once."""
     states = [rows.position, rows.angles, rows.direction, rows.extension[:, None]]
     states.append(np.unique(rows.setup, return_inverse=True)[1].reshape(-1, 1).astype(float))
-    odd = hidden.oddity.kind if hidden.oddity else ""
     if hidden.hertz or hidden.clearance:
         states.append(rows.force[:, None])
-    if odd == "warming_leg":
-        states.append(rows.elapsed[:, None])
     if hidden.unknown is not None:
-        varies = UNKNOWNS[hidden.unknown.kind].varies
+        varies = OUTSIDE[hidden.unknown.kind].varies
         states += [np.asarray(getattr(rows, name), dtype=float)[:, None] for name in varies]
     _, first, which = np.unique(np.concatenate(states, axis=1), axis=0, return_index=True, return_inverse=True)
     return first, which.ravel()
-
-
-def _stiffness_row_by_row(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
-    place, links = assembled(nominal, hidden, rows)
-    return np.asarray(1.0 / secant_compliance(place, links, rows.direction, rows.force))
 
 
 def assembled(
@@ -258,17 +133,14 @@ def assembled(
     lengths = commanded_lengths(nominal, rows.position, turned, rows.extension)
     place = _true_geometry(nominal, hidden, rows, turned, lengths)
     links = Links(
-        struts=_struts(nominal, hidden, rows, lengths if struts is None else np.where(struts > 0.0, struts, lengths)),
+        struts=_struts(nominal, hidden, lengths if struts is None else np.where(struts > 0.0, struts, lengths)),
         joints=_joint_law(hidden),
         moment=hidden.moment,
         bars=hidden.bars,
-        spindle=_spindle(nominal, hidden, rows),
         vertices=hidden.vertices[: nominal.vertices.max() + 1],
-        table=hidden.table + extra_table(hidden.oddity, rows),
-        rocking=hidden.rocking,
-        setup=np.where((rows.setup == hidden.setup)[:, None] & bool(hidden.setup), hidden.setup_compliance, 0.0),
+        ends=_ends(nominal, hidden, rows, place),
     )
-    if hidden.unknown is not None and (act := UNKNOWNS[hidden.unknown.kind].act) is not None:
+    if hidden.unknown is not None and (act := OUTSIDE[hidden.unknown.kind].act) is not None:
         links = act(links, CommandedRows(nominal, rows, lengths, place), hidden.unknown)
     return place, links
 
@@ -278,7 +150,7 @@ def _true_geometry(
 ) -> Geometry:
     """Where joints and tip are when struts of the commanded lengths carry the true platform on the true frame."""
     frame = nominal.frame_joints + hidden.frame_errors
-    if hidden.unknown is not None and (move := UNKNOWNS[hidden.unknown.kind].move) is not None:
+    if hidden.unknown is not None and (move := OUTSIDE[hidden.unknown.kind].move) is not None:
         frame = frame + move(hidden.unknown)
     platform = nominal.platform_joints + hidden.platform_errors
     radius = np.linalg.norm(nominal.platform_joints[:, :2], axis=1, keepdims=True)
@@ -296,13 +168,13 @@ def _true_geometry(
     )
 
 
-def _struts(nominal: Nominal, hidden: HiddenMachine, rows: Rows, lengths: FloatArray) -> FloatArray:
-    """(n, 6, 6) N/m: the paper's law, linear in length (its equation 5), with curvature, spread and oddities."""
+def _struts(nominal: Nominal, hidden: HiddenMachine, lengths: FloatArray) -> FloatArray:
+    """(n, 6, 6) N/m: the paper's law, linear in length (its equation 5), with curvature and spread."""
     l1, l2 = nominal.law_ends
     s = (lengths - l1) / (l2 - l1)
     # The exponential keeps strongly curved laws positive beyond the two lengths.
     law = _law(nominal, lengths) * np.exp(hidden.curvature * 4.0 * s * (1.0 - s))
-    return strut_block(hidden.oddity, law * hidden.strut_factors, lengths, rows)
+    return np.asarray((law * hidden.strut_factors)[:, :, None] * np.eye(6))
 
 
 def _law(nominal: Nominal, lengths: FloatArray) -> FloatArray:
@@ -321,18 +193,29 @@ def _joint_law(hidden: HiddenMachine) -> Callable[[FloatArray], FloatArray]:
     def secant(forces: FloatArray) -> FloatArray:
         size = np.maximum(np.abs(forces), SLACK_LOAD)
         contact = hidden.hertz * np.cbrt(HERTZ_LOAD / size)
-        return np.asarray(hidden.joint + contact + hidden.clearance / size + extra_joint(hidden.oddity, forces))
+        return np.asarray(hidden.joint + contact + hidden.clearance / size)
 
     return secant
 
 
-def _spindle(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
-    """(n, 3) m/N in platform axes."""
+def _ends(nominal: Nominal, hidden: HiddenMachine, rows: Rows, place: Geometry) -> tuple[End, ...]:
+    """Spindle in platform axes; table, its rocking about the base frame's x and y through its origin, and set-up."""
+    n = len(rows.force)
     radial, axial = hidden.spindle
-    grown = np.ones(len(rows.force))
+    grown = np.ones(n)
     if nominal.tool_length > 0.0:
         grown = (1.0 + rows.extension / nominal.tool_length) ** hidden.overhang_exponent
-    return np.stack([radial * grown, radial * grown, np.full(len(grown), axial)], axis=1)
+    here = (rows.setup == hidden.setup) & bool(hidden.setup)
+    along = [np.broadcast_to(axis, (n, 3)) for axis in AXES]
+    return (
+        *(
+            End("spindle", place.rotation[:, :, j], c)
+            for j, c in enumerate((radial * grown,) * 2 + (np.full(n, axial),))
+        ),
+        *(End("table", along[j], np.full(n, hidden.table[j])) for j in range(3)),
+        *(End("table", np.cross(AXES[j], place.work_point), np.full(n, hidden.rocking)) for j in range(2)),
+        *(End("table", along[j], np.where(here, hidden.setup_compliance[j], 0.0)) for j in range(3)),
+    )
 
 
 def _gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:
@@ -401,8 +284,3 @@ def disturb_readings(stiffness: FloatArray, clamps: IntArray, nuisances: Nuisanc
         return np.asarray(shown)
     printed = np.round(n_per_mm_from_n_per_m(shown) / PRINTED_N_PER_MM) * PRINTED_N_PER_MM
     return np.asarray(n_per_m_from_n_per_mm(printed))
-
-
-def reading_sd(stiffness: FloatArray, nuisances: Nuisances) -> FloatArray:
-    """(n,) N/m, one reading's standard deviation, re-clamping included, as an experimenter would state it."""
-    return np.asarray(stiffness * np.hypot(nuisances.repeat, nuisances.clamping))

@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 
 
 TIP = ("", "tip")
+LOOP_PATTERN = (
+    r"|tip|spindle|platform|table|strut [1-6]( alone)?|joint [1-6]( (platform|frame))?|frame [1-3]( (radial|vertical))?"
+)
+LOOP_WORDS = "tip, spindle, platform, table, strut 1 (alone), joint 1 (platform, frame), frame 1 (radial, vertical)"
 
 
 # An indicator on its stand, one sd of a reading in m, and the load with the indicator's slant, relative; assumed.
@@ -50,19 +54,18 @@ def true_displacements(
 def _read(k: int, loop: str, place: Geometry, links: Links, rows: Rows, solution: Solved) -> float:
     kind, *rest = loop.split()
     unknowns, first = solution.moved[k], solution.platform_dofs
-    vertices = first + 6
-    spindle = vertices + links.vertices.size
-    table, direction = spindle + 3, rows.direction[k]
-    nose = float(direction @ place.rotation[k] @ unknowns[spindle:table])
+    ends, direction = first + 6 + links.vertices.size, rows.direction[k]
+
+    def give(link: str) -> float:
+        moved = zip(links.ends, unknowns[ends:], strict=True)
+        return float(sum(direction @ end.lever[k] * size for end, size in moved if end.link == link))
+
     if kind in TIP:
         return float(solution.compliance[k])
-    if kind == "spindle":
-        return nose
+    if kind in ("spindle", "table"):
+        return give(kind)
     if kind == "platform":
-        return float(solution.compliance[k]) - nose
-    if kind == "table":
-        rocked = np.cross(place.work_point[k], direction)[:2] @ unknowns[table + 3 : table + 5]
-        return float(direction @ (unknowns[table : table + 3] + unknowns[table + 5 : table + 8]) + rocked)
+        return float(solution.compliance[k]) - give("spindle")
     number = int(rest[0]) - 1
     if kind == "strut" and rest[1:]:
         return float(np.linalg.inv(links.struts[k])[number, number])
@@ -70,7 +73,7 @@ def _read(k: int, loop: str, place: Geometry, links: Links, rows: Rows, solution
         return float(solution.stretch[k, number] @ unknowns)
     if kind == "joint":  # the rig's joint is one element: each end of the strut gives half
         return float(unknowns[first + number]) * (0.5 if rest[1:] else 1.0)
-    return _vertex(k, number, "".join(rest[1:]), place, direction, unknowns[vertices:spindle])
+    return _vertex(k, number, "".join(rest[1:]), place, direction, unknowns[first + 6 : ends])
 
 
 def _vertex(k: int, number: int, way: str, place: Geometry, direction: FloatArray, unknowns: FloatArray) -> float:

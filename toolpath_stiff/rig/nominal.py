@@ -9,9 +9,7 @@ geometry, commands a pose.
 from __future__ import annotations
 
 import math
-from copy import deepcopy
 from dataclasses import dataclass
-from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -24,9 +22,6 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_text
 from toolpath_stiff.toml_reader import TomlReader
 from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_um, rad_from_deg
-
-SECTIONS = ("platform", "limits", "reference_tool", "strut_law", "frame_joints", "platform_joints")  # read here
-
 
 # Joints of one vertex of the frame lie within this angle about the machine's axis; vertices are far more apart.
 VERTEX_WIDTH = rad_from_deg(15.0)
@@ -99,115 +94,80 @@ def load_nominal(machine: str = defaults.MACHINE) -> Nominal:
     if machine.endswith(".toml") or "/" in machine:
         return parse_nominal(read_text(machine, "the machine file"), machine)
     folder = resources.files("toolpath_stiff") / "data" / "machines"
-    packaged = folder / f"{machine}.toml"
-    if not packaged.is_file():
-        names = sorted(Path(item.name).stem for item in folder.iterdir() if item.name.endswith(".toml"))
+    names = sorted(Path(item.name).stem for item in folder.iterdir() if item.name.endswith(".toml"))
+    if machine not in names:
         raise InputError(f"no machine {machine!r}", expected=f"{', '.join(names)}, or a file ending in .toml")
-    return deepcopy(_packaged(machine))  # its arrays are the caller's own
-
-
-@cache
-def _packaged(machine: str) -> Nominal:
-    """A machine that ships with the package, read once."""
-    file = f"{machine}.toml"
-    return parse_nominal((resources.files("toolpath_stiff") / "data" / "machines" / file).read_text("utf-8"), file)
+    return parse_nominal((folder / f"{machine}.toml").read_text("utf-8"), f"{machine}.toml")
 
 
 def parse_nominal(text: str, file: str) -> Nominal:
     """Nominal machine from the text of a machine file; `file` names it in messages. Raises `InputError`."""
     toml = TomlReader(text, file)
-    table = toml.data
-    for name in SECTIONS:
-        _section(toml, name)
     for kind in ("effect", "instrument"):
-        if table.get(kind):
-            raise InputError(
-                f"the machine carries [[{kind}]] already",
-                expected="a nominal machine",
-                hint="take the effects out; the rig adds its own hidden one",
-                file=file,
-                line=toml.line_of(kind),
-            )
-    bars = table.get("platform", {}).get("bar_stiffness_N_per_m", math.inf)
-    if bars != math.inf:
-        raise toml.error(
-            f"[platform] bar_stiffness_N_per_m = {bars}",
-            "inf",
-            "the rig's nominal platform is rigid; a flexible one is the hidden effect platform_flexibility",
-            where="platform.bar_stiffness_N_per_m",
-        )
-    angles = _section(toml, "limits.joint_angle")
-    neutral = _numbers(toml, "limits.joint_angle", "neutral_pose_mm_deg", 6) if angles else np.zeros(6)
-    lengths, stiffnesses = _law(toml)
+        if toml.data.get(kind):
+            hint = "take the effects out; the rig adds its own hidden one"
+            fault, line = f"the machine carries [[{kind}]] already", toml.line_of(kind)
+            raise InputError(fault, expected="a nominal machine", hint=hint, file=file, line=line)
+    bars = _value(toml, "platform.bar_stiffness_N_per_m")
+    if bars not in (None, math.inf):
+        hint = "the rig's nominal platform is rigid; a flexible one is the hidden effect platform_flexibility"
+        where = "platform.bar_stiffness_N_per_m"
+        raise toml.error(f"{where} = {bars}", "inf", hint, where=where)
+    if _value(toml, "strut_law.length_mm") is None:  # the same at every length
+        lengths, stiffnesses = np.zeros(1), _numbers(toml, "strut_law.stiffness_N_per_um")[None]
+    else:
+        lengths = m_from_mm(_numbers(toml, "strut_law.length_mm", -1))
+        stiffnesses = _numbers(toml, "strut_law.stiffness_N_per_um", len(lengths))
+        if len(lengths) < 2 or (len(lengths) > 2 and not (np.diff(lengths) > 0.0).all()):
+            raise toml.error("strut_law.length_mm", "two or more lengths, rising", where="strut_law.length_mm")
+    swing, neutral = None, np.zeros(6)
+    if _value(toml, "limits.joint_angle"):
+        neutral = _numbers(toml, "limits.joint_angle.neutral_pose_mm_deg", 6)
+        frame, platform = (_numbers(toml, f"limits.joint_angle.{end}_max_deg") for end in ("frame", "platform"))
+        swing = rad_from_deg(float(frame)), rad_from_deg(float(platform))
+    shortest, longest = (_numbers(toml, f"limits.strut_length.{end}_mm") for end in ("min", "max"))
     return Nominal(
-        name=str(table.get("name", "machine")),
+        name=str(toml.data.get("name", "machine")),
         text=text,
         frame_joints=_joints(toml, "frame_joints"),
         platform_joints=_joints(toml, "platform_joints"),
-        tool_length=m_from_mm(float(_numbers(toml, "reference_tool", "length_mm", 1)[0])),
+        tool_length=m_from_mm(float(_numbers(toml, "reference_tool.length_mm"))),
         law_lengths=lengths,
-        law_stiffnesses=stiffnesses,
-        strut_range=(
-            m_from_mm(float(_numbers(toml, "limits.strut_length", "min_mm", 1)[0])),
-            m_from_mm(float(_numbers(toml, "limits.strut_length", "max_mm", 1)[0])),
-        ),
-        swing=None
-        if not angles
-        else (
-            rad_from_deg(float(_numbers(toml, "limits.joint_angle", "frame_max_deg", 1)[0])),
-            rad_from_deg(float(_numbers(toml, "limits.joint_angle", "platform_max_deg", 1)[0])),
-        ),
+        law_stiffnesses=n_per_m_from_n_per_um(stiffnesses),
+        strut_range=(m_from_mm(float(shortest)), m_from_mm(float(longest))),
+        swing=swing,
         neutral_pose=np.concatenate([m_from_mm(neutral[:3]), rad_from_deg(neutral[3:])]),
     )
 
 
-def _section(toml: TomlReader, name: str) -> dict[str, Any]:
-    """A table by its dotted name, empty where there is none. Raises `InputError`."""
-    content = toml.data
-    for part in name.split("."):
-        content = toml.table(name, content.get(part, {}), f"a section [{name}]")
-    return content
+def _value(toml: TomlReader, where: str) -> Any:
+    """What stands under a dotted name; None where nothing does."""
+    value: Any = toml.data
+    for part in where.split("."):
+        value = value.get(part) if isinstance(value, dict) else None
+    return value
 
 
-def _numbers(toml: TomlReader, section: str, key: str, count: int) -> FloatArray:
-    """(count,) the numbers under a key."""
-    given = _section(toml, section).get(key)
+def _numbers(toml: TomlReader, where: str, *shape: int) -> FloatArray:
+    """The finite numbers under a dotted name, in an array of that shape; -1: of any length. Raises `InputError`."""
+    value = _value(toml, where)
     try:
-        values = np.atleast_1d(np.asarray(given, dtype=float))
+        numbers = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        values = np.array([math.nan])
-    if values.shape != (count,) or not np.isfinite(values).all():
-        words = f"{key} = {'missing' if given is None else repr(given)}"
-        raise toml.error(words, f"{count} number{'s' * (count > 1)}", where=f"{section}.{key}")
-    return values
-
-
-def _law(toml: TomlReader) -> tuple[FloatArray, FloatArray]:
-    """(p,) m and (p,) N/m of the strut law: a stiffness for each of two or more lengths, or one without a length."""
-    lengths, stiffnesses = (_section(toml, "strut_law").get(key) for key in ("length_mm", "stiffness_N_per_um"))
-    if lengths is None and not isinstance(stiffnesses, list):
-        constant = n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", 1))
-        return np.zeros(1), constant
-    count = max(2, len(lengths) if isinstance(lengths, list) else 0)
-    points = m_from_mm(_numbers(toml, "strut_law", "length_mm", count))
-    if count > 2 and not (np.diff(points) > 0.0).all():
-        raise toml.error(f"length_mm = {lengths!r}", "rising lengths", where="strut_law.length_mm")
-    return points, n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", count))
+        numbers = np.array(math.nan)
+    fits = len(numbers.shape) == len(shape) and all(a in (b, -1) for a, b in zip(shape, numbers.shape, strict=True))
+    if not fits or not np.isfinite(numbers).all():
+        count = " x ".join(map(str, shape)).replace("-1", "some") or "one"
+        raise toml.error(f"{where} = {'missing' if value is None else repr(value)}", f"{count} numbers", where=where)
+    return numbers
 
 
 def _joints(toml: TomlReader, section: str) -> FloatArray:
     """(6, 3) m, joints given as x, y, z or as radius, angle, height."""
-    content = _section(toml, section)
-    rows = content.get("mm", content.get("cylindrical_mm_deg"))
-    try:
-        joints = np.asarray(rows, dtype=float)
-    except (TypeError, ValueError):
-        joints = np.empty(0)
-    if joints.shape != (6, 3) or not np.isfinite(joints).all():
-        raise toml.error(f"[{section}] has no six joints", "mm or cylindrical_mm_deg, 6 rows of 3", where=section)
-    if "mm" in content:
-        return m_from_mm(joints)
-    radius, angle, height = m_from_mm(joints[:, 0]), rad_from_deg(joints[:, 1]), m_from_mm(joints[:, 2])
+    if _value(toml, f"{section}.mm") is not None:
+        return m_from_mm(_numbers(toml, f"{section}.mm", 6, 3))
+    radius, angle, height = _numbers(toml, f"{section}.cylindrical_mm_deg", 6, 3).T
+    radius, angle, height = m_from_mm(radius), rad_from_deg(angle), m_from_mm(height)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
 
 

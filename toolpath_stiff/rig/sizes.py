@@ -14,10 +14,11 @@ import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.rig.effects import Parameters, at_strength, draw_shape, with_effect
+from toolpath_stiff.rig.effects import at_strength, draw_shape, with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
+from toolpath_stiff.rig.unknown import Shape
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 LARGEST = 0.30  # rms change of ln stiffness
@@ -48,7 +49,7 @@ class Scale:
         return np.where(np.abs(change) <= LARGEST_SINGLE, change, math.inf)
 
     def draw(self, name: str, size: float | None, rng: Generator) -> tuple[dict[str, Any], dict[str, float]]:
-        """Parameters, and their size and detectability."""
+        """Shape, and their size and detectability."""
         shape = draw_shape(name, rng, self.vertices, self.setups)
         fraction = rng.random()
         strength, change = self._reach(name, shape, 0.03)
@@ -68,7 +69,7 @@ class Scale:
         figures = {"size": _rms(change), "detectability": self._detectability(change)}
         return parameters, {key: float(f"{value:.6g}") for key, value in figures.items()}
 
-    def _reach(self, name: str, shape: Parameters, size: float, start: float = 0.02) -> tuple[float, FloatArray]:
+    def _reach(self, name: str, shape: Shape, size: float, start: float = 0.02) -> tuple[float, FloatArray]:
         """Strength in (0, 1] at which the rms change is `size` within 2 %, and that change; 1 if no strength does.
 
         The change grows about in proportion to the strength, so scaling the strength by what is missing converges.

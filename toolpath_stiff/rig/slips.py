@@ -15,13 +15,14 @@ import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import Nominal, reachable
 from toolpath_stiff.rig.sizes import scale_of
+from toolpath_stiff.rig.unknown import Shape
 from toolpath_stiff.units import MM_PER_INCH
 
 # Kind -> what was done.
@@ -35,47 +36,27 @@ SLIPS = {
     "pose_1_deg": "an angle off by 1 degree",
     "pose_5_deg": "an angle off by 5 degrees",
 }
-
-
 N_PER_LBF = 4.4482216152605  # exact: 0.45359237 kg (international pound, 1959) times 9.80665 m/s2 (CGPM 1901)
-
-
 WRITTEN_PER_N_PER_MM = {"lbf_per_in": MM_PER_INCH / N_PER_LBF, "N_per_um": 1e-3}
-
-
 WRONG_BY = {"pose_10_mm": 10.0, "pose_1_deg": 1.0, "pose_5_deg": 5.0}  # mm or degrees
-
-
 SMALLEST_ANGLE, SMALLEST_COORDINATE = 3.0, 30.0  # degrees, mm: a wrong sign of less is hardly a mistake (assumed)
-
-
 TRIES = 200  # draws until the written pose is one that the machine can reach
-
-
 # Whitened length of a slip that is found with 80 % power at 5 % among all slips of all rows of a tilted campaign, some
 # 6000: z(1 - 0.05/6000/2) + z(0.8) = 4.46 + 0.84 (normal quantiles, Bonferroni).
 VISIBLE = 5.3
 
 
-def with_slip(
-    table: Mapping[str, Any],
-    nominal: Nominal,
-    rng: Generator,
-    kind: str | None = None,
-    nuisances: Nuisances | None = None,
-) -> tuple[Table, dict[str, Any]]:
-    """A measured table with one slip in it.
+def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = None) -> tuple[Table, Shape]:
+    """A measured table of a case with one slip in it.
 
-    Parameters
+    Shape
     ----------
+    case
+        Its nominal machine keeps poses reachable; with its nuisances for the size of the slip.
     table
         A table with `stiffness_N_per_mm`.
-    nominal
-        To keep poses reachable, and for the size of the slip.
     kind
         One of `SLIPS`; None: drawn.
-    nuisances
-        For the size; the standard ones if not given.
 
     Returns
     -------
@@ -102,35 +83,37 @@ def with_slip(
         written = wrong["stiffness_N_per_mm"][rows].astype(float) * WRITTEN_PER_N_PER_MM[kind]
         wrong["stiffness_N_per_mm"][rows] = np.round(written, 3)
     else:
-        rows = _mistype(wrong, nominal, kind, rng)
+        rows = _mistype(wrong, case.nominal, kind, rng)
     changed = [name for name in wrong if (wrong[name] != np.array(table[name], dtype=object)).any()]
     slipped: Table = {
         name: values.tolist() if isinstance(table[name], list) else values.astype(np.asarray(table[name]).dtype)
         for name, values in wrong.items()
     }
-    truth = {
+    modelled, found = (
+        np.log(readings(case.nominal, HiddenMachine(), rows_of(one))) - np.log(one["stiffness_N_per_mm"])
+        for one in (table, slipped)
+    )
+    scale = scale_of(case.nominal, rows_of(table), clamp_of(table), case.nuisances)
+    return slipped, {
         "kind": kind,
         "rows": [int(row) + 1 for row in rows],
         "columns": changed,
-        "written": {name: [slipped[name][row] for row in rows] for name in changed},
-        "meant": {name: [table[name][row] for row in rows] for name in changed},
-        "detectability": _length(table, slipped, nominal, Nuisances() if nuisances is None else nuisances),
+        "written": {name: np.asarray(slipped[name])[rows].tolist() for name in changed},
+        "meant": {name: np.asarray(table[name])[rows].tolist() for name in changed},
+        "detectability": scale.covariance.length(modelled - found),
     }
-    return slipped, _plain(truth)
 
 
-def slipped_case(
-    case: DrawnCase, seed: int, kind: str | None = None, count: int = 1
-) -> tuple[Table, list[dict[str, Any]]]:
+def slipped_case(case: DrawnCase, seed: int, kind: str | None = None, count: int = 1) -> tuple[Table, list[Shape]]:
     """The rows of a case with `count` slips in different rows, and their truths."""
     rng = np.random.default_rng([seed, 5])  # beyond the streams of `draw_case`
     table = case.rows
-    truths: list[dict[str, Any]] = []
+    truths: list[Shape] = []
     taken: set[int] = set()
     for _ in range(TRIES):
         if len(truths) == count:
             return table, truths
-        trial, truth = with_slip(table, case.nominal, rng, kind, case.nuisances)
+        trial, truth = with_slip(case, table, rng, kind)
         if taken.isdisjoint(truth["rows"]):
             table = trial
             taken.update(truth["rows"])
@@ -155,7 +138,7 @@ def with_stated_noise(
     return stated, {"true_percent": 100.0 * true, "stated_percent": 100.0 * true * factor}
 
 
-def _exchange(wrong: dict[str, Any], rng: Generator) -> IntArray:
+def _exchange(wrong: Table, rng: Generator) -> IntArray:
     """Two rows of one clamping and one load get each other's stiffness."""
     clamps = clamp_of(wrong)
     loads = wrong.get("force_N", np.full(len(clamps), defaults.FORCE))
@@ -171,7 +154,7 @@ def _exchange(wrong: dict[str, Any], rng: Generator) -> IntArray:
     raise InputError("no two directions of one clamping and load", expected="a campaign with several")
 
 
-def _mistype(wrong: dict[str, Any], nominal: Nominal, kind: str, rng: Generator) -> IntArray:
+def _mistype(wrong: Table, nominal: Nominal, kind: str, rng: Generator) -> IntArray:
     """A coordinate or an angle of one row, or of all rows of a clamping, is written wrongly."""
     names = [name for name in POSE if name in wrong]
     clamps = clamp_of(wrong)
@@ -200,21 +183,3 @@ def _mistype(wrong: dict[str, Any], nominal: Nominal, kind: str, rng: Generator)
 def _reached(table: Mapping[str, Any], nominal: Nominal, rows: IntArray) -> bool:
     slipped = rows_of({name: np.asarray(values)[rows] for name, values in table.items()})
     return bool(reachable(nominal, slipped.position, slipped.angles, slipped.extension).all())
-
-
-def _length(table: Mapping[str, Any], slipped: Mapping[str, Any], nominal: Nominal, nuisances: Nuisances) -> float:
-    """Whitened length of the change of ln measured - ln modelled."""
-    modelled = [np.log(readings(nominal, HiddenMachine(), rows_of(rows))) for rows in (table, slipped)]
-    measured = [np.log(np.asarray(rows["stiffness_N_per_mm"], dtype=float)) for rows in (table, slipped)]
-    change: FloatArray = (measured[1] - measured[0]) - (modelled[1] - modelled[0])
-    return scale_of(nominal, rows_of(table), clamp_of(table), nuisances).covariance.length(change)
-
-
-def _plain(truth: dict[str, Any]) -> dict[str, Any]:
-    """Python's own numbers, for JSON."""
-    for key in ("written", "meant"):
-        truth[key] = {
-            name: [value.item() if isinstance(value, np.generic) else value for value in values]
-            for name, values in truth[key].items()
-        }
-    return truth

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,6 +54,25 @@ class Geometry:
     vertices: IntArray
 
 
+class End(NamedTuple):
+    """A link between tool and work that carries the whole load, of n rows.
+
+    A unit load along d puts d . lever on it (a force, or a torque where the lever is in m), and the tip moves along d
+    by that times the compliance times d . lever.
+
+    Attributes
+    ----------
+    link
+        `spindle` or `table`, beside which an indicator may stand; "" for others.
+    lever, compliance
+        (n, 3) and (n,).
+    """
+
+    link: str
+    lever: FloatArray
+    compliance: FloatArray
+
+
 @dataclass(frozen=True)
 class Links:
     """How the links of n rows give way; SI. A compliance of zero is rigid.
@@ -67,35 +87,26 @@ class Links:
         N m/rad, rotational spring at both ends of every strut; (n, 6) where struts and rows differ.
     bars
         N/m, bars of the platform truss; inf is rigid; (19,) where they differ, in the order of `truss_bars`.
-    spindle
-        (n, 3) m/N in platform axes.
     vertices
         (vertices, 2) m/N, radial and vertical.
-    table
-        (n, 3) m/N along base axes.
-    rocking
-        rad/(N m), of the table about the base frame's x and y axes through its origin.
-    setup
-        (n, 3) m/N along base axes.
+    ends
+        Whatever carries the whole load.
     loose
         What the vertices give beside `vertices`, (n, vertices, 2) m/N, from strut forces (n, 6) N.
-    ends
-        Further links between tool and work that carry the whole load: lever (n, 3) and compliance (n,) each. A unit
-        load along d puts d . lever on such a link (a force, or a torque where the lever is in m), and the tip moves
-        along d by that times the compliance times d . lever.
     """
 
     struts: FloatArray
     joints: Callable[[FloatArray], FloatArray]
     moment: float | FloatArray
     bars: float | FloatArray
-    spindle: FloatArray
     vertices: FloatArray
-    table: FloatArray
-    rocking: float
-    setup: FloatArray
+    ends: tuple[End, ...]
     loose: Callable[[FloatArray], FloatArray] | None = None
-    ends: tuple[tuple[FloatArray, FloatArray], ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Unknowns beside the platform's: six joints, two a vertex, the ends."""
+        return 6 + self.vertices.size + len(self.ends)
 
 
 @dataclass(frozen=True)
@@ -107,7 +118,7 @@ class Solved:
     compliance
         (n,) m/N between tool and workpiece.
     moved
-        (n, N) the unknowns: the platform's own, then six joints, the vertices, spindle, table, set-up (`_give`).
+        (n, N) the unknowns: the platform's own, then six joints, the vertices, the ends.
     stretch
         (n, 6, N) what turns them into the elongation of each strut, its joints left out.
     platform_dofs
@@ -120,17 +131,12 @@ class Solved:
     platform_dofs: int
 
 
-def secant_compliance(place: Geometry, links: Links, direction: FloatArray, force: FloatArray) -> FloatArray:
-    """(n,) m/N between tool and workpiece along unit vectors `direction` (n, 3) under loads `force` (n,) N."""
-    return solved(place, links, direction, force).compliance
-
-
 def solved(place: Geometry, links: Links, direction: FloatArray, force: FloatArray) -> Solved:
     """The machine under loads `force` (n,) N along unit vectors `direction` (n, 3)."""
     stretch, platform_springs, platform_dofs = _struts(place, links)
-    load = _load_vector(place, links, direction, platform_dofs)
-    give = _give(place, links)
+    load = _load_vector(links, direction, platform_dofs)
     n, size = load.shape
+    give = _give(links, n)
     per_stretch = links.struts @ stretch  # (n, 6, N) N/m
     fixed = platform_springs + np.swapaxes(stretch, 1, 2) @ per_stretch
     first = platform_dofs
@@ -171,8 +177,7 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
     flexible = bool(np.isfinite(links.bars).all())
     motion = np.broadcast_to(np.eye(24), (n, 24, 24)) if flexible else rigid
     dofs = motion.shape[2]
-    vertex_count = len(links.vertices)
-    size = dofs + _give_size(vertex_count, len(links.ends))
+    size = dofs + links.count
     # Displacement of the platform end minus that of the frame end, base axes, per unknown.
     relative = np.zeros((n, 6, 3, size))
     relative[..., :dofs] = motion[:, :18].reshape(n, 6, 3, dofs)
@@ -258,42 +263,21 @@ def _radial(place: Geometry, vertex: int) -> FloatArray:
     return np.asarray(outward / np.linalg.norm(outward, axis=1, keepdims=True))
 
 
-def _give_size(vertex_count: int, further: int) -> int:
-    """Unknowns beside the platform's: six joints, two a vertex, spindle 3, table 3 and rocking 2, set-up 3, others."""
-    return 6 + 2 * vertex_count + 3 + 3 + 2 + 3 + further
-
-
-def _give(place: Geometry, links: Links) -> FloatArray:
+def _give(links: Links, n: int) -> FloatArray:
     """(n, .) compliances of those unknowns, in their order; the joints' are filled in during the iteration."""
-    n = len(place.work_point)
-    return np.concatenate(
-        [
-            np.zeros((n, 6)),
-            np.broadcast_to(links.vertices.ravel(), (n, links.vertices.size)),
-            links.spindle,
-            links.table,
-            np.full((n, 2), links.rocking),
-            links.setup,
-            *(compliance[:, None] for _, compliance in links.ends),
-        ],
-        axis=1,
-    )
+    vertices = np.broadcast_to(links.vertices.ravel(), (n, links.vertices.size))
+    return np.column_stack([np.zeros((n, 6)), vertices, *(end.compliance for end in links.ends)])
 
 
-def _load_vector(place: Geometry, links: Links, direction: FloatArray, dofs: int) -> FloatArray:
-    """(n, N) what each unknown adds to the movement of tool against workpiece along `direction`."""
-    n = len(direction)
-    size = dofs + _give_size(len(links.vertices), len(links.ends))
-    vector = np.zeros((n, size))
+def _load_vector(links: Links, direction: FloatArray, dofs: int) -> FloatArray:
+    """(n, N) what each unknown adds to the movement of tool against workpiece along `direction`.
+
+    The workpiece is pushed back: the load on it is -direction, so its give counts with the same sign.
+    """
+    vector = np.zeros((len(direction), dofs + links.count))
     # Tip of a rigid platform: the first three unknowns; node TIP of a truss: three of its last ones.
     tip = 0 if dofs == 6 else 3 * TIP
     vector[:, tip : tip + 3] = direction
-    end = dofs + 6 + 2 * len(links.vertices)
-    vector[:, end : end + 3] = np.einsum("ni,nij->nj", direction, place.rotation)  # spindle, platform axes
-    # The workpiece is pushed back: the load on it is -direction, so its give counts with the same sign.
-    vector[:, end + 3 : end + 6] = direction
-    vector[:, end + 6 : end + 8] = np.cross(place.work_point, direction)[:, :2]
-    vector[:, end + 8 : end + 11] = direction
-    for column, (lever, _) in enumerate(links.ends, end + 11):
-        vector[:, column] = np.einsum("ni,ni->n", direction, lever)
+    for column, end in enumerate(links.ends, dofs + 6 + links.vertices.size):
+        vector[:, column] = np.einsum("ni,ni->n", direction, end.lever)
     return vector

@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.random import Generator
@@ -20,12 +20,14 @@ from numpy.random import Generator
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import Geometry, Links
+from toolpath_stiff.rig.structure import End, Geometry, Links
+
+Shape = dict[str, Any]  # what is drawn of something hidden beside its size, by name
+Physics = TypeVar("Physics", bound=Callable[..., Any])
+X, Y, Z = np.eye(3)
 
 # Words of a description.
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
-
-
 VARIABLES = (
     *("constant", "x", "y", "z", "radius", "tilt", "strut length", "strut force", "force sign"),
     *("load", "time", "order", "setup", "temperature", "direction"),
@@ -37,14 +39,8 @@ VARIABLES = (
 # varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant
 # there, and shows as the strut swings about it.
 ONE, ALL = "one strut,joints", "joints,struts"
-
-
 SOFT = 60e-9  # m/N, largest compliance that is tried: far beyond 30 % of a tip that gives 8 to 31 nm/N
-
-
 REACH = 0.3  # m, half the width of the workspace that the paper measured
-
-
 SIGN_WIDTH = 30.0  # N over which a seat opens: no contact lets go at a stroke (assumed)
 
 
@@ -64,7 +60,7 @@ class Unknown:
 
     kind: str
     size: float
-    shape: dict[str, Any] = field(default_factory=dict)
+    shape: Shape = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -89,19 +85,12 @@ class CommandedRows:
         return np.asarray((self.lengths - low) / (high - low))
 
 
-def no_shape(rng: Generator) -> dict[str, Any]:
-    """Nothing is drawn beside the size."""
-    return {}
-
-
 @dataclass(frozen=True)
 class Kind:
     """A kind of unknown.
 
     Attributes
     ----------
-    words
-        What it is.
     links, variables
         What a description may name.
     limit
@@ -120,21 +109,32 @@ class Kind:
         Columns that a measurement file needs to show it.
     """
 
-    words: str
     links: frozenset[str]
     variables: frozenset[str]
     limit: float
     act: Callable[[Links, CommandedRows, Unknown], Links] | None = None
     read: Callable[[Rows, Unknown], FloatArray] | None = None
     move: Callable[[Unknown], FloatArray] | None = None
-    shape: Callable[[Generator], dict[str, Any]] = no_shape
+    shape: Callable[[Generator], Shape] = lambda rng: {}
     varies: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
 
 
-def kind(words: str, links: str, variables: str, limit: float, **more: Any) -> Kind:
-    """A kind whose links and variables are given as words between commas."""
-    return Kind(words, frozenset(links.split(",")), frozenset(variables.split(",")), limit, **more)
+def kind(
+    kinds: dict[str, Kind], role: str, links: str, variables: str, limit: float, **more: Any
+) -> Callable[[Physics], Physics]:
+    """Puts the function below it among the kinds, by its name; links, variables, columns stand between commas.
+
+    `role`: `act`, `read` or `move`.
+    """
+
+    def registered(physics: Physics) -> Physics:
+        more.update({name: tuple(filter(None, more.get(name, "").split(","))) for name in ("varies", "columns")})
+        more[role] = physics
+        kinds[physics.__name__] = Kind(frozenset(links.split(",")), frozenset(variables.split(",")), limit, **more)
+        return physics
+
+    return registered
 
 
 def opened(pull: FloatArray) -> FloatArray:
@@ -147,20 +147,39 @@ def beyond(force: FloatArray, threshold: float) -> FloatArray:
     return np.asarray(np.maximum(0.0, 1.0 - threshold / np.maximum(np.abs(force), 1e-9)))
 
 
-def one_strut(rng: Generator) -> dict[str, Any]:
+def uniform(name: str, low: float, high: float) -> Callable[[Generator], Shape]:
+    """One number, drawn from a range."""
+    return lambda rng: {name: float(rng.uniform(low, high))}
+
+
+def one_strut(rng: Generator) -> Shape:
     """Which strut, from 0."""
     return {"strut": int(rng.integers(6))}
 
 
-def signed(rng: Generator) -> dict[str, Any]:
+def side(rng: Generator) -> Shape:
+    """Which side."""
+    return {"side": float(rng.choice([-1.0, 1.0]))}
+
+
+def signed(rng: Generator) -> Shape:
     """Which sign."""
     return {"sign": float(rng.choice([-1.0, 1.0]))}
 
 
-def _with_ends(links: Links, *ends: tuple[FloatArray, FloatArray]) -> Links:
-    return dataclasses.replace(links, ends=(*links.ends, *ends))
+def with_ends(links: Links, *ends: tuple[FloatArray, FloatArray | float]) -> Links:
+    """Further links that carry the whole load: levers (n, 3) or (3,), compliances (n,) or alike in all rows."""
+    n = len(links.struts)
+    more = (End("", np.broadcast_to(lever, (n, 3)), np.broadcast_to(give, (n,))) for lever, give in ends)
+    return dataclasses.replace(links, ends=(*links.ends, *more))
 
 
-def _with_joints(links: Links, extra: Callable[[FloatArray], FloatArray]) -> Links:
+def with_joints(links: Links, extra: Callable[[FloatArray], FloatArray]) -> Links:
     """Further secant compliance (n, 6) along the struts from their forces (n, 6)."""
     return dataclasses.replace(links, joints=lambda forces: links.joints(forces) + extra(forces))
+
+
+def with_factors(links: Links, factor: FloatArray) -> Links:
+    """Stiffnesses of the struts times (n, 6)."""
+    root = np.sqrt(factor)
+    return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])

@@ -3,26 +3,61 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.structure import BARS, Links
-from toolpath_stiff.rig.unknown import ALL, ONE, SOFT, _with_joints, beyond, kind, one_strut, opened, signed
+from toolpath_stiff.rig.unknown import (
+    ALL,
+    ONE,
+    SOFT,
+    Shape,
+    beyond,
+    kind,
+    one_strut,
+    opened,
+    side,
+    signed,
+    uniform,
+    with_factors,
+    with_joints,
+)
 
 if TYPE_CHECKING:
     from toolpath_stiff.rig.unknown import CommandedRows, Kind, Unknown
 
+STRUT_KINDS: dict[str, Kind] = {}
+act = partial(kind, STRUT_KINDS, "act")
+move = partial(kind, STRUT_KINDS, "move")
 
 LEAST_FORCE = 0.1  # N, below which a secant compliance is held
-
-
 SOUND_BAR = 3e9  # N/m, the bars of a platform one of which is cracked: 1.4 % at the tip (assumed)
-
-
 PRELOAD_GROWS = 0.3  # of the campaign, time constant of a machine that warms up (assumed)
+
+
+def _vertex(rng: Generator) -> Shape:
+    return {"vertex": int(rng.integers(3))}
+
+
+def _loose(rng: Generator) -> Shape:
+    """The second or third post: loads along +X, +Y and +Z never pull the first one of the paper's machine down."""
+    return {"vertex": int(rng.integers(1, 3))}
+
+
+def _moved(rng: Generator) -> Shape:
+    return one_strut(rng) | {"axis": int(rng.integers(3))} | signed(rng)
+
+
+def _wave(rng: Generator) -> Shape:
+    return one_strut(rng) | {"wavelength": float(rng.uniform(0.12, 0.3)), "phase": float(rng.uniform(0.0, 6.28))}
+
+
+def _only(strut: int) -> FloatArray:
+    return np.where(np.arange(6) == strut, 1.0, 0.0)
 
 
 def _coupled(links: Links, shares: FloatArray, compliance: float) -> Links:
@@ -31,75 +66,75 @@ def _coupled(links: Links, shares: FloatArray, compliance: float) -> Links:
     return dataclasses.replace(links, struts=np.asarray(np.linalg.inv(flexibility), dtype=np.float64))
 
 
-def _only(strut: int) -> FloatArray:
-    return np.where(np.arange(6) == strut, 1.0, 0.0)
-
-
+@act(ONE, "strut force,load", 50e-6, shape=one_strut, varies="force", columns="force_N")
 def strut_backlash(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Lost motion in one strut alone: c = g / |f|."""
-    return _with_joints(links, lambda f: u.size / np.maximum(np.abs(f), LEAST_FORCE) * _only(u.shape["strut"]))
+    return with_joints(links, lambda f: u.size / np.maximum(np.abs(f), LEAST_FORCE) * _only(u.shape["strut"]))
 
 
+@act(ALL, "strut force,load", SOFT, shape=uniform("preload", 150.0, 500.0), varies="force", columns="force_N")
 def nut_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Double nuts with too little preload: beyond it one of the two lets go and the struts are softer by c0."""
-    return _with_joints(links, lambda f: u.size * beyond(f, u.shape["preload"]))
+    return with_joints(links, lambda f: u.size * beyond(f, u.shape["preload"]))
 
 
+@act(ONE, "force sign", SOFT, shape=lambda rng: one_strut(rng) | side(rng), varies="force")
 def thrust_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The thrust bearing of one screw is worn on one side: softer in tension, or in compression."""
-    return _with_joints(links, lambda f: u.size * opened(f * u.shape["side"]) * _only(u.shape["strut"]))
+    return with_joints(links, lambda f: u.size * opened(f * u.shape["side"]) * _only(u.shape["strut"]))
 
 
+@act(ALL, "force sign,strut length", SOFT, varies="force")
 def strut_bowing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Struts not quite straight bow under compression: c grows as length^4 (Timoshenko, an initially bent column)."""
     compliance = u.size * (state.lengths / state.nominal.strut_range[1]) ** 4
-    return _with_joints(links, lambda f: compliance * opened(-f))
+    return with_joints(links, lambda f: compliance * opened(-f))
 
 
+@act(ONE, "strut length", SOFT, shape=one_strut)
 def drive_spring(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One drive loses stiffness in proportion to how far its strut is out, as a column of oil does."""
     compliance = u.size * np.maximum(state.stretched, 0.0) * _only(u.shape["strut"])
-    return _with_joints(links, lambda forces: compliance)
+    return with_joints(links, lambda forces: compliance)
 
 
+@act(ONE, "strut length", 3.0, shape=lambda rng: one_strut(rng) | signed(rng))
 def other_screw(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One strut was replaced: its stiffness has another slope over the length, k exp(a (s - 1/2))."""
     factor = np.where(np.arange(6) == u.shape["strut"], np.exp(u.size * (state.stretched - 0.5)), 1.0)
-    root = np.sqrt(factor)
-    return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])
+    return with_factors(links, factor)
 
 
+@act(ONE, "strut length", 0.85, shape=_wave)
 def screw_lead(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One screw was ground with a wavy lead: its nut's stiffness varies periodically with the length."""
     wave = 1.0 + u.size * np.sin(2.0 * np.pi * state.lengths / u.shape["wavelength"] + u.shape["phase"])
-    root = np.sqrt(np.where(np.arange(6) == u.shape["strut"], wave, 1.0))
-    return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])
+    return with_factors(links, np.where(np.arange(6) == u.shape["strut"], wave, 1.0))
 
 
+@act("struts,joints,platform", "constant", SOFT, shape=one_strut)
 def motor_mount(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Two neighbouring struts of different vertices hang on one soft bracket, which both load: c (f1 + f2)^2."""
-    return _coupled(links, np.broadcast_to(_pair(state, u), state.lengths.shape), u.size)
-
-
-def _pair(state: CommandedRows, u: Unknown) -> FloatArray:
-    first = u.shape["strut"]
-    vertices = state.nominal.vertices
+    first, vertices = u.shape["strut"], state.nominal.vertices
     other = next(s % 6 for s in range(first + 1, first + 6) if vertices[s % 6] != vertices[first])
-    return _only(first) + _only(other)
+    return _coupled(links, np.broadcast_to(_only(first) + _only(other), state.lengths.shape), u.size)
 
 
+@act(ONE, "time", SOFT, shape=one_strut, varies="time", columns="time_min")
 def strut_heating(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The motor of one strut holds it and heats its nut while the readings of a clamping are taken."""
     compliance = u.size * (state.rows.time / 300.0)[:, None] * _only(u.shape["strut"])
-    return _with_joints(links, lambda forces: compliance)
+    return with_joints(links, lambda forces: compliance)
 
 
+@act(ALL, "order,time,temperature", SOFT, varies="elapsed")
 def warm_up_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Joints gain their preload as the machine warms up: c = c0 exp(-t / tau) over the campaign."""
     compliance = u.size * np.exp(-state.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6)
-    return _with_joints(links, lambda forces: compliance)
+    return with_joints(links, lambda forces: compliance)
 
 
+@act("platform,joints,one strut", "constant", 0.9995, shape=one_strut)
 def cracked_bar(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The bar from one joint of the platform to the spindle nose is cracked; the others are stiff, but not rigid."""
     stiffness = np.minimum(np.full(BARS, SOUND_BAR), links.bars)
@@ -107,6 +142,7 @@ def cracked_bar(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return dataclasses.replace(links, bars=stiffness)
 
 
+@act("frame", "constant", SOFT, shape=_vertex)
 def frame_oval(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The frame's ring goes oval: the radial loads of two posts act against each other, c (R1 - R2)^2."""
     vertices = state.nominal.vertices
@@ -116,6 +152,7 @@ def frame_oval(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return _coupled(links, np.einsum("nki,nki->nk", state.units, outward) * side, u.size)
 
 
+@act("frame", "force sign,direction", SOFT, shape=_loose, varies="force")
 def loose_vertex_bolt(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A bolt of one post is loose: pulled down the post gives, a third as much outwards; pressed it sits."""
     vertex = u.shape["vertex"]
@@ -132,79 +169,14 @@ def loose_vertex_bolt(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return dataclasses.replace(links, loose=loose)
 
 
+@move(
+    "frame,joints,one strut",
+    "constant",
+    0.3,
+    shape=lambda rng: one_strut(rng) | {"axis": int(rng.integers(3))} | signed(rng),
+)
 def joint_seat(u: Unknown) -> FloatArray:
     """One frame joint stands elsewhere than the control believes."""
     moved = np.zeros((6, 3))
     moved[u.shape["strut"], u.shape["axis"]] = u.size
     return moved
-
-
-def _vertex(rng: Generator) -> dict[str, Any]:
-    return {"vertex": int(rng.integers(3))}
-
-
-def _loose(rng: Generator) -> dict[str, Any]:
-    """The second or third post: loads along +X, +Y and +Z never pull the first one of the paper's machine down."""
-    return {"vertex": int(rng.integers(1, 3))}
-
-
-def _wave(rng: Generator) -> dict[str, Any]:
-    return one_strut(rng) | {"wavelength": float(rng.uniform(0.12, 0.3)), "phase": float(rng.uniform(0.0, 6.28))}
-
-
-STRUT_KINDS: dict[str, Kind] = {
-    "strut_backlash": kind(
-        "lost motion in one strut", ONE, "strut force,load", 50e-6, act=strut_backlash, shape=one_strut,
-        varies=("force",), columns=("force_N",),
-    ),
-    "nut_preload": kind(
-        "struts softer beyond the preload of their nuts", ALL, "strut force,load", SOFT, act=nut_preload,
-        shape=lambda rng: {"preload": float(rng.uniform(150.0, 500.0))}, varies=("force",), columns=("force_N",),
-    ),
-    "thrust_bearing": kind(
-        "one strut softer in tension or in compression", ONE, "force sign", SOFT, act=thrust_bearing,
-        shape=lambda rng: one_strut(rng) | {"side": float(rng.choice([-1.0, 1.0]))}, varies=("force",),
-    ),
-    "strut_bowing": kind(
-        "struts softer in compression, the longer the more", ALL, "force sign,strut length", SOFT, act=strut_bowing,
-        varies=("force",),
-    ),
-    "drive_spring": kind(
-        "one drive softer the further its strut is out", ONE, "strut length", SOFT, act=drive_spring, shape=one_strut
-    ),
-    "other_screw": kind(
-        "one strut whose stiffness has another slope over its length", ONE, "strut length", 3.0, act=other_screw,
-        shape=lambda rng: one_strut(rng) | signed(rng),
-    ),
-    "screw_lead": kind(
-        "one strut's stiffness varies periodically with its length", ONE, "strut length", 0.85, act=screw_lead,
-        shape=_wave,
-    ),
-    "motor_mount": kind(
-        "two neighbouring struts on one soft bracket", "struts,joints,platform", "constant", SOFT,
-        act=motor_mount, shape=one_strut,
-    ),
-    "strut_heating": kind(
-        "one strut softens in the minutes of a clamping", ONE, "time", SOFT, act=strut_heating, shape=one_strut,
-        varies=("time",), columns=("time_min",),
-    ),
-    "warm_up_preload": kind(
-        "joints stiffen in the course of the campaign", ALL, "order,time,temperature", SOFT, act=warm_up_preload,
-        varies=("elapsed",),
-    ),
-    "cracked_bar": kind(
-        "one bar of the platform is cracked", "platform,joints,one strut", "constant", 0.9995, act=cracked_bar,
-        shape=one_strut,
-    ),
-    "frame_oval": kind(
-        "the frame's ring goes oval between two posts", "frame", "constant", SOFT, act=frame_oval, shape=_vertex
-    ),
-    "loose_vertex_bolt": kind(
-        "one post of the frame gives when it is pulled down", "frame", "force sign,direction", SOFT,
-        act=loose_vertex_bolt, shape=_loose, varies=("force",),
-    ),
-    "joint_seat": kind(
-        "one frame joint stands elsewhere", "frame,joints,one strut", "constant", 0.3, move=joint_seat,
-        shape=lambda rng: one_strut(rng) | {"axis": int(rng.integers(3))} | signed(rng),
-    ),
-}  # fmt: skip

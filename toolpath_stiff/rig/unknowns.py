@@ -1,14 +1,15 @@
-"""The unknowns that the rig can hide: what no effect of the catalogue and none of the oddities describes.
+"""What the rig can hide outside the catalogue: oddities, and unknowns, which are judged by what is said of them.
 
-They are there to judge descriptions of what is missing. Each is invented from its physics, with the shape that worn,
-damaged or badly set machines show; no source gives figures for them. The sizes that are drawn change the stiffness by
-4 to 15 % rms.
+Unknowns are there to judge descriptions of what is missing. Each is invented from its physics, with the shape that
+worn, damaged or badly set machines show; no source gives figures for them. The sizes that are drawn change the
+stiffness by 4 to 15 % rms.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
 from toolpath_stiff.rig.unknown_ends import END_KINDS
 from toolpath_stiff.rig.unknown_joints import JOINT_KINDS
 from toolpath_stiff.rig.unknown_struts import STRUT_KINDS
@@ -18,3 +19,4 @@ if TYPE_CHECKING:
 
 
 UNKNOWNS: dict[str, Kind] = {**JOINT_KINDS, **STRUT_KINDS, **END_KINDS}
+OUTSIDE = {**ODDITIES, **ODDITIES_IN_TIME, **UNKNOWNS}

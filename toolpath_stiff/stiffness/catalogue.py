@@ -73,8 +73,8 @@ def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
     for file in files:
         for name, effect in effects_from_file(file).items():
             if name in known:
-                line, hint = None if effect.file else line_of(type(effect), "name"), "give it another name"
-                raise EffectError(f"effect {name} exists already", hint=hint, file=str(file), line=line)
+                line = None if effect.file else line_of(type(effect), "name")
+                raise EffectError(f"effect {name} exists already", file=str(file), line=line)
             known[name] = effect
     return dict(sorted(known.items(), key=lambda item: (LINKS.index(item[1].link), item[0])))
 
@@ -90,8 +90,7 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
         raise EffectError(f"effect {name} does not load: {broken[name]}", hint="repair or uninstall its package")
     near = difflib.get_close_matches(name, known, n=1)
     listed = f"`{command_line('effects', 'list', *options(effects=list(files)))}` lists them"
-    hint = f"did you mean {near[0]}?" if near else listed
-    raise EffectError(f"unknown effect {name!r}", expected=f"one of {', '.join(known)}", hint=hint)
+    raise EffectError(f"unknown effect {name!r}", hint=f"did you mean {near[0]}?" if near else listed)
 
 
 def effects_from_file(file: str | Path) -> dict[str, Effect]:
@@ -122,11 +121,11 @@ class _Source(importlib.machinery.SourceFileLoader):
 @lru_cache(maxsize=MOST_FILES)
 def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]:
     """`path`, `changed` and `size` tell files and their versions apart."""
-    name = f"toolpath_stiff_user_effects_{path.stem}"
     if path.suffix == ".toml":
         return effects_of_terms(file)
     if path.suffix != ".py":
         raise EffectError("neither Python nor TOML", expected="a name that ends in .py or .toml", file=file)
+    name = f"toolpath_stiff_user_effects_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path, loader=_Source(name, str(path)))
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -146,13 +145,9 @@ def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]
 
 def _failure(error: BaseException, file: str) -> InputError:
     """Where a file failed when it was run, and of what."""
-    if isinstance(error, SyntaxError) and error.filename and Path(error.filename).resolve() == Path(file).resolve():
-        return EffectError(f"{type(error).__name__}: {error.msg}", file=file, line=error.lineno, column=error.offset)
     what, line = f"{type(error).__name__}: {error}".rstrip(": "), line_in(error, file)
-    if line is None:  # a byte that no Python file has: Python does not say where
-        content = Path(file).read_bytes()
-        place = error.start if isinstance(error, UnicodeDecodeError) else content.find(b"\0")
-        line = content.count(b"\n", 0, place) + 1 if place >= 0 else None
+    if isinstance(error, SyntaxError) and error.filename and Path(error.filename).resolve() == Path(file).resolve():
+        what, line = f"{type(error).__name__}: {error.msg}", error.lineno
     return EffectError(f"{what}, when the file is run", file=file, line=line)
 
 
@@ -164,8 +159,7 @@ def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
             effect = value()
             check_declarations(effect, where)
             if effect.name in defined and type(defined[effect.name]) is not value:
-                mistake, hint = f"effect {effect.name} is defined twice", "give one another name"
-                raise EffectError(mistake, hint=hint, file=where, line=line_of(value, "name"))
+                raise EffectError(f"effect {effect.name} is defined twice", file=where, line=line_of(value, "name"))
             defined[effect.name] = effect
     return defined
 

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
-from toolpath_stiff.machine.kinematics import LENGTH_TOLERANCE, Struts, solve_struts_at
+from toolpath_stiff.machine.kinematics import LENGTH_TOLERANCE, solve_struts_at
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.stiffness.elimination import Vector, cross, dot, forces, over_struts, strut
 
@@ -49,23 +49,22 @@ class ClosedForm:
     law: StrutLaw
     arm: float
 
-    def on_joints_of(self, machine: Hexapod, tool_length: float) -> ClosedForm:
-        """The same split of another machine's joints."""
-        return _on_joints(machine, tool_length, self.order, self.arm)
 
+def prepare(machine: Hexapod, tool_length: float = np.nan, split_of: Hexapod | None = None) -> ClosedForm:
+    """The kernel's form of a machine with a tool of that length (m; nan: the reference tool), made once a machine.
 
-def prepare(machine: Hexapod, tool_length: float = np.nan) -> ClosedForm:
-    """The kernel's form of a machine with a tool of that length (m; nan: the reference tool), made once a machine."""
+    `split_of`: in the order of struts of another machine, which differs from it by little.
+    """
+
+    def on_joints() -> ClosedForm:
+        other = split_of or machine
+        order, arm = other.once("split", lambda: _split(other))
+        bodies = (machine.frame_joints, machine.platform_joints_for(tool_length))
+        frame, platform = (np.ascontiguousarray(joints[order].T) for joints in bodies)
+        return ClosedForm(order, frame, platform, machine.strut_law, arm)
+
     key = ("closed form", "reference" if np.isnan(tool_length) else float(tool_length))
-    return machine.once(key, lambda: _on_joints(machine, tool_length, *machine.once("split", lambda: _split(machine))))
-
-
-def _on_joints(machine: Hexapod, tool_length: float, order: list[int], arm: float) -> ClosedForm:
-    frame, platform = (
-        np.ascontiguousarray(joints[order].T)
-        for joints in (machine.frame_joints, machine.platform_joints_for(tool_length))
-    )
-    return ClosedForm(order, frame, platform, machine.strut_law, arm)
+    return on_joints() if split_of else machine.once(key, on_joints)
 
 
 def _split(machine: Hexapod) -> tuple[list[int], float]:
@@ -235,24 +234,20 @@ def compliance_along_columns(
 
 def strut_forces_columns(
     kernel: ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
-) -> tuple[FloatArray, Struts, BoolArray]:
-    """Strut forces (n, 6) N per N along one direction a pose, the struts, and where the forces may be trusted (n,).
+) -> tuple[FloatArray, BoolArray]:
+    """Strut forces (n, 6) N per N along one direction a pose, and where they may be trusted (n,).
 
     Arguments as of `compliance_along_columns`, with one direction.
     """
-    n, order = position.shape[1], kernel.order
+    n = position.shape[1]
     force, good = np.empty((n, 6)), np.empty(n, dtype=bool)
-    struts = Struts(np.empty((n, 6)), np.empty((n, 6, 3)), np.empty((n, 6, 3)))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for rows in _blocks(n):
             block = _Block(kernel, position[:, rows], _turns(rotation, rows))
-            struts.lengths[rows, order] = block.lengths.T
-            struts.directions[rows, order] = np.array(block.directions).T
-            struts.arms[rows, order] = block.arms.T
-            force[rows, order] = np.array(block.forces(direction[:, rows])).T
+            force[rows, kernel.order] = np.array(block.forces(direction[:, rows])).T
             good[rows] = block.good & np.isfinite(force[rows]).all(axis=1)
             del block
-    return force, struts, good
+    return force, good
 
 
 def followed_columns(

@@ -6,51 +6,32 @@ time on a machine; the result is cached on disk. `core` chooses this route by it
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
-from toolpath_stiff.stiffness.closed_form import SMALL_DETERMINANT, ClosedForm, well_conditioned
-
-Triples = tuple[tuple[float, ...], ...]
+from toolpath_stiff.stiffness.closed_form import ClosedForm, well_conditioned
 
 
 def available() -> bool:
     """Whether numba is installed; does not import it."""
-    from importlib.util import find_spec
-
     return find_spec("numba") is not None
-
-
-def _constants(kernel: ClosedForm) -> tuple[Triples, Triples, float, float]:
-    """Platform arms and frame joints as tuples, which the compiled loop keeps in registers; strut law."""
-    arms, frame = (tuple(map(tuple, joints.T.tolist())) for joints in (kernel.platform, kernel.frame))
-    return arms, frame, kernel.law.intercept, kernel.law.slope
-
-
-def tip_compliance(
-    kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None = None
-) -> tuple[FloatArray, BoolArray]:
-    """As `closed_form.tip_compliance`: (n, 3, 3) m/N and (n,) good, for position (n, 3) and rotation (n, 3, 3)."""
-    from toolpath_stiff.stiffness import compiled_loops
-
-    n = len(position)
-    compliance, good = np.empty((n, 9)), np.empty(n, dtype=bool)
-    smallest = (SMALL_DETERMINANT, SMALL_DETERMINANT * kernel.arm**3)
-    turns = None if rotation is None else np.ascontiguousarray(rotation).reshape(n, 9)
-    compiled_loops.tensor_rows(np.ascontiguousarray(position), turns, *_constants(kernel), smallest, compliance, good)
-    return compliance.reshape(n, 3, 3), good
 
 
 def compliance_along_columns(
     kernel: ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """As `closed_form.compliance_along_columns`, of contiguous arrays, in about the time of the tensor alone."""
+    """As `closed_form.compliance_along_columns`, of contiguous arrays and a law that is a straight line."""
     from toolpath_stiff.stiffness import compiled_loops
 
-    n, loads = position.shape[1], np.ascontiguousarray(direction if direction.ndim == 3 else direction[None])
+    # Tuples, which the compiled loop keeps in registers.
+    arms, frame = (tuple(map(tuple, joints.T.tolist())) for joints in (kernel.platform, kernel.frame))
+    law, n = (kernel.law.intercept, kernel.law.slope), position.shape[1]
+    loads = np.ascontiguousarray(direction if direction.ndim == 3 else direction[None])
     out, det, lengths = np.empty((len(loads), n)), np.empty((2, n)), np.empty((6, n))
     for load, along in zip(loads, out, strict=True):
-        compiled_loops.directed_columns(n, position, rotation, load, *_constants(kernel), along, det, lengths)
+        compiled_loops.directed_columns((position, rotation, load), (arms, frame), law, along, det, lengths)
     in_order = np.empty_like(lengths)
     in_order[kernel.order] = lengths
     # Values are nan where a strut has no stiffness above zero.

@@ -26,7 +26,7 @@ inline = numba.njit(**INLINED)
 for function in (cross, dot, strut, forces, over_struts):
     register_jitable(**INLINED)(function)
 
-ROWS = 256  # poses at a time for work arrays and for two passes: some 50 kB, which stay in the second-level cache
+ROWS = 256  # poses at a time for two passes: some 50 kB, which stay in the second-level cache
 
 
 def loop(function):
@@ -91,7 +91,7 @@ def strut_from(tip, arm, frame):
 
 
 @inline
-def factors(tip, arms, frame, intercept, slope):
+def factors(tip, arms, frame, law):
     """U_A^-1 and S^-1 with their determinants, and 1 / k(L) of the struts.
 
     The first of these is nan, and with it the result, unless all struts have a stiffness above zero.
@@ -110,6 +110,7 @@ def factors(tip, arms, frame, intercept, slope):
         (m4[0] - n4[0], m4[1] - n4[1], m4[2] - n4[2]),
         (m5[0] - n5[0], m5[1] - n5[1], m5[2] - n5[2]),
     )
+    intercept, slope = law
     k0, k1, k2 = intercept + slope * l0, intercept + slope * l1, intercept + slope * l2
     k3, k4, k5 = intercept + slope * l3, intercept + slope * l4, intercept + slope * l5
     holds = (k0 > 0.0) & (k1 > 0.0) & (k2 > 0.0) & (k3 > 0.0) & (k4 > 0.0) & (k5 > 0.0)
@@ -118,48 +119,14 @@ def factors(tip, arms, frame, intercept, slope):
 
 
 @loop
-def tensor_columns(n, p, r, arms, frame, intercept, slope, out, det):
-    """Six columns xx, yy, zz, xy, xz, yz, and both determinants."""
-    for i in range(np.uint64(0), np.uint64(n)):
-        tip = (p[0, i], p[1, i], p[2, i])
-        w, t, moments, q, det[0, i], det[1, i], c = factors(tip, arms_at(r, arms, i), frame, intercept, slope)
-        fx, fy, fz = forces(t, moments, q, w[0]), forces(t, moments, q, w[1]), forces(t, moments, q, w[2])
-        out[0, i], out[1, i], out[2, i] = over_struts(fx, fx, c), over_struts(fy, fy, c), over_struts(fz, fz, c)
-        out[3, i], out[4, i], out[5, i] = over_struts(fx, fy, c), over_struts(fx, fz, c), over_struts(fy, fz, c)
+def directed_columns(poses, joints, law, out, det, lengths):
+    """Compliance along one direction a pose, the determinants, the lengths.
 
-
-@loop
-def tensor_rows(position, rotation, arms, frame, intercept, slope, smallest, out, good):
-    """The same with poses in rows: position (n, 3), rotation (n, 9) or None, out (n, 9).
-
-    `good`: whether the determinants are larger than the `smallest`.
+    `poses` are positions (3, n), rotations (9, n) or None, directions (3, n); `joints` those of platform and frame.
     """
-    p, c, d = np.empty((3, ROWS)), np.empty((6, ROWS)), np.empty((2, ROWS))
-    turns = np.empty((9, ROWS))
-    for start in range(0, len(position), ROWS):
-        m, base = min(ROWS, len(position) - start), np.uint64(start)
-        for i in range(np.uint64(0), np.uint64(m)):
-            for k in range(3):
-                p[np.uint64(k), i] = position[base + i, np.uint64(k)]
-        if rotation is None:
-            tensor_columns(m, p, None, arms, frame, intercept, slope, c, d)
-        else:
-            for i in range(np.uint64(0), np.uint64(m)):
-                for k in range(9):
-                    turns[np.uint64(k), i] = rotation[base + i, np.uint64(k)]
-            tensor_columns(m, p, turns, arms, frame, intercept, slope, c, d)
-        for i in range(np.uint64(0), np.uint64(m)):
-            finite = abs(c[2, i]) < np.inf
-            good[base + i] = (abs(d[0, i]) > smallest[0]) & (abs(d[1, i]) > smallest[1]) & finite
-            out[base + i, 0], out[base + i, 4], out[base + i, 8] = c[0, i], c[1, i], c[2, i]
-            out[base + i, 1] = out[base + i, 3] = c[3, i]
-            out[base + i, 2] = out[base + i, 6] = c[4, i]
-            out[base + i, 5] = out[base + i, 7] = c[5, i]
-
-
-@loop
-def directed_columns(n, p, r, d, arms, frame, intercept, slope, out, det, lengths):
-    """Compliance along one direction a pose, the determinants, the lengths."""
+    p, r, d = poses
+    arms, frame = joints
+    n = len(out)
     # Two passes, lengths apart: LLVM vectorises a loop only if at most 128 comparisons tell that no row written
     # overlaps another row (its vectorize-memory-check-threshold). One pass reads 15 rows and writes 9, which needs
     # 9 * 15 + 9 * 8 / 2 = 171: four times slower, and fast as soon as the threshold is 171.
@@ -167,7 +134,7 @@ def directed_columns(n, p, r, d, arms, frame, intercept, slope, out, det, length
         first, last = np.uint64(start), np.uint64(min(start + ROWS, n))
         for i in range(first, last):
             tip, load = (p[0, i], p[1, i], p[2, i]), (d[0, i], d[1, i], d[2, i])
-            w, t, moments, q, det[0, i], det[1, i], c = factors(tip, arms_at(r, arms, i), frame, intercept, slope)
+            w, t, moments, q, det[0, i], det[1, i], c = factors(tip, arms_at(r, arms, i), frame, law)
             f = forces(t, moments, q, combine(w, load))
             out[i] = over_struts(f, f, c)
         for i in range(first, last):

@@ -23,6 +23,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.stiffness.sizes import about
 
 if TYPE_CHECKING:
     from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
@@ -120,6 +121,27 @@ def compliance(name: str, largest: float, typical: tuple[float, float], source: 
 def length_error(typical: tuple[float, float], source: str, meaning: str) -> Parameter:
     """The parameter of an effect by which a length of the geometry is off, mm: the true one less the stated one."""
     return Parameter("error", "mm", 1e-3, (-60.0, 60.0), typical, source=source, meaning=meaning)
+
+
+def choice(
+    name: str, bounds: tuple[int, int], source: str, meaning: str, typical: tuple[int, ...] = (), neutral: int = 0
+) -> Parameter:
+    """The parameter that says on which part the effect acts, a whole number."""
+    low, *_, high = typical or bounds
+    return Parameter(name, "", 1.0, bounds, (low, high), source, neutral, meaning, kind="integer")
+
+
+class Size(float):
+    """A size in a sentence: without words to two digits, with two of them the first above zero, else the second.
+
+    Examples
+    --------
+    >>> "{0} mm too {0:long/short}".format(Size(-0.123))
+    '0.12 mm too short'
+    """
+
+    def __format__(self, words: str) -> str:
+        return words.split("/")[not self > 0.0] if words else about(self)
 
 
 @dataclass(frozen=True)
@@ -257,6 +279,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     load_dependent: bool = False
     unknown_to_control: bool = False
+    told: str = ""  # what a fit has found, parameters by name: "the tool is {error} mm {error:longer/shorter}"
     described_from: tuple[str, ...] = ()
     file: str = ""  # that declares it without code
 
@@ -393,6 +416,8 @@ class Effect:
 
         `p`: parameter name -> value in the units of files, choices as they are.
         """
+        if self.told:
+            return self.told.format(**{q.name: p[q.name] if q.discrete else Size(p[q.name]) for q in self.parameters})
         sizes = []
         for q in self.parameters:
             value = p[q.name] if q.discrete else f"{float(f'{p[q.name]:.3g}'):g} {q.unit}".rstrip()

@@ -23,8 +23,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness import closed_form, exact
-from toolpath_stiff.stiffness.active import ADDING
+from toolpath_stiff.stiffness import closed_form, compiled, exact
 from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
 from toolpath_stiff.stiffness.possible import is_compliance
@@ -55,11 +54,8 @@ def choose_route(model: StiffnessModel, poses: int) -> str:
     """One of `ROUTES` for so many poses."""
     if poses < CLOSED_FORM_FROM or not is_closed_form(model):
         return "exact"
-    if poses < COMPILED_FROM or model.machine.strut_law.shape:  # the compiled loops know straight lines only
-        return "closed_form"
-    from toolpath_stiff.stiffness import compiled
-
-    return "compiled" if compiled.available() else "closed_form"
+    straight = not model.machine.strut_law.shape  # the compiled loops know no other law
+    return "compiled" if poses >= COMPILED_FROM and straight and compiled.available() else "closed_form"
 
 
 def tip_compliance(
@@ -85,49 +81,33 @@ def tip_compliance(
     force
         N, the size of the load.
     route
-        One of `ROUTES`; chosen by the number of poses unless given.
+        One of `ROUTES`, of which all but "exact" are the closed form; chosen by the number of poses unless given.
 
     Returns
     -------
     (n, 3, 3) m/N; nan where the machine is singular.
     """
-    chosen = route or choose_route(model, len(position))
-    if chosen == "exact":
-        return _exact(model, position, rotation, tool_length, force)
-    lengths = np.asarray(tool_length, dtype=float)
-    if lengths.ndim == 0 or np.isnan(lengths).all() or np.ptp(lengths) == 0.0:
-        length = float(lengths.flat[0]) if lengths.size else np.nan
-        return _fast(model, position, rotation, length, force, chosen)
-    compliance = np.empty((len(position), 3, 3))
-    for length in np.unique(lengths).tolist():  # nan counts as one value
-        rows = np.isnan(lengths) if np.isnan(length) else lengths == length
+    compliance, doubtful = np.empty((len(position), 3, 3)), np.ones(len(position), dtype=bool)
+    lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(position),))
+    if (route or choose_route(model, len(position))) != "exact":
+        for length, rows in rows_of_tools(lengths):
+            turn, kernel = None if rotation is None else rotation[rows], closed_form.prepare(model.machine, length)
+            compliance[rows], good = closed_form.tip_compliance(kernel, position[rows], turn)
+            doubtful[rows] = ~(good & is_compliance(compliance[rows]))  # the exact route says what is wrong
+    if doubtful.any():
+        rows = slice(None) if doubtful.all() else doubtful
         turn = None if rotation is None else rotation[rows]
-        compliance[rows] = _fast(model, position[rows], turn, length, force, chosen)
+        blocks = _paths(model, position[rows], turn, lengths[rows], force)
+        compliance[rows] = np.concatenate([exact.tip_compliance(model, path) for _, path in blocks])
     return compliance
 
 
-def _fast(
-    model: StiffnessModel,
-    position: FloatArray,
-    rotation: FloatArray | None,
-    tool_length: float,
-    force: float,
-    route: str,
-) -> FloatArray:
-    """Closed form or compiled loops for one tool length; doubtful poses go to the exact route."""
-    kernel = closed_form.prepare(model.machine, tool_length)
-    if route == "compiled" and not kernel.law.shape:
-        from toolpath_stiff.stiffness import compiled
-
-        compliance, good = compiled.tip_compliance(kernel, position, rotation)
-    else:
-        compliance, good = closed_form.tip_compliance(kernel, position, rotation)
-    good &= is_compliance(compliance)  # what is none goes the exact route, which says what is wrong
-    if not good.all():
-        bad = ~good
-        turn = None if rotation is None else rotation[bad]
-        compliance[bad] = _exact(model, position[bad], turn, tool_length, force)
-    return compliance
+def rows_of_tools(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]]:
+    """Each tool length, nan counts as one, and the rows that have it."""
+    if len(tool_length) and (np.isnan(tool_length).all() or np.ptp(tool_length) == 0.0):
+        return [(float(tool_length[0]), slice(None))]
+    lengths, number = np.unique(tool_length, return_inverse=True)
+    return [(float(length), np.flatnonzero(number == i)) for i, length in enumerate(lengths)]
 
 
 def compliance_along_columns(
@@ -144,9 +124,7 @@ def compliance_along_columns(
     one of the fast routes. Where a pose is not good the exact route must be asked.
     """
     kernel = closed_form.prepare(machine, tool_length)
-    if route == "compiled" and not kernel.law.shape:
-        from toolpath_stiff.stiffness import compiled
-
+    if route == "compiled":
         return compiled.compliance_along_columns(kernel, position, direction, rotation)
     return closed_form.compliance_along_columns(kernel, position, direction, rotation)
 
@@ -168,43 +146,20 @@ def compliance_with_effects(
     -------
     (n,) m/N; nan where the exact route must be asked. Columns as of `compliance_along_columns`.
     """
-    kernel, n = closed_form.prepare(model.machine, tool_length), position.shape[1]
-    sure = np.ones(n, dtype=bool)
+    n = position.shape[1]
+    compliance, sure = np.full(n, np.nan), np.ones(n, dtype=bool)
+    kernel = closed_form.prepare(model.machine, tool_length)
     if model.control is not None:
-        control = kernel.on_joints_of(model.control, tool_length)
+        control = closed_form.prepare(model.control, tool_length, split_of=model.machine)
         position, rotation, sure = closed_form.followed_columns(kernel, control, position, rotation)
-    if not any(hook in ADDING for active in acting_effects(model) for hook in active.effect.hooks):
-        compliance, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
-        compliance[~(sure & good)] = np.nan
-        return compliance
-    compliance = np.full(n, np.nan)
-    extension = 0.0 if np.isnan(tool_length) else tool_length - model.machine.reference_tool_length
-    for start in range(0, n, BLOCK):
-        rows = slice(start, start + BLOCK)
+        model = replace(model, control=None)
+    turns = None if rotation is None else rotation.T.reshape(-1, 3, 3)
+    for rows, path in _paths(model, position.T, turns, np.full(n, tool_length), force):
         turn = None if rotation is None else rotation[:, rows]
-        forces, struts, good = closed_form.strut_forces_columns(kernel, position[:, rows], direction[:, rows], turn)
-        turns = np.broadcast_to(np.eye(3), (len(forces), 3, 3)) if turn is None else turn.T.reshape(-1, 3, 3)
-        path = LoadPath(
-            machine=model.machine,
-            position=position[:, rows].T,
-            rotation=turns,
-            struts=struts,
-            tool_extension=np.full(len(forces), extension),
-            force=np.full(len(forces), force),
-            **model.conditions.columns(len(forces)),
-        )
+        forces, good = closed_form.strut_forces_columns(kernel, position[:, rows], direction[:, rows], turn)
         some = np.flatnonzero(good & sure[rows])
-        path = path if len(some) == len(forces) else path.take(some)
-        compliance[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
-    return compliance
-
-
-def _exact(
-    model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: Tools, force: float
-) -> FloatArray:
-    compliance = np.empty((len(position), 3, 3))
-    for rows, path in _paths(model, position, rotation, tool_length, force):
-        compliance[rows] = exact.tip_compliance(model, path)
+        known = path if len(some) == len(good) else path.take(some)
+        compliance[rows.start + some] = exact.compliance_along(model, known, direction[:, rows].T[some], forces[some])
     return compliance
 
 

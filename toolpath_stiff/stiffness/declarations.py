@@ -6,26 +6,19 @@ import difflib
 import inspect
 import math
 import re
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
-from toolpath_stiff.errors import EffectError, InputError
+from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.contract import HOOKS, LINKS, Effect, Parameter
 from toolpath_stiff.stiffness.effect_source import line_of
 from toolpath_stiff.toml_reader import is_text
 
 TEXTS = ("name", "title", "link", "equation", "source")
+FLAGS, LISTS = ("load_dependent", "unknown_to_control"), ("needs", "described_from")
 NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)  # of an effect or a parameter; a bare key of a machine file
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 KINDS = ("real", "integer", "text")
-LONGEST_SHOWN = 200  # characters of a value in a message
-
-Refuse = Callable[..., InputError]
-
-
-def _is_flag(value: object) -> bool:
-    return isinstance(value, bool)
 
 
 def _are_texts(value: object) -> bool:
@@ -37,23 +30,14 @@ RULES: list[tuple[str, Callable[[Any], object], str]] = [
     *((attribute, is_text, "a text that is not empty") for attribute in TEXTS),
     ("name", NAME.fullmatch, "letters, digits and underscores, such as my_screw"),
     ("link", LINKS.__contains__, f"one of {', '.join(LINKS)}"),
-    ("load_dependent", _is_flag, "True or False"),
-    ("unknown_to_control", _is_flag, "True or False"),
-    ("needs", _are_texts, 'names of columns: ("time_min",)'),
-    ("described_from", _are_texts, "marks of readings, a tuple of texts"),
+    *((attribute, (False, True).__contains__, "True or False") for attribute in FLAGS),
+    *((attribute, _are_texts, 'texts in brackets, such as ("time_min",)') for attribute in LISTS),
     ("parameters", lambda value: isinstance(value, tuple | list), "(Parameter(...), ...), with a comma"),
 ]
 
 
 def check_declarations(effect: object, where: str) -> None:
-    """Refuse what is not a complete effect.
-
-    Parameters
-    ----------
-    effect
-        An instance.
-    where
-        The file, or the name of the entry point, for messages.
+    """Refuse what is not a complete effect; `where` is its file, or the name of its entry point.
 
     Raises
     ------
@@ -62,34 +46,46 @@ def check_declarations(effect: object, where: str) -> None:
     """
     if not isinstance(effect, Effect):
         raise EffectError(f"{effect!r} is not an effect", file=where)
-    kind = type(effect)
+    if fault := next(_faults(effect), None):
+        attribute, mistake, expected = fault
+        kind = type(effect)
+        line = line_of(kind, attribute)
+        raise EffectError(f"effect {kind.__name__}: {mistake}", expected=expected, file=where, line=line)
 
-    def refuse(attribute: str, mistake: str, expected: str = "", index: int | None = None) -> InputError:
-        line = line_of(kind, attribute, index)
-        return EffectError(f"effect {kind.__name__}: {mistake}", expected=expected, file=where, line=line)
 
+def _faults(effect: Any) -> Iterator[tuple[str, str, str]]:
+    """Attribute, mistake, what was expected."""
     for attribute in (*TEXTS, "parameters"):
         if not hasattr(effect, attribute):
-            raise refuse("", f"`{attribute}` is missing")
+            yield "", f"`{attribute}` is missing", ""
     for attribute, holds, expected in RULES:
         value = getattr(effect, attribute)
         if not holds(value):
-            raise refuse(attribute, f"{attribute} = {value!r:.60}", expected)
-    for i, parameter in enumerate(effect.parameters):
+            yield attribute, f"{attribute} = {value!r:.60}", expected
+    names = []
+    for parameter in effect.parameters:
         if not isinstance(parameter, Parameter):
-            raise refuse("parameters", f"parameters hold {parameter!r:.60}", "Parameter(...)", i)
-        if wrong := wrong_in(parameter):
-            raise refuse("parameters", f"parameter {parameter.name}: {wrong[0]}", wrong[1], i)
-        if parameter.name in [earlier.name for earlier in effect.parameters[:i]]:
-            raise refuse("parameters", f"parameter {parameter.name} is declared twice", index=i)
-    _check_hooks(effect, refuse)
+            yield "parameters", f"parameters hold {parameter!r:.60}", "Parameter(...)"
+        elif wrong := wrong_in(parameter):
+            yield "parameters", f"parameter {parameter.name}: {wrong[0]}", wrong[1]
+        elif parameter.name in names:
+            yield "parameters", f"parameter {parameter.name} is declared twice", ""
+        names.append(parameter.name)
+    for name, value in vars(type(effect)).items():
+        if inspect.isfunction(value) and name not in HOOKS and not name.startswith("_"):
+            for near in difflib.get_close_matches(name, HOOKS, n=1, cutoff=0.8):
+                yield name, f"method {name} is never called", near
+    if not effect.hooks:
+        yield "", "adds nothing", f"one of the methods {', '.join(HOOKS)}"
+    if effect.is_instrument != (effect.hooks == ["reading"]):
+        mistake = f"link = {effect.link!r} with {', '.join(effect.hooks)}"
+        yield "link", mistake, '`reading` alone with link "instrument", or the others with another link'
 
 
 def wrong_in(parameter: Parameter) -> tuple[str, str] | None:
     """What is wrong, and what was expected."""
-    for attribute in ("name", "unit", "source", "meaning"):
-        if not isinstance(getattr(parameter, attribute), str):
-            return f"{attribute} = {getattr(parameter, attribute)!r}", "a text"
+    if not _are_texts((parameter.name, parameter.unit, parameter.source, parameter.meaning)):
+        return "not of texts", "texts as name, unit, source and meaning"
     if not NAME.fullmatch(parameter.name):
         return f"name = {parameter.name!r}", "letters, digits and underscores"
     if parameter.kind not in KINDS:
@@ -97,55 +93,24 @@ def wrong_in(parameter: Parameter) -> tuple[str, str] | None:
     if not BARE_KEY.fullmatch(parameter.key):
         return f"unit = {parameter.unit!r} makes the key {parameter.key!r}", "a unit in plain letters, such as um, N/um"
     if not _is_number(parameter.si) or not 0.0 < parameter.si < math.inf:
-        expected = f"the SI value of one {parameter.unit or 'unit'} as a number, such as 1e-9"
-        return f"si = {_shown(parameter.si)}", expected
+        return "si is no number above 0", f"the SI value of one {parameter.unit or 'unit'}, such as 1e-9"
     if parameter.kind == "text":
         return None
-    for attribute in ("bounds", "typical"):
-        pair = getattr(parameter, attribute)
-        good = isinstance(pair, tuple | list) and len(pair) == 2 and all(map(_is_number, pair))
-        if not good or any(math.isnan(value) for value in pair):
-            return f"{attribute} = {_shown(pair)}", "two numbers (low, high)"
+    for name, pair in (("bounds", parameter.bounds), ("typical", parameter.typical), ("neutral", [parameter.neutral])):
+        numbers = isinstance(pair, tuple | list) and all(map(_is_number, pair))
+        if not numbers or len(pair) != (1 if name == "neutral" else 2):
+            return f"{name} is not of numbers", "bounds and typical = (low, high), neutral a number"
     (low, high), typical = parameter.bounds, parameter.typical
-    if not _is_number(parameter.neutral):
-        return f"neutral = {_shown(parameter.neutral)}", "a number, or inf"
     if not low < high or not low <= parameter.neutral <= high:
-        mistake = f"bounds {tuple(parameter.bounds)}, neutral {parameter.neutral:g}"
-        return mistake, "low < high with the neutral value between them"
+        return f"bounds {low:g} to {high:g}, neutral {parameter.neutral:g}", "low < high with the neutral between them"
     if not low <= typical[0] <= typical[1] <= high:
-        return f"typical {tuple(typical)}, bounds {tuple(parameter.bounds)}", "low <= high within the bounds"
+        return f"typical {typical[0]:g} to {typical[1]:g}", f"low <= high within the bounds {low:g} to {high:g}"
     return None
 
 
 def _is_number(value: object) -> bool:
     """Whether it is a number that a float holds: Python's whole numbers may be larger."""
-    if isinstance(value, int) and not isinstance(value, bool):
-        return abs(value) <= sys.float_info.max
-    return isinstance(value, float)
-
-
-def _shown(value: object) -> str:
-    """A value in a few words where it is endless; Python writes no whole number of more than 4,300 digits."""
     try:
-        text = repr(value)
-    except ValueError:
-        return "a number of thousands of digits"
-    return text if len(text) <= LONGEST_SHOWN else f"{text[:10]}... ({len(text)} characters)"
-
-
-def _check_hooks(effect: Effect, refuse: Refuse) -> None:
-    """At least one hook of its own, as a method, and none with a slip in its name."""
-    kind = type(effect)
-    for name, value in vars(kind).items():
-        slip = not name.startswith("_") and name not in HOOKS and inspect.isfunction(value)
-        if slip and (near := difflib.get_close_matches(name, HOOKS, n=1, cutoff=0.8)):
-            raise refuse(name, f"method {name} is never called", near[0])
-    for hook in HOOKS:
-        if not callable(getattr(effect, hook)):
-            raise refuse(hook, f"{hook} = {getattr(effect, hook)!r:.60}", "a method")
-    hooks = effect.hooks
-    if not hooks:
-        raise refuse("", "adds nothing", f"one of the methods {', '.join(HOOKS)}")
-    if effect.is_instrument != (hooks == ["reading"]):
-        mistake = f"link = {effect.link!r} with the method{'s' if len(hooks) > 1 else ''} {', '.join(hooks)}"
-        raise refuse("link", mistake, '`reading` alone with link "instrument", or the others with another link')
+        return isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(float(value))
+    except OverflowError:
+        return False

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
+import re
 import sys
 from pathlib import Path
 
@@ -32,30 +32,11 @@ def line_in(error: BaseException, file: str) -> int | None:
     return line
 
 
-def line_of_hook(effect: Effect, hook: str) -> int | None:
-    """Line on which the hook is defined, if the effect's own file defines it."""
-    code = getattr(inspect.unwrap(getattr(type(effect), hook)), "__code__", None)
-    here = code is not None and Path(code.co_filename).resolve() == Path(file_of(effect)).resolve()
-    return code.co_firstlineno if here and code is not None else None
-
-
-def line_of(kind: type, attribute: str, index: int | None = None) -> int | None:
-    """Line of a class, of what it assigns or defines, or of an element of that; None without a source."""
+def line_of(kind: type, name: str = "") -> int | None:
+    """Line on which a class assigns or defines a name, else that of the class; None without a source."""
     try:
-        tree = ast.parse(Path(inspect.getsourcefile(kind) or "").read_text("utf-8"))
-    except (TypeError, OSError, ValueError, SyntaxError):  # built in, or its file or module is gone
+        lines, first = inspect.getsourcelines(kind)
+    except (TypeError, OSError):  # built in, or its file is gone
         return None
-    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__]
-    return _line_within(classes[0], attribute, index) if classes else None
-
-
-def _line_within(node: ast.ClassDef, attribute: str, index: int | None) -> int:
-    for part in node.body:
-        targets = getattr(part, "targets", None) or [getattr(part, "target", None)]
-        names = [getattr(part, "name", None), *(getattr(target, "id", None) for target in targets)]
-        if attribute in names:
-            value = getattr(part, "value", None)
-            if index is not None and isinstance(value, ast.Tuple | ast.List) and index < len(value.elts):
-                return value.elts[index].lineno
-            return part.lineno
-    return node.lineno
+    defined = re.compile(rf"\s+(def )?{re.escape(name)}\s*[=:(]")
+    return next((first + i for i, line in enumerate(lines) if name and defined.match(line)), first)

@@ -18,8 +18,7 @@ the stretch of strut i, s_i the secant compliance that the effects state, the fo
     g(F) = e(F) + Q_ff F + Q_fw w - J x,      K x = w - J^T F.
 
 It is convex, because a strut gives more under more force, and its gradient has kinks (a strut at the edge of its gap).
-Whole steps of Newton's method settle most poses; where they cycle between the kinks, steps with an exact line search,
-which converge on such functions from everywhere, come first.
+Whole steps of Newton's method settle most poses; where they cycle between the kinks, parts of them settle the others.
 """
 
 from __future__ import annotations
@@ -27,7 +26,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -38,7 +36,8 @@ from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.stiffness.possible import at_pose, possible, refuse_struts_without_stiffness
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
-WHOLE_STEPS, MOST_STEPS, LINE_STEPS = 25, 200, 40
+SHARES = (1.0, 0.5, 0.25, 0.1, 1.0)  # of a step: where whole ones cycle between the kinks, parts of them do not
+WHOLE_STEPS, PART_STEPS = 25, 200
 
 
 LEAST_STIFFNESS = 1e-6  # N/m; what a strut law gives below is no stiffness, and its inverse may be no number
@@ -51,12 +50,6 @@ DIFFERENCE = 1e-9  # of the load, for the tangent: well below what settles, or t
 
 
 LEAST_TANGENT = 1e-3  # of the secant: a strut whose stretch does not grow with its force would be infinitely stiff
-
-
-FLAT = 0.1  # of its slope at the start, to which a line search brings the slope of the energy
-
-
-FAINT = 1e-7  # of the struts' stiffness: added to the parallel one in the search alone, so that it can be inverted
 
 
 @dataclass(frozen=True)
@@ -107,22 +100,22 @@ def settle(load: SharedLoad, first: FloatArray) -> tuple[FloatArray, BoolArray]:
         (n, 6) N, and (n,) whether they stay.
     """
     forces = np.array(first)
-    rest = _whole_steps(load, forces, np.arange(len(forces)))
-    _line_searches(load, forces, rest)
-    rest = _whole_steps(load, forces, rest)
+    rest = np.arange(len(forces))
+    for share in SHARES:
+        rest = _newton_steps(load, forces, rest, share)
     settled = np.ones(len(forces), dtype=bool)
     settled[rest] = False
     return forces, settled
 
 
-def _whole_steps(load: SharedLoad, forces: FloatArray, rows: IntArray) -> IntArray:
-    """Newton's method at some poses, in place; the rows that have not settled.
+def _newton_steps(load: SharedLoad, forces: FloatArray, rows: IntArray, share: float) -> IntArray:
+    """Newton's method at some poses, in place, by a share of each step; the rows that have not settled.
 
     With e_i = t_i F_i + o_i, t the tangent and o_i = (s_i - t_i) F_i from the last forces, the system is linear. Where
     its forces stay e_i = s_i F_i holds, whatever the tangent was.
     """
     eye = np.eye(6)
-    for _ in range(WHOLE_STEPS):
+    for _ in range(WHOLE_STEPS if share == 1.0 else PART_STEPS):
         if not len(rows):
             break
         before, jacobian = forces[rows], load.jacobian[rows]
@@ -137,62 +130,9 @@ def _whole_steps(load: SharedLoad, forces: FloatArray, rows: IntArray) -> IntArr
         moved = np.abs(settled - before).max(axis=1) / load.force[rows]
         # Between tension and compression of a strut lies its gap, where it is idle.
         crossing = (settled * before < 0.0) & (moved > SETTLED)[:, None]
-        forces[rows] = np.where(crossing, 0.0, settled)
+        forces[rows] = before + share * (np.where(crossing, 0.0, settled) - before)
         rows = rows[moved > SETTLED]
     return rows
-
-
-def _line_searches(load: SharedLoad, forces: FloatArray, rows: IntArray) -> None:
-    """Newton's method with an exact line search at some poses, in place, to near the least energy."""
-    shared, moved = _parallel_alone(load, rows)  # compliance of the parallel stiffness as the struts see it
-    for _ in range(MOST_STEPS):
-        if not len(rows):
-            break
-        before = forces[rows]
-        gradient = partial(_incompatibility, load, rows, shared, moved)
-        tangent, _, form = load.tangent(before, rows)
-        step = -_solved(tangent[..., None] * np.eye(6) + form[..., :6] + shared, gradient(before))
-        forces[rows] = before + _length(gradient, before, step)[:, None] * step
-        going = np.abs(step).max(axis=1) > 1e-3 * SETTLED * load.force[rows]
-        rows, shared, moved = rows[going], shared[going], moved[going]
-
-
-def _parallel_alone(load: SharedLoad, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """J K^-1 J^T (k, 6, 6) and J K^-1 w (k, 6): strut stretches as the parallel stiffness alone would have them."""
-    jacobian = load.jacobian[rows]
-    transposed = np.swapaxes(jacobian, 1, 2)
-    strut, _ = load.compliance(np.repeat(load.force[rows, None], 6, axis=1), rows)
-    faint = FAINT * transposed @ (jacobian / strut[..., None])
-    flexible = jacobian @ np.linalg.inv(load.parallel[rows] + faint)
-    return flexible @ transposed, _times(flexible, load.wrench[rows])
-
-
-def _incompatibility(
-    load: SharedLoad, rows: IntArray, shared: FloatArray, moved: FloatArray, forces: FloatArray
-) -> FloatArray:
-    """(k, 6) m, the gradient g of the complementary energy."""
-    strut, form = load.compliance(forces, rows)
-    both = np.concatenate([forces, load.wrench[rows]], axis=1)
-    return np.asarray(strut * forces + _times(form, both) + _times(shared, forces) - moved)
-
-
-def _length(gradient: Callable[[FloatArray], FloatArray], forces: FloatArray, step: FloatArray) -> FloatArray:
-    """(n,) how much of each step to go: to where the energy falls no further along it, at most all of it."""
-
-    def slope(share: FloatArray) -> FloatArray:
-        return np.asarray(np.einsum("ni,ni->n", gradient(forces + share[:, None] * step), step))
-
-    low, high = np.zeros(len(forces)), np.ones(len(forces))
-    goal = FLAT * np.abs(slope(low))
-    share, rise = high.copy(), slope(high)
-    for _ in range(LINE_STEPS):
-        rising, falling = rise > goal, (rise < -goal) & (share < 1.0)
-        if not (rising | falling).any():
-            break
-        high, low = np.where(rising, share, high), np.where(falling, share, low)
-        share = np.where(rising | falling, 0.5 * (low + high), share)
-        rise = slope(share)
-    return share
 
 
 def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:

@@ -224,10 +224,9 @@ def load_path(
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     n = len(tip)
     length = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    one_length = length[0] if n and (np.isnan(length).all() or np.ptp(length) == 0.0) else length
     if model.control is not None and n:
         tip, rotation = _where_control_goes(model, tip, rotation, length)
-    struts = solve_struts(model.machine, tip, rotation, one_length)
+    struts = solve_struts(model.machine, tip, rotation, length)
     turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
     return LoadPath(
         machine=model.machine,

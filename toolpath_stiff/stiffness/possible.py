@@ -103,14 +103,12 @@ def refuse_struts_without_stiffness(effects: Sequence[Effect], path: LoadPath, s
 def _impossible(effects: Sequence[Effect], path: LoadPath, row: int, part: str) -> EffectError:
     """An error that names the effects from outside the package, else all effects, else the machine."""
     foreign = [effect for effect in effects if is_foreign(effect)]
-    named = foreign or list(effects)
-    cause = f"effect{'s' if len(named) > 1 else ''} {', '.join(effect.name for effect in named)}"
-    hint = "check the parameters of these effects" if named else "check the machine file: strut law, joints"
+    names = ", ".join(effect.name for effect in foreign or effects)
+    cause, hint = f"machine {path.machine.name}", "check the parameters of the effects, strut law and joints"
     if foreign:
         hint = f"`{command_line('effects', 'check', file_of(foreign[0]))}` tries an effect by itself"
     return EffectError(
-        f"with {cause if named else f'machine {path.machine.name}'} {part} has no positive stiffness"
-        f"{at_pose(path, row)}",
+        f"with {f'effect {names}' if names else cause} {part} has no positive stiffness{at_pose(path, row)}",
         expected="a compliance that is finite, symmetric and positive definite",
         hint=hint,
     )

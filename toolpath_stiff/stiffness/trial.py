@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pickle
 import re
-import time
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import EffectError, EffectFault, InputError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.kinematics import solve_struts
@@ -32,7 +32,7 @@ from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
 if TYPE_CHECKING:
     import pandas as pd
 
-POSES, DRAWN, TIMED = 24, 600, 512
+POSES, DRAWN = 24, 600
 LEANING = rad_from_deg(10.0)  # largest roll, pitch and yaw of the poses
 LONGER = 0.1  # m, of the longest tool, for effects that ask for it
 SETUPS = ("riser", "table")
@@ -40,10 +40,10 @@ ALLOW = "--allow-unchecked-effects"
 SAME = 1e-9  # relative: of results that must agree
 
 # SI value of the units that parameters have.
-BASE = {"m": 1.0, "N": 1.0, "rad": 1.0, "s": 1.0, "K": 1.0, "C": 1.0, "deg": RAD_PER_DEG, "%": 1e-2, "1": 1.0}
 PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
 UNITS = {prefix + unit: factor for prefix, factor in PREFIXES.items() for unit in ("m", "N", "rad", "s")}
-UNITS |= BASE | {"percent": 1e-2, "min": 60.0, "h": 3600.0}
+UNITS |= {"": 1.0, "m": 1.0, "N": 1.0, "rad": 1.0, "s": 1.0, "K": 1.0, "C": 1.0, "deg": RAD_PER_DEG}
+UNITS |= {"%": 1e-2, "percent": 1e-2, "1": 1.0, "min": 60.0, "h": 3600.0}
 
 
 @dataclass(frozen=True)
@@ -99,13 +99,13 @@ def failure(effect: Effect, machine: Hexapod) -> str:
 @lru_cache(maxsize=256)
 def _failure(effect: Effect, machine: bytes) -> str:
     try:
-        outcomes = try_effect(effect, pickle.loads(machine), timed=False).outcomes
+        outcomes = try_effect(effect, pickle.loads(machine)).outcomes
     except InputError as error:
         return f"cannot be tried: {error}"
     return "; ".join(f"fails the check of its {row.name}: {row.found}" for row in outcomes if row.passed is False)
 
 
-def try_effect(effect: Effect, machine: Hexapod, seed: int = 0, timed: bool = True) -> Trial:
+def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> Trial:
     """Try an effect on a machine, by itself: at its neutral value, typical values and finite bounds.
 
     Parameters
@@ -116,32 +116,52 @@ def try_effect(effect: Effect, machine: Hexapod, seed: int = 0, timed: bool = Tr
         Its own effects are left out.
     seed
         Of the poses, which lie within the machine's reach, tilted up to 10 degrees.
-    timed
-        Whether its speed is taken too, which nothing depends on.
     """
-    bare = build_model(machine.with_changes(effects=(), instruments=()))
-    poses, sets = _poses(effect, machine, seed), dict(_parameter_sets(effect))
-    outcomes = [_unit(p) for p in effect.parameters if p.kind == "real"]
+    outcomes = [_unit(parameter) for parameter in effect.parameters if parameter.kind == "real"]
     try:
-        plain, acted = _answer(bare, poses), {}
-        for words, values in sets.items():
-            try:
-                acted[words] = _answer(_with(bare, effect, values), poses)
-            except InputError as error:  # at its bounds an effect may ask more than a machine can give
-                if "bound" not in words:
-                    return Trial(effect, (*outcomes, TrialOutcome("stiffness", False, f"{words}: {error}")))
-        count = f"{len(acted)} sets of parameters, {len(poses)} poses"
-        outcomes.append(TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}"))
-        high = _with(bare, effect, sets["typical, high"])
-        outcomes += [_neutral(acted, plain), _acts(effect, acted, plain), _one_by_one(high, poses)]
-        outcomes += _sign(high, effect, poses)
-        if timed:
-            many = np.resize(poses, (TIMED, poses.shape[1]))
-            ratio = _seconds(high, many) / _seconds(bare, many)
-            outcomes.append(TrialOutcome("speed", None, f"{ratio:.1f} times the plain model's time for {TIMED} poses"))
+        outcomes += _behaviour(effect, machine.with_changes(effects=(), instruments=()), seed)
     except EffectFault as fault:
         outcomes.append(TrialOutcome("shapes", False, str(fault)))
     return Trial(effect, tuple(outcomes))
+
+
+def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOutcome]:
+    """What it does at some poses with one set of parameters after the other."""
+    plain, poses = build_model(machine), _poses(effect, machine, seed)
+    before, after = _shown(plain, _path(plain, poses)), {}
+    for words, values in _parameter_sets(effect):
+        model = build_model(machine, extra=[ActiveEffect(effect, values)])
+        path = _path(model, poses)
+        try:
+            exact.tip_compliance(model, path)  # refused if there can be no such one
+            after[words] = _shown(model, path)
+        except EffectFault:
+            raise
+        except InputError as error:  # at its bounds an effect may ask more than a machine can give
+            if "bounds" not in words:
+                yield TrialOutcome("stiffness", False, f"{words}: {error}")
+                return
+        if words == "typical, high":
+            alone = np.array([_shown(model, path.take(np.array([i])))[0] for i in range(len(path))])
+            mixed = _largest(alone / after[words] - 1.0)
+            negative = [] if _goes_both_ways(effect) else [*_negative(model, path)]
+    count = f"{len(after)} sets of parameters, {len(poses)} poses"
+    yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}")
+    change = _largest(after["neutral"] / before - 1.0)
+    found = f"there it changes the stiffness by up to {100.0 * change:.3g} %; it must not"
+    yield TrialOutcome("neutral value", change <= SAME, "there the effect vanishes" if change <= SAME else found)
+    changes = 100.0 * (after["typical, high"] / before - 1.0)
+    if _largest(changes) > 100.0 * SAME:
+        span = f"{changes.min():+.3g} to {changes.max():+.3g} % (median {np.median(changes):+.3g} %)"
+        yield TrialOutcome("size", None, f"at its upper typical value the stiffness changes by {span}")
+    else:  # one drawn from readings may act at a set-up, a load, a corner that is not among these poses
+        passed = None if effect.described_from else False
+        yield TrialOutcome("size", passed, "at its upper typical value it changes nothing at these poses")
+    found = f"alone and together differ by up to {100.0 * mixed:.3g} %: the poses mix"
+    yield TrialOutcome("poses", mixed <= SAME, "each alone gives what all together give" if mixed <= SAME else found)
+    for hook in negative:
+        found = f"{hook} is negative; if both signs are meant, bound the parameter so"
+        yield TrialOutcome("sign", False, found)
 
 
 def _poses(effect: Effect, machine: Hexapod, seed: int) -> FloatArray:
@@ -163,27 +183,16 @@ def _poses(effect: Effect, machine: Hexapod, seed: int) -> FloatArray:
 
 def _parameter_sets(effect: Effect) -> Iterator[tuple[str, Values]]:
     """Words -> SI values. A bound that is not finite is left out."""
-
-    def values(choose: str, index: int = 0) -> Values:
-        chosen: dict[str, str | float] = {}
+    sets = (("neutral", "neutral", 0), ("typical, low", "typical", 0), ("typical, high", "typical", 1))
+    for words, attribute, index in (*sets, ("lower bounds", "bounds", 0), ("upper bounds", "bounds", 1)):
+        values: dict[str, str | float] = {}
         for p in effect.parameters:
             if p.discrete:
-                chosen[p.name] = SETUPS[0] if p.kind == "text" else int(p.bounds[index])
+                values[p.name] = SETUPS[0] if p.kind == "text" else int(p.bounds[index])
             else:
-                chosen[p.name] = (p.neutral if choose == "neutral" else getattr(p, choose)[index]) * p.si
-        return chosen
-
-    yield "neutral", values("neutral")
-    yield "typical, low", values("typical")
-    yield "typical, high", values("typical", 1)
-    for index, word in enumerate(("lower", "upper")):
-        if all(p.kind == "text" or np.isfinite(p.bounds[index]) for p in effect.parameters):
-            yield f"{word} bounds", values("bounds", index)
-
-
-def _with(bare: StiffnessModel, effect: Effect, values: Values) -> StiffnessModel:
-    assert bare.given is not None
-    return build_model(bare.given, extra=[ActiveEffect(effect, values)])
+                values[p.name] = p.si * (p.neutral if words == "neutral" else getattr(p, attribute)[index])
+        if "bounds" not in words or np.isfinite([value for value in values.values() if isinstance(value, float)]).all():
+            yield words, values
 
 
 def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
@@ -197,14 +206,8 @@ def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
     )  # fmt: skip
 
 
-def _answer(model: StiffnessModel, poses: FloatArray) -> FloatArray:
-    """(n,) N/m that a gauge shows, one direction a pose; the full tensors are computed, and refused if impossible."""
-    path = _path(model, poses)
-    exact.tip_compliance(model, path)
-    return _along(model, path)
-
-
-def _along(model: StiffnessModel, path: LoadPath) -> FloatArray:
+def _shown(model: StiffnessModel, path: LoadPath) -> FloatArray:
+    """(n,) N/m that a gauge shows, one direction a pose."""
     assert path.direction is not None
     stiffness = 1.0 / exact.compliance_along(model, path, path.direction)
     for active in model.instruments:
@@ -212,69 +215,25 @@ def _along(model: StiffnessModel, path: LoadPath) -> FloatArray:
     return np.asarray(stiffness)
 
 
-def _neutral(acted: Mapping[str, FloatArray], plain: FloatArray) -> TrialOutcome:
-    if "neutral" not in acted:
-        return TrialOutcome("neutral value", False, "no result at the neutral value")
-    gap = float(np.abs(acted["neutral"] / plain - 1.0).max())
-    if gap <= SAME:
-        return TrialOutcome("neutral value", True, "there the effect vanishes")
-    return TrialOutcome(
-        "neutral value", False, f"there it changes the stiffness by up to {100.0 * gap:.3g} %; it must not"
-    )
+def _largest(values: FloatArray) -> float:
+    return float(np.abs(values).max())
 
 
-def _acts(effect: Effect, acted: Mapping[str, FloatArray], plain: FloatArray) -> TrialOutcome:
-    changes = 100.0 * (acted["typical, high"] / plain - 1.0)
-    if np.abs(changes).max() <= 100.0 * SAME:
-        if (
-            effect.described_from
-        ):  # its constants are those of readings: a set-up, a load, a corner not among these poses
-            drawn = "at these poses it changes nothing; `diagnose` judges it where it was drawn from"
-            return TrialOutcome("size", None, drawn)
-        return TrialOutcome("size", False, "at its upper typical value it changes nothing")
-    span = f"{changes.min():+.3g} to {changes.max():+.3g} % (median {np.median(changes):+.3g} %)"
-    return TrialOutcome("size", None, f"at its upper typical value the stiffness changes by {span}")
+def _goes_both_ways(effect: Effect) -> bool:
+    """Whether it may add and take: its neutral value lies between bounds, or it was drawn from readings."""
+    between = any(p.kind == "real" and p.bounds[0] < p.neutral < p.bounds[1] for p in effect.parameters)
+    return between or bool(effect.described_from)
 
 
-def _one_by_one(model: StiffnessModel, poses: FloatArray) -> TrialOutcome:
-    """A pose's result must not hang on the poses beside it."""
-    path = _path(model, poses)
-    alone = np.array([_along(model, path.take(np.array([i])))[0] for i in range(len(path))])
-    gap = float(np.abs(alone / _along(model, path) - 1.0).max())
-    if gap <= SAME:
-        return TrialOutcome("poses", True, "each alone gives what all together give")
-    return TrialOutcome("poses", False, f"alone and together differ by up to {100.0 * gap:.3g} %: the poses mix")
-
-
-def _sign(model: StiffnessModel, effect: Effect, poses: FloatArray) -> list[TrialOutcome]:
-    """A part that gives way can only add compliance, one beside the struts only stiffness.
-
-    Parameters whose neutral value lies between their bounds, and constants drawn from readings, go both ways.
-    """
-    both_ways = any(p.kind == "real" and p.bounds[0] < p.neutral < p.bounds[1] for p in effect.parameters)
-    if both_ways or effect.described_from:
-        return []
-    path = _path(model, poses)
+def _negative(model: StiffnessModel, path: LoadPath) -> Iterator[str]:
+    """Hooks that add less than nothing: what gives way can only add compliance, what stands beside only stiffness."""
     for active in model.effects:
         for hook in ADDING:
             added = active.adds(hook, path)
-            if added is None:
-                continue
-            lowest = added if added.ndim == 2 else np.linalg.eigvalsh(added)
-            if lowest.min() < -SAME * np.abs(lowest).max():
-                negative = f"{hook} is negative, down to {lowest.min():.3g}"
-                return [TrialOutcome("sign", False, f"{negative}; if both signs are meant, bound the parameter so")]
-    return []
-
-
-def _seconds(model: StiffnessModel, poses: FloatArray) -> float:
-    path = _path(model, poses)
-    best = np.inf
-    for _ in range(3):
-        start = time.process_time()
-        _along(model, replace(path))
-        best = min(best, time.process_time() - start)
-    return max(best, 1e-6)
+            if added is not None:
+                lowest = np.asarray(added if added.ndim == 2 else np.linalg.eigvalsh(added))
+                if lowest.min() < -SAME * _largest(lowest):
+                    yield hook
 
 
 def _unit(parameter: Parameter) -> TrialOutcome:
@@ -282,21 +241,15 @@ def _unit(parameter: Parameter) -> TrialOutcome:
     meant, name = unit_in_si(parameter.unit), f"unit of {parameter.name}"
     if meant is None:
         return TrialOutcome(name, None, f"{parameter.unit!r} is not known here; si = {parameter.si:g} is not checked")
-    value = f"one {parameter.unit or 'unit'} is {meant:g} in SI"
-    if abs(parameter.si / meant - 1.0) > SAME:
-        return TrialOutcome(name, False, f"{value}, but si = {parameter.si:g}")
-    return TrialOutcome(name, True, value)
+    agrees, value = abs(parameter.si / meant - 1.0) <= SAME, f"one {parameter.unit or 'unit'} is {meant:g} in SI"
+    return TrialOutcome(name, agrees, value if agrees else f"{value}, but si = {parameter.si:g}")
 
 
 def unit_in_si(unit: str) -> float | None:
     """SI value of one `unit` such as `nm/N/m` or `N m/rad`; None if it is not known."""
-    value = 1.0
-    for place, part in enumerate(unit.split("/") if unit else ()):
-        for token in re.split(r"[ .*]+", part.strip()):
-            if token not in UNITS:
-                return None
-            value = value / UNITS[token] if place else value * UNITS[token]
-    return value
+    above, *below = ([UNITS.get(token, np.nan) for token in re.split(r"[ .*]+", part)] for part in unit.split("/"))
+    value = float(np.prod(above) / np.prod([factor for part in below for factor in part]))
+    return None if np.isnan(value) else value
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -330,10 +283,7 @@ class EffectCheck(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Each check of each effect."""
-        rows = [
-            {"effect": t.effect.name, "passed": t.passed, "checks": [vars(outcome) for outcome in t.outcomes]}
-            for t in self.trials
-        ]
+        rows = [{"effect": t.effect.name, "passed": t.passed, "checks": to_dict(t.outcomes)} for t in self.trials]
         return {"file": self.file, "machine": self.machine, "passed": self.passed, "effects": rows}
 
     def to_frame(self) -> pd.DataFrame:

@@ -22,7 +22,6 @@ from urllib.parse import parse_qs, unquote, urlsplit
 from toolpath_stiff.api.inputs import finite
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import is_file
-from toolpath_stiff.locks import reason
 from toolpath_stiff.studio.actions import do, take_file
 from toolpath_stiff.studio.page import exported, page
 from toolpath_stiff.studio.picture import document
@@ -147,7 +146,7 @@ class Handler(BaseHTTPRequestHandler):
         except (ConnectionError, TimeoutError):  # the tab was closed
             self.close_connection = True
         except OSError as error:
-            self._json({"error": reason(error)})
+            self._json({"error": error.strerror or str(error)})
         return None
 
     @property

@@ -13,7 +13,6 @@ import math
 import re
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.controller import Controller, Switches
 from toolpath_stiff.nc.cutter_location.modes import one_frame
 from toolpath_stiff.nc.cutter_location.motion import to_point
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
@@ -22,7 +21,6 @@ from toolpath_stiff.nc.cutter_location.vocabulary import execute
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Unsupported
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import any_statement
 
 NO_UNITS = "the file names no UNITS; its numbers are taken as mm"
@@ -31,19 +29,16 @@ OPERATION = re.compile(r"\s*\$\$\s*OPERATION NAME\s*:\s*(.*\S)", re.IGNORECASE)
 PACKED_AT = 50_000  # moves
 
 
-def not_for(controller: Controller, offsets: Offsets | None, block_delete: Switches) -> tuple[str, ...]:
-    """Warnings about what was asked for and means nothing to a cutter-location file."""
+def not_for(request: Request) -> list[str]:
+    """A warning about what was asked for and means nothing to a cutter-location file."""
+    controller = request.controller
     given = {
         "a dialect": controller.dialect.name != "generic",
-        "work offsets": offsets is not None and any(offset.given for offset in offsets.table),
+        "work offsets": any(offset.given for offset in request.work_offsets.table),
         "posted kinematics": controller.kinematics is not None,
-        "block-delete switches": bool(block_delete) or bool(controller.switches),
+        "block-delete switches": bool(request.switches),
     }
-    return tuple(
-        f"{what} mean nothing to a cutter-location file and are not used"
-        for what, is_given in given.items()
-        if is_given
-    )
+    return [f"{what} mean nothing to a cutter-location file and are not used" for what in given if given[what]]
 
 
 def read(request: Request) -> ReadProgram:
@@ -63,7 +58,11 @@ def read(request: Request) -> ReadProgram:
     state = CutterLocationState(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
     for error in run(state, request.lines):
         raise error
-    warnings = not_for(request.controller, request.work_offsets, request.block_delete)
+    return program_of(state, request)
+
+
+def program_of(state: CutterLocationState, request: Request) -> ReadProgram:
+    """What a run made of a file."""
     return ReadProgram(
         name=request.name,
         path=request.path,
@@ -72,7 +71,7 @@ def read(request: Request) -> ReadProgram:
         origin=request.default_origin if request.origin is None else request.origin,
         origin_source="default" if request.origin is None else "option",
         unsupported=unsupported(state),
-        warnings=(*warnings, *state.warnings),
+        warnings=(*not_for(request), *state.warnings),
         assumptions=tuple(state.assumptions),
         tools=tuple(state.used_tools.values()),
         dialect=CUTTER_LOCATION,

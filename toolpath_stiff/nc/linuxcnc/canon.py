@@ -36,6 +36,7 @@ MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
 HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
+LEAVES = re.compile(r"O|.*M0*9[89](?!\d)")  # lines of which rs274 prints no comment: calls, returns, loops, conditions
 FINE_WORD = re.compile(r"[XYZ][-+]?\d*\.\d{4,}[1-9]")  # more decimals than rs274 prints
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
@@ -87,7 +88,8 @@ class Follower:
         self.fine = any(FINE_WORD.search(line.words) for line in self.lines)
         self.passed = [0]  # how many of the first lines no run that comes straight on leaves out
         for line in self.lines:
-            self.passed.append(self.passed[-1] + bool(line.words and line.words[0] not in "O%" and not line.optional))
+            shows = line.words.strip("%") and not line.optional and not LEAVES.match(line.words)
+            self.passed.append(self.passed[-1] + bool(shows))
 
     def follow(self, text: str) -> None:
         """Take every command. Raises `InputError` for what gives no path: probing, splines, tools of unknown length."""
@@ -122,7 +124,7 @@ class Follower:
             self._check_diameter()
 
     def _note_jump(self, line: int) -> None:
-        """A loop, a condition or a call, from whose O word the run left, or after whose O word it goes on."""
+        """A loop, a condition or a call, from whose line the run left, or after whose line it goes on."""
         if line > self.line and self.passed[line - 1] == self.passed[self.line]:
             return
         left, after = self.line + 1, line - 1
@@ -130,8 +132,8 @@ class Follower:
             left += 1
         while after > 1 and not self.lines[after - 1].words:
             after -= 1
-        left = left if self._words(left).startswith("O") else self.line
-        after = after if self._words(after).startswith("O") else line - 1
+        left = left if LEAVES.match(self.lines[left - 1].words) else self.line
+        after = after if LEAVES.match(self.lines[after - 1].words) else line - 1
         self.jumps.append(Jump(len(self.recorder), left, after))
 
     def _on_use_length_units(self, inner: str) -> None:

@@ -11,12 +11,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.locks import temporary_folder
 
 HOW_TO_CONFINE = (
     "install bubblewrap (Debian, Ubuntu: apt install bubblewrap), or say --unconfined (unconfined=True): "
@@ -62,7 +62,8 @@ def find_rs274(path: str | None = None, unconfined: bool = False) -> str:
 
 def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: RunLimits) -> Run:
     """Run the interpreter on a program that has passed the fence. Raises `InputError` if it cannot be started."""
-    with temporary_folder("tps-rs274-") as folder:
+    with tempfile.TemporaryDirectory(prefix="tps-rs274-", ignore_cleanup_errors=True) as place:
+        folder = Path(place)
         for name, text in ((PROGRAM, program), (PARAMETERS, parameters), (TOOLS, tools)):
             (folder / name).write_text(text, encoding="ascii")
         wrapper = _bubblewrap()

@@ -39,7 +39,7 @@ from toolpath_stiff.report.words import duration, plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
-    from toolpath_stiff.analysis import Analysis
+    from toolpath_stiff.analysis.results import Analysis
 
 SCRIPTS = ("stage.js", "viewer.js", "profile.js", "analysis.js")
 
@@ -259,7 +259,7 @@ def page_data(analysis: Analysis) -> dict[str, Any]:
     points = mm_from_m(samples.position)
     frame = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
     stiffness, stiffness_range = _fractions(n_per_mm_from_n_per_m(evaluation.stiffness[rows]))
-    margin, margin_range = _fractions(evaluation.margin[rows])
+    margin, margin_range = _fractions(evaluation.reach.margin[rows])
     kind = samples.motion + OUT_OF_REACH * ~evaluation.reachable[rows] + PLUNGE * analysis.set_aside[rows]
     tool_starts = np.flatnonzero(np.diff(samples.tool, prepend=-1) != 0)
     return {

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.analysis import Analysis
+    from toolpath_stiff.analysis.results import Analysis
     from toolpath_stiff.path import Samples
 
 

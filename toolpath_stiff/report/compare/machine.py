@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.comparison.residuals import directions, planes
+from toolpath_stiff.comparison.residuals import directions, plane_heights_mm, planes
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.report.compare.pictures import heading, near_rows
@@ -54,7 +54,8 @@ def machine_png(comparison: Comparison) -> Figure:
     """PNG: glyphs on the machine from above, plane by plane, and from the front and the right."""
     data = comparison.data
     where = planes(data)
-    order = [*reversed(comparison.summary.by_plane)]
+    heights = plane_heights_mm(data)
+    order = [*reversed(heights)]
     along = directions(data)
     axes_shown = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     largest = _largest(comparison)
@@ -68,7 +69,7 @@ def machine_png(comparison: Comparison) -> Figure:
             place = (LEFT + i * pitch, 4.75, pitch - 0.45, pitch - 0.45)
             axes = figure.add_axes(_relative(place, width, height))
             _from_above(axes, comparison)
-            z = comparison.summary.by_plane[plane].z_mm
+            z = heights[plane]
             axes.set_title("from above" if len(order) == 1 else _plane_title(plane, z), fontsize=10)
             axes.set_xlabel("X mm", fontsize=9)
             if i == 0:

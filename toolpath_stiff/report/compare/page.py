@@ -10,7 +10,7 @@ from markupsafe import Markup
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import Variable, directions, planes
-from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors, RefittedHint
+from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors
 from toolpath_stiff.files import Content
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.compare.load_path import load_path_png
@@ -117,15 +117,9 @@ def _findings(summary: ComparisonSummary) -> Markup:
     rows = []
     for hint in summary.findings or summary.hints:
         cells = [hint.text, f"{hint.statistic:+.1f}", f"{hint.p_adjusted:.2g}"]
-        if summary.findings:
-            after = hint.after_strut_law_refit if isinstance(hint, RefittedHint) else None
-            cells.append(f"{after.p_adjusted:.2g}" if after else "-")
         rows.append(("finding" if summary.findings else "out", [*cells, ", ".join(hint.indistinguishable_from) or "-"]))
-    head = ["finding", "t", "p, corrected", "p if the strut law is refitted", "looks the same in these data"]
-    if not summary.findings:
-        head[0] = "the strongest hints"
-        del head[3]
-    return table(head, rows, range(1, len(head) - 1))
+    first = "finding" if summary.findings else "the strongest hints"
+    return table((first, "t", "p, corrected", "looks the same in these data"), rows, (1, 2))
 
 
 def groups(summary: ComparisonSummary) -> list[tuple[str, GroupErrors]]:
@@ -273,7 +267,7 @@ def _refitted(summary: ComparisonSummary) -> list[str]:
     if refit is None:
         return []
     gain = round(base.mean_abs_error_percent - refit.mean_abs_error_percent, 2)
-    law = " / ".join(f"{stiffness:.1f}" for stiffness in refit.strut_law.N_per_um)
+    law = " / ".join(f"{stiffness:.1f}" for stiffness in refit.N_per_um)
     return [
         "",
         f"strut law refitted: {refit.mean_abs_error_percent:.2f} % mean error, {refit.bias_percent:+.1f} % bias, rms "

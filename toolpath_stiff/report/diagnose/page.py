@@ -8,10 +8,9 @@ import numpy as np
 from markupsafe import Markup
 
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.diagnosis.beside import beside_text
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.rows import percent_of
-from toolpath_stiff.diagnosis.words import assumptions, doubts, next_steps, verdict_text, why
+from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why
 from toolpath_stiff.files import Content
 from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent
 from toolpath_stiff.report import explanations as words

@@ -89,7 +89,7 @@ def _headline(update: Update) -> str:
 
 
 def _figures(update: Update) -> list[tuple[str, str]]:
-    last, by_likelihood = update.steps[-1], update.objective == "likelihood"
+    last, by_likelihood = update.steps[-1], update.task.objective == "likelihood"
     figures = [(_percent(update.steps[0].error), "mean error as given")]
     if by_likelihood:
         figures.append((_percent(update.refitted.error), "mean error, strut law refitted"))
@@ -133,7 +133,7 @@ def _fitted(update: Update) -> Markup:
     step = _result(update)
     rows = [
         ("strut law", _length(end), f"{end.stiffness:.2f} N/um", f"sd {end.sd:.2g} N/um")
-        for end in step.law_ends(update.given.strut_law, update.widening)
+        for end in step.law_ends(update.task.machine.strut_law, update.widening)
         if end.sd is not None
     ]
     for effect, entry in step.sizes(update.widening).items():
@@ -173,7 +173,7 @@ def text(update: Update) -> str:
     """Ladder, errors by direction before and after, parameters, what was turned down."""
     document = update.document
     lines = [
-        f"data     {counted(document['readings'], 'reading')} of {', '.join(map(plain, update.names))}, "
+        f"data     {counted(document['readings'], 'reading')} of {', '.join(map(plain, update.task.files))}, "
         f"machine {machine_text(document)}",
         fill(f"result   {update.verdict.upper()}. {plain(document['text'])}", WIDTH, subsequent_indent=" " * 9),
         "",
@@ -215,7 +215,7 @@ def _direction_lines(update: Update) -> list[str]:
 
 def _parameters(update: Update) -> list[str]:
     step, lines = _result(update), []
-    ends = step.law_ends(update.given.strut_law, update.widening)
+    ends = step.law_ends(update.task.machine.strut_law, update.widening)
     if step.fit.law_free:
         law = " and ".join(f"{end.stiffness:.1f} +- {end.sd:.1f} N/um {_length(end)}" for end in ends)
         lines.append(f"strut law  {law}")
@@ -253,7 +253,7 @@ def _pictures(update: Update) -> dict[str, Content]:
     pictures: dict[str, bytes] = {} if update.bars is None else {"figure3.png": figure3_png(update.bars)}
     pictures["ladder.png"] = error_ladder_png(update)
     pictures["before_after.png"] = before_after_png(
-        update.data.of_tip, first.residual, last.residual, last.title,
+        update.task.data.of_tip, first.residual, last.residual, last.title,
         update.document["steps"][-1]["held_out_error_percent"], 100.0 * update.refitted.error,
     )  # fmt: skip
     return {**pictures, "report.html": update_html(update, pictures)}

@@ -6,7 +6,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance
-from toolpath_stiff.stiffness.sizes import about
 
 REFERENCE_FORCE = 500.0  # N, force in the strut at which the compliance is given
 IDLE = 1e-3  # N: below, a strut adds nothing to the tip that could be measured, and the power law would diverge
@@ -26,6 +25,10 @@ class ContactNonlinearity(Effect):
     source = "Hertz (1882), point contact: approach grows as F^(2/3)"
     load_dependent = True
     needs = ("force_N",)
+    told = (
+        "the contacts in the joints of a strut give way by about {compliance} nm/N at "
+        f"{REFERENCE_FORCE:g} N, less under more load"
+    )
     parameters = (
         compliance(
             "compliance",
@@ -42,10 +45,3 @@ class ContactNonlinearity(Effect):
             return None
         force = np.maximum(np.abs(path.strut_forces), IDLE)
         return np.asarray(p["compliance"] * np.cbrt(REFERENCE_FORCE / force))
-
-    def finding(self, p: Values) -> str:
-        """Which part gives way, by how much."""
-        return (
-            f"the contacts in the joints of a strut give way by about {about(p['compliance'])} nm/N at "
-            f"{REFERENCE_FORCE:g} N, less under more load"
-        )

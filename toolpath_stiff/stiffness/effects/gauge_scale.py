@@ -6,10 +6,11 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectError
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, setup_parameter
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, choice, setup_parameter
 from toolpath_stiff.stiffness.sizes import about
 
 ALONG = 0.999  # |d_axis| from which a reading counts as taken along that axis: 2.6 degrees, no one aligns better
+WHICH = "1, 2, 3: readings along X, Y, Z; 0: every direction"
 
 
 class GaugeScale(Effect):
@@ -24,16 +25,7 @@ class GaugeScale(Effect):
     equation = "k_read = (1 + s) k, for one direction, one set-up, or both"
     source = "wrong range, unit or lever of a force gauge or indicator"
     parameters = (
-        Parameter(
-            name="direction",
-            unit="",
-            si=1.0,
-            bounds=(0, 3),
-            typical=(1, 3),
-            source="direction of the measurements",
-            meaning="1, 2, 3: readings along X, Y, Z; 0: every direction",
-            kind="integer",
-        ),
+        choice("direction", (0, 3), "direction of the measurements", WHICH, typical=(1, 3)),
         setup_parameter('name of the set-up; "": every one'),
         Parameter(
             name="scale",

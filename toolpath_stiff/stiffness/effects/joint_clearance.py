@@ -6,7 +6,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
-from toolpath_stiff.stiffness.sizes import about
 
 # N: a strut under less is idle. It would add less than g times this over F^2 to the tip's compliance, some 1e-14 m/N.
 IDLE = 1e-3
@@ -26,6 +25,7 @@ class JointClearance(Effect):
     source = "secant through a gap, taken up in full by any load"
     load_dependent = True
     needs = ("force_N",)
+    told = "every strut moves about {lost_motion} um to each side before it carries its load"
     parameters = (
         Parameter(
             name="lost_motion",
@@ -43,7 +43,3 @@ class JointClearance(Effect):
         if path.strut_forces is None:
             return None
         return np.asarray(p["lost_motion"] / np.maximum(np.abs(path.strut_forces), IDLE))
-
-    def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        return f"every strut moves about {about(p['lost_motion'])} um to each side before it carries its load"

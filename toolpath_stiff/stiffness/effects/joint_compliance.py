@@ -6,7 +6,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance
-from toolpath_stiff.stiffness.sizes import about
 
 
 class JointCompliance(Effect):
@@ -20,6 +19,7 @@ class JointCompliance(Effect):
     link = "joints"
     equation = "c_i += c_j"
     source = "springs in series"
+    told = "joints and nut of every strut give way by about {compliance} nm/N"
     parameters = (
         compliance(
             "compliance",
@@ -35,7 +35,3 @@ class JointCompliance(Effect):
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """The constant, for every strut and pose."""
         return np.full((len(path), 6), p["compliance"])
-
-    def finding(self, p: Values) -> str:
-        """Which part gives way, by how much."""
-        return f"joints and nut of every strut give way by about {about(p['compliance'])} nm/N"

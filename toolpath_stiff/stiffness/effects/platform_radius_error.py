@@ -6,7 +6,6 @@ import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, Values, length_error
-from toolpath_stiff.stiffness.sizes import about
 
 
 class PlatformRadiusError(Effect):
@@ -22,6 +21,7 @@ class PlatformRadiusError(Effect):
     equation = "P_i += e (P_ix, P_iy, 0) / |(P_ix, P_iy)|"
     source = "geometry"
     unknown_to_control = True
+    told = "the platform's joints stand about {error} mm further {error:out/in} than in the machine file"
     parameters = (
         length_error(
             typical=(-3.0, 3.0),
@@ -37,8 +37,3 @@ class PlatformRadiusError(Effect):
         off_axis = radius > 0.0
         joints[off_axis, :2] *= (1.0 + p["error"] / radius[off_axis])[:, None]
         return machine.with_changes(platform_joints=joints)
-
-    def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        side = "out" if p["error"] > 0.0 else "in"
-        return f"the platform's joints stand about {about(p['error'])} mm further {side} than in the machine file"

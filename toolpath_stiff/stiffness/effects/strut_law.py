@@ -6,7 +6,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
-from toolpath_stiff.stiffness.sizes import about
 
 
 class StrutLawCurvature(Effect):
@@ -20,6 +19,10 @@ class StrutLawCurvature(Effect):
     link = "struts"
     equation = "k(L) = k_linear(L) exp(q (1 - x^2)), x = (2 L - L_1 - L_2) / (L_2 - L_1)"
     source = "lowest-order deviation from the paper's equation 5 that leaves both its constants as they are"
+    told = (
+        "midway between the strut law's two lengths struts are about {curvature} % {curvature:stiffer/softer} than on "
+        "its straight line"
+    )
     parameters = (
         Parameter(
             name="curvature",
@@ -42,11 +45,3 @@ class StrutLawCurvature(Effect):
         length = path.struts.lengths
         x = (2.0 * length - law.length_1 - law.length_2) / (law.length_2 - law.length_1)
         return np.asarray(np.expm1(-p["curvature"] * (1.0 - x * x)) / law.stiffness(length))
-
-    def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        side = "stiffer" if p["curvature"] > 0.0 else "softer"
-        return (
-            f"midway between the strut law's two lengths struts are about {about(p['curvature'])} % {side} than on "
-            "its straight line"
-        )

@@ -6,7 +6,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
-from toolpath_stiff.stiffness.sizes import about
 
 
 class ThermalDrift(Effect):
@@ -18,6 +17,7 @@ class ThermalDrift(Effect):
     equation = "F / k_read = F / k + rate time"
     source = "growth of the loop between work and tip at a constant rate"
     needs = ("time_min",)
+    told = "the indicator drifts by about {rate} um/min towards {rate:larger/smaller} deflection while it is read"
     parameters = (
         Parameter(
             name="rate",
@@ -36,8 +36,3 @@ class ThermalDrift(Effect):
             return stiffness
         deflection = path.force / stiffness + p["rate"] * path.time
         return np.where(deflection > 0.0, path.force / np.where(deflection > 0.0, deflection, 1.0), np.nan)
-
-    def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        side = "larger" if p["rate"] > 0.0 else "smaller"
-        return f"the indicator drifts by about {about(p['rate'])} um/min towards {side} deflection while it is read"

@@ -6,7 +6,6 @@ import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, Values, length_error
-from toolpath_stiff.stiffness.sizes import about
 
 
 class ToolLengthError(Effect):
@@ -18,6 +17,7 @@ class ToolLengthError(Effect):
     equation = "r_i += R (0, 0, e), tip -= R (0, 0, e): the struts stay, their arms about the tip grow"
     source = "geometry"
     unknown_to_control = True
+    told = "the tool is about {error} mm {error:longer/shorter} than the length that was entered"
     parameters = (
         length_error(
             typical=(-10.0, 10.0),
@@ -29,8 +29,3 @@ class ToolLengthError(Effect):
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Platform joints further above the tip."""
         return machine.with_changes(platform_joints=machine.platform_joints + np.array([0.0, 0.0, p["error"]]))
-
-    def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        side = "longer" if p["error"] > 0.0 else "shorter"
-        return f"the tool is about {about(p['error'])} mm {side} than the length that was entered"

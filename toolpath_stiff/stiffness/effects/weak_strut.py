@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, choice
 from toolpath_stiff.stiffness.sizes import about
 
 
@@ -18,17 +18,7 @@ class WeakStrut(Effect):
     equation = "k_s(L) = factor k_linear(L) for strut s"
     source = "worn nut, lost preload"
     parameters = (
-        Parameter(
-            name="strut",
-            unit="",
-            si=1.0,
-            bounds=(1, 6),
-            typical=(1, 6),
-            source="number of the strut",
-            neutral=1,
-            meaning="which strut",
-            kind="integer",
-        ),
+        choice("strut", (1, 6), "number of the strut", "which strut", neutral=1),
         Parameter(
             name="factor",
             unit="",
