@@ -188,6 +188,8 @@ def words_of(function: Callable[..., Any], given: Mapping[str, Any]) -> list[str
         value = given.get(name)
         if value is None or value is False or value == argument.default:
             continue
+        if isinstance(value, Mapping):
+            value = [f"{key}={part:.10g}" for key, part in value.items()]
         several = value if isinstance(value, list | tuple | frozenset | set) else [value]
         shown = [f"{part:.10g}" if isinstance(part, int | float) else str(part) for part in several]
         joined = shown if argument.option.count else [(":" if argument.option.read is low_high else ",").join(shown)]

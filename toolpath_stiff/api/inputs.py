@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.options import Option, numbers
-from toolpath_stiff.units import Pose, pose_in_mm, pose_in_si
+from toolpath_stiff.units import Pose, pose_in_si
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0
@@ -53,9 +53,3 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
 def origin_si(origin_mm_deg: Sequence[float] | None) -> Pose | None:
     """A placement in SI, None where none is given. Raises `InputError`."""
     return None if origin_mm_deg is None else pose_si(both_names("--origin"), origin_mm_deg)
-
-
-def origin_word(origin: Pose) -> str:
-    """A placement in SI as --origin takes it; angles that are all 0 go without saying."""
-    words = [f"{value:.10g}" for value in pose_in_mm(origin)]
-    return ",".join(words if any(origin[3:]) else words[:3])

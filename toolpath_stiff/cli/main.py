@@ -144,8 +144,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt:
             return _ended("", 130)
         except Exception as error:
-            if os.environ.get(TRACEBACK):
-                traceback.print_exc()
             return _ended(last_resort(error), 2)
 
 
@@ -193,8 +191,7 @@ def _ended(error: str, code: int) -> int:
     return code
 
 
-TRACEBACK = "TPS_TRACEBACK"  # set in the environment, it shows where in the code an unforeseen error came from
-REPORT = f"if that does not explain it, run the command again with {TRACEBACK}=1 and report what it prints"
+REPORT = "if that does not explain it, report this line"
 
 
 def last_resort(error: Exception) -> str:

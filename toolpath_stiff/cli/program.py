@@ -142,19 +142,17 @@ def _executor(args: Namespace) -> Iterator[Executor | None]:
         raise InputError("--jobs with --cluster", hint="the cluster's workers say how many programs analyze at a time")
     try:
         from distributed import Client
-
+    except ImportError:
+        hint = "run `pip install 'toolpath-stiff[cluster]'`"
+        raise InputError("--cluster needs the package distributed", hint=hint) from None
+    try:
         client: Any = Client(args.cluster, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError, ImportError) as error:  # ImportError: a protocol that is not installed, or all of it
-        if "distributed" not in sys.modules or sys.modules["distributed"] is None:
-            hint = "run `pip install 'toolpath-stiff[cluster]'`"
-            raise InputError("--cluster needs the package distributed", hint=hint) from None
+    except (OSError, ValueError, ImportError) as error:  # ImportError: a protocol that is not installed
         raise InputError(
             f"--cluster {args.cluster}: {' '.join(str(error).split())}",
             expected="the address of a Dask scheduler, as tcp://10.0.0.5:8786",
         ) from None
     with client:
-        if not client.scheduler_info()["workers"]:
-            tell("note", [f"{args.cluster} has no worker yet, the programs wait for one"])
         yield client.get_executor(pure=False)
 
 

@@ -62,10 +62,10 @@ def _fit(session: Session) -> None:
 
 
 def _accept(session: Session) -> None:
-    entry = session.found("update")
-    if not entry or not entry.get("accepted"):
+    fit = session.found("update")
+    if not fit or not fit.accepted:
         raise InputError("there is no fit that the data support", hint="switch an effect on and press Fit")
-    session.case.accept(session.case.folder / entry["result"] / "machine.toml")
+    session.case.accept(session.case.folder / fit.result / "machine.toml")
 
 
 def _measure(session: Session) -> None:

@@ -222,8 +222,8 @@ def fit(session: Session) -> Picture | None:
     latest = session.found("update")
     if not latest:
         return None
-    parts = _of(latest["document"], "verdict", "text", "steps", "support", "warnings")
-    return {**parts, "accepted": latest["accepted"], "holds": session.is_fitted, "result": latest["result"]}
+    parts = _of(latest.document, "verdict", "text", "steps", "support", "warnings")
+    return {**parts, "accepted": latest.accepted, "holds": session.is_fitted, "result": latest.result}
 
 
 def plan(session: Session) -> Picture | None:
@@ -232,7 +232,7 @@ def plan(session: Session) -> Picture | None:
     if not latest:
         return None
     names = ("text", "visits", "poses", "readings", "minutes", "notes")
-    return {**_of(latest["document"], *names), "file": f"{latest['result']}/plan.csv"}
+    return {**_of(latest.document, *names), "file": f"{latest.result}/plan.csv"}
 
 
 def compare(session: Session) -> Picture | None:
@@ -241,7 +241,7 @@ def compare(session: Session) -> Picture | None:
     if not latest:
         return None
     names = ("text", "by_plane_and_direction", "by_direction", "findings", "outliers", "warnings")
-    return {**_of(latest["document"], *names), "result": latest["result"]}
+    return {**_of(latest.document, *names), "result": latest.result}
 
 
 def program(session: Session) -> Picture | None:
@@ -261,10 +261,10 @@ def program(session: Session) -> Picture | None:
     if not analysis:
         return {**shown, "path": None, "error": error}
     summary = _of(
-        analysis["document"], "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "weakest", "plunges",
-        "warnings", "out_of_reach_samples", "per_operation", "required",
+        analysis.document, "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "weakest", "plunges",
+        "warnings", "out_of_reach_samples", "required",
     )  # fmt: skip
-    return {**shown, "path": analysis["path"], "summary": summary, "result": analysis["result"], "error": ""}
+    return {**shown, "path": analysis.path, "summary": summary, "result": analysis.result, "error": ""}
 
 
 def origin(session: Session) -> list[float]:
@@ -290,7 +290,7 @@ def placement(session: Session) -> Picture | None:
     if not entry:
         return {"now": now, "front": None, "set_up": sheet}
     names = ("front", "chosen", "before", "worse", "warnings", "offset_blocks")
-    return {"now": now, "set_up": sheet, "result": entry["result"], **_of(entry["document"], *names)}
+    return {"now": now, "set_up": sheet, "result": entry.result, **_of(entry.document, *names)}
 
 
 def set_up(session: Session) -> Picture | None:
@@ -298,6 +298,5 @@ def set_up(session: Session) -> Picture | None:
     entry = session.found("set_up")
     if not entry:
         return None
-    files = {"sheet": "setup.pdf", "written": entry["written"], "page": "report.html"}
-    parts = _of(entry["document"], "warnings", "offset_blocks", "chosen", "before", "worse")
-    return parts | {name: f"{entry['result']}/{file}" for name, file in files.items()}
+    files = {"sheet": f"{entry.result}/setup.pdf", "written": entry.file, "page": f"{entry.result}/report.html"}
+    return {**_of(entry.document, "warnings", "offset_blocks", "chosen", "before", "worse"), **files}
