@@ -8,7 +8,6 @@ import re
 import shlex
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -188,21 +187,6 @@ def test_whatever_a_file_is_called_there_is_an_answer(running, name):
     assert running.ask("GET", f"/case/{name}")[0] == 404
 
 
-def test_half_open_connections_neither_pile_up_nor_lock_the_studio(running):
-    silent = [socket.create_connection(("127.0.0.1", running.port)) for _ in range(100)]
-    try:
-        for one in silent[::2]:
-            one.sendall(b"GET /state HTTP/1.1\r\nHost: ")
-        assert running.ask("GET", "/state")[0] == 200
-        threads = Path(f"/proc/{running.process.pid}/task")
-        if threads.is_dir():
-            assert len(list(threads.iterdir())) < 70
-    finally:
-        for one in silent:
-            one.close()
-    assert running.ask("GET", "/state")[0] == 200
-
-
 def test_a_program_with_tool_lengths_by_dropped_files(running):
     program = b"G21 G90\nT5 M6\nG0 X0 Y0\nG43 H5 Z5\nG1 Z0 F300\nG1 X40\nM2\n"
 
@@ -326,13 +310,6 @@ def test_own_effects_are_edited_beside_the_page(running, browser, tmp_path):
     tab.until("document.querySelector('#sw-my_screw') === null")
     assert tab.faults == []
     tab.close()
-
-
-def test_a_second_studio_of_the_same_case_is_refused(running):
-    words = [sys.executable, "-m", "toolpath_stiff", "studio", "--case", str(running.folder), "--no-browser"]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 2
-    assert "open in another studio" in done.stderr
 
 
 # -- the journey -------------------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from toolpath_stiff.options import Option, checked
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.contract import Conditions
-from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup, known_setups
+from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup
 from toolpath_stiff.stiffness.trial import failures, own_effects, refuse_failing
 from toolpath_stiff.units import mm_from_m, pose_in_mm, pose_in_si
 
@@ -69,10 +69,8 @@ class Machine(Result):
     <Machine nist: 6 struts, no effects>
     >>> machine.strut_lengths_mm((0, 0, 800)).round(1).tolist()
     [2884.7, 2869.9, 2884.7, 2869.9, 2884.7, 2869.9]
-    >>> machine.name, machine.title, machine.source[:24]
-    ('nist', 'NIST Ingersoll Octahedral Hexapod', 'Clinton, Zhang, Wavering')
-    >>> machine.effects, machine.setups, machine.inputs
-    ([], [], ('nist',))
+    >>> machine.name, machine.effects, machine.inputs
+    ('nist', [], ('nist',))
     >>> machine.origin_mm_deg
     (0.0, 0.0, 800.0, 0.0, 0.0, 0.0)
     >>> [round(value) for value in machine.joints_mm["frame"][0]], machine.joints_mm["tool"]
@@ -193,24 +191,9 @@ class Machine(Result):
         return self.model.machine.name
 
     @property
-    def title(self) -> str:
-        """Its name for headings."""
-        return self.model.machine.title
-
-    @property
-    def source(self) -> str:
-        """Where its figures come from."""
-        return self.model.machine.source
-
-    @property
     def effects(self) -> list[str]:
         """Names of the effects that it carries, those that act on readings too."""
         return [active.effect.name for active in (*self.model.effects, *self.model.instruments)]
-
-    @property
-    def setups(self) -> list[str]:
-        """The set-ups that its file lists and its effects name."""
-        return known_setups([self.model])
 
     @property
     def origin_mm_deg(self) -> tuple[float, ...]:
@@ -369,8 +352,8 @@ class Machine(Result):
         """
         return {
             "name": self.name,
-            "title": self.title,
-            "source": self.source,
+            "title": self.model.machine.title,
+            "source": self.model.machine.source,
             "effects": self.effects,
             "figures": self.view.figure_entries(self.model.machine),
         }

@@ -13,7 +13,7 @@ The state is what the steps up to `done` have made of it; undo and redo move `do
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
@@ -41,6 +41,7 @@ from toolpath_stiff.case.reading import read_case
 from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES
 from toolpath_stiff.correction.draft import EffectDraft
 from toolpath_stiff.defaults import MACHINE
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import read_bytes, writing_errors
 from toolpath_stiff.hints import command_line
@@ -259,7 +260,7 @@ class Case(BlindExercise):
             return set()
 
     @recorded
-    def switch(self, effect: str, values: Mapping[str, Any] | None) -> None:
+    def switch(self, effect: str, values: Document | None) -> None:
         """Switch an effect on with these values (keys as in a machine file), or off with None.
 
         Raises `InputError` for an effect that is unknown or in the machine, and for values that it cannot have.
@@ -360,7 +361,7 @@ class Case(BlindExercise):
         text = ", ".join(f"{TABLES.get(name, name)} {Path(str(value)).name}" for name, value in reading.items())
         self._take_program(self.state.program, reading, [], "reading", f"programs are read with {text}")
 
-    def _take_program(self, program: str, given: Mapping[str, Any], files: list[str], kind: str, text: str) -> None:
+    def _take_program(self, program: str, given: Document, files: list[str], kind: str, text: str) -> None:
         """Read a program of the case with what it has and what is given; drop the files where it cannot be read."""
         state, reading = self.state, dict(self.state.reading)
         try:
@@ -410,7 +411,7 @@ class Case(BlindExercise):
 
         It competes like an effect of one's own; without new readings it is `described` at best.
         """
-        draft: EffectDraft = self._step("draft", progress)
+        draft = self._step("draft", EffectDraft, progress)
         if draft.text:
             self.add_effects(self.folder / self.latest("draft") / f"{draft.name}.toml")
         return draft

@@ -15,17 +15,18 @@ from toolpath_stiff.api.measurements import Measurements
 from toolpath_stiff.api.trust import is_agreed
 from toolpath_stiff.case.files import used_name
 from toolpath_stiff.case.history import History
-from toolpath_stiff.case.steps import TABLES, Keys
+from toolpath_stiff.case.steps import TABLES
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import words_of
 
-NO_CHANGE: Keys = MappingProxyType({})
+NO_CHANGE: Document = MappingProxyType({})
 
 
-def reading_arguments(folder: Path, reading: Keys) -> Reading:
+def reading_arguments(folder: Path, reading: Document) -> Reading:
     """The same as arguments of `Program.read`."""
     given = {name: str(folder / value) if name in TABLES else value for name, value in reading.items()}
     if isinstance(switches := given.get("block_delete"), str):
@@ -91,7 +92,7 @@ class Contents(History):
             self._preview = (key, preview(self.data, self.machine))
         return self._preview[1]
 
-    def machine_with(self, on: Mapping[str, Keys]) -> Machine:
+    def machine_with(self, on: Mapping[str, Document]) -> Machine:
         """The machine with effects of these sizes; where there are readings, the strut law is refitted beside them.
 
         Examples
@@ -113,7 +114,7 @@ class Contents(History):
             raise InputError("this case has no program", hint="add one with add_program")
         return self._program(self.state.program, self.state.reading)
 
-    def _program(self, name: str, reading: Keys) -> Program:
+    def _program(self, name: str, reading: Document) -> Program:
         return Program.read(self.path(name), **reading_arguments(self.folder, reading))
 
     def latest(self, kind: str) -> str:
@@ -125,7 +126,7 @@ class Contents(History):
         common = options(machine=machine or self.state.machine, effects=list(self.state.effects))
         return command_line(*name.split(), *(self.data_files if files is None else files), *common, *words)
 
-    def program_line(self, name: str = "analyze", machine: str = "", change: Keys = NO_CHANGE, **given: Any) -> str:
+    def program_line(self, name: str = "analyze", machine: str = "", change: Document = NO_CHANGE, **given: Any) -> str:
         """The command line that asks this of the program, after a change of the state; "" without a program."""
         state = replace(self.state, **change)
         if name == "analyze":

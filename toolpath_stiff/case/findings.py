@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import toolpath_stiff as tps
 from toolpath_stiff.case.contents import Contents
@@ -16,6 +16,7 @@ from toolpath_stiff.hints import options
 from toolpath_stiff.options import words_of
 from toolpath_stiff.results import Progress
 
+Made = TypeVar("Made")
 PLACE = ("x_mm", "y_mm", "z_mm", "tilt_a_deg", "tilt_b_deg", "rotate_deg")  # as of an origin
 
 
@@ -42,35 +43,32 @@ class Findings(Contents):
         kept.save(self.folder / result, plots=self.plots)
         return kept, self.question(kind, "", *words_of(getattr(tps, kind), given))
 
-    def _step(self, kind: str, progress: Progress | None = None, **given: Any) -> Any:
+    def _step(self, kind: str, of: type[Made], progress: Progress | None = None, **given: Any) -> Made:
+        """A result of this class as a step."""
         result = self.next_result(kind)
         kept, command = self.find(kind, result, progress, **given)
         self.record(kind, kept._short(), command, result=result)
-        return kept
+        return cast("Made", kept)
 
     @recorded
     def compare(self, progress: Progress | None = None) -> tps.Comparison:
         """Where the model fails, as `tps.compare`; kept in results/."""
-        comparison: tps.Comparison = self._step("compare", progress)
-        return comparison
+        return self._step("compare", tps.Comparison, progress)
 
     @recorded
     def diagnose(self, progress: Progress | None = None) -> tps.Diagnosis:
         """Which effect is missing, as `tps.diagnose`; kept in results/."""
-        diagnosis: tps.Diagnosis = self._step("diagnose", progress)
-        return diagnosis
+        return self._step("diagnose", tps.Diagnosis, progress)
 
     @recorded
     def update(self, add: str | Iterable[str], progress: Progress | None = None) -> tps.Update:
         """Fit effects, as `tps.update`; kept in results/, where `accept` takes machine.toml from."""
-        update: tps.Update = self._step("update", progress, add=[add] if isinstance(add, str) else list(add))
-        return update
+        return self._step("update", tps.Update, progress, add=[add] if isinstance(add, str) else list(add))
 
     @recorded
     def plan(self, n: int = 6) -> tps.Plan:
         """What to measure next, as `tps.plan`; kept in results/, plan.csv among it."""
-        plan: tps.Plan = self._step("plan", n=n)
-        return plan
+        return self._step("plan", tps.Plan, n=n)
 
     @recorded
     def analyze(self, machine: str = "", progress: Progress | None = None) -> tps.Analysis:
@@ -78,14 +76,12 @@ class Findings(Contents):
 
         `machine`: a file of the case in place of that, such as an update's.
         """
-        analysis: tps.Analysis = self._step("analyze", progress, machine=machine)
-        return analysis
+        return self._step("analyze", tps.Analysis, progress, machine=machine)
 
     @recorded
     def place(self, progress: Progress | None = None, **bounds: Any) -> tps.Placement:
         """Where the work should sit, as `tps.place`; kept in results/."""
-        placement: tps.Placement = self._step("place", progress, **bounds)
-        return placement
+        return self._step("place", tps.Placement, progress, **bounds)
 
     @recorded
     def set_up(self, progress: Progress | None = None) -> tps.Placement:
@@ -95,8 +91,7 @@ class Findings(Contents):
         Kept in results/ with its pictures. A program that cannot be written for the place is not; not_written.txt says
         why.
         """
-        placement: tps.Placement = self._step("set_up", progress)
-        return placement
+        return self._step("set_up", tps.Placement, progress)
 
     def _analyze(self, result: str, progress: Progress | None, machine: str = "") -> tuple[tps.Analysis, str]:
         state = self.state

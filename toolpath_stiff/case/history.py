@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from toolpath_stiff.case.files import free_name, sha256, used_name, without_lines, write_files
-from toolpath_stiff.case.steps import CASE_FILE, TABLES, CaseState, Keys, Step, case_text
+from toolpath_stiff.case.steps import CASE_FILE, TABLES, CaseState, Step, case_text
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import write_atomically
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
-def python_line(name: str, positional: Sequence[Any], named: Mapping[str, Any]) -> str:
+def python_line(name: str, positional: Sequence[Any], named: Document) -> str:
     """A call of a method of the case; without what only watches it."""
     words = {"": positional, **{f"{key}=": [value] for key, value in named.items() if key != "progress"}}
     shown = [
@@ -105,7 +106,7 @@ class History:
         text: str,
         command: str = "",
         *,
-        change: Keys | None = None,
+        change: Document | None = None,
         files: Sequence[str] = (),
         python: str = "",
         result: str = "",

@@ -9,7 +9,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from toolpath_stiff.case.steps import FORMAT, READING, TABLES, CaseState, Keys, Step
+from toolpath_stiff.case.steps import FORMAT, READING, TABLES, CaseState, Step
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.toml_reader import TomlReader, is_number, shortened
 
@@ -69,7 +70,7 @@ SHAPES: dict[str, Callable[[Any], bool]] = {
 }  # fmt: skip
 
 
-def _step(reader: TomlReader, number: int, entry: Keys) -> Step:
+def _step(reader: TomlReader, number: int, entry: Document) -> Step:
     """A step; refused where it says what no step has written."""
     wrong = "" if {"kind", "text"} <= set(entry) else "it has no kind or no text"
     for kind, table in ((Step, entry), (CaseState, entry.get("change", {}))):

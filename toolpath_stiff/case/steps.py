@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from toolpath_stiff.defaults import MACHINE
+from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.writer import toml_text
 
 CASE_FILE = "case.toml"
@@ -14,7 +15,6 @@ FORMAT = 1
 HEADING = "# A case of toolpath_stiff: the steps in their order; `done` of them hold, the others were undone.\n"
 TABLES = {"tools": "tool table", "offsets": "work offsets", "controller": "controller file"}  # a program is read with
 READING = ("dialect", *TABLES, "block_delete", "feed_mm_per_min")  # of `Program.read`; not what runs another program
-Keys = Mapping[str, Any]  # of an effect's entry in a machine file, of a table of case.toml
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Step:
     text: str
     command: str = ""
     python: str = ""
-    change: Keys = field(default_factory=dict)
+    change: Document = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
     result: str = ""
 
@@ -68,9 +68,9 @@ class CaseState:
     effects: tuple[str, ...] = ()
     data: tuple[str, ...] = ()
     aside: tuple[str, ...] = ()
-    on: Mapping[str, Keys] = field(default_factory=dict)
+    on: Mapping[str, Document] = field(default_factory=dict)
     program: str = ""
-    reading: Keys = field(default_factory=dict)
+    reading: Document = field(default_factory=dict)
     origin: tuple[float, ...] = ()
     require: float = 0.0
     exercise: str = ""

@@ -35,7 +35,7 @@ def analyze(
     table: Table = "csv",
     show_plunges: ShowPlunges = False,
     jobs: Jobs = None,
-    cluster: Annotated[str | None, Option("--cluster", "ADDRESS")] = None,
+    cluster: Annotated[str | None, Option("--cluster", "ADDRESS", instead_of="jobs")] = None,
 ) -> int:
     """Stiffness along the path of NC programs.
 
@@ -138,8 +138,6 @@ def _executor(args: Namespace) -> Iterator[Executor | None]:
     if args.cluster is None:
         yield None
         return
-    if args.jobs is not None:
-        raise InputError("--jobs with --cluster", hint="the cluster's workers say how many programs analyze at a time")
     try:
         from distributed import Client
     except ImportError:

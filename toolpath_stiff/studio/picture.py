@@ -61,7 +61,7 @@ def machine(session: Session) -> Picture:
     on = session.machine
     return {
         "name": on.name,
-        "title": on.title,
+        "title": on.model.machine.title,
         "effects": on.effects,
         "joints": on.joints_mm,
         "origin": list(on.origin_mm_deg),
@@ -128,34 +128,17 @@ def _values(candidate: Document) -> Picture:
     return {**candidate["choice"], **{key: size["value"] for key, size in candidate["parameters"].items()}}
 
 
-SENTENCES = {
-    "adequate": "Nothing is missing that these data could show",
-    "unexplained": "Something is missing that no effect describes",
-}
-
-
-ENDS = {"identified": "nothing else fits", "described": "described, not confirmed: new readings must tell"}
-
-
 def verdict(session: Session) -> Picture | None:
     """What the diagnosis says; None while there is none for these readings."""
     diagnosis = session.document("diagnose")
     if not diagnosis:
         return None
-    best = next((row for row in diagnosis["candidates"] if row["effect"] == diagnosis["best"]), None)
-    verdict, names = diagnosis["verdict"], diagnosis["plausible"]
-    if verdict in ENDS and best and best["finding"]:
-        sentence = f"{best['finding'][0].upper()}{best['finding'][1:]}; {ENDS[verdict]}"
-    elif verdict in SENTENCES:
-        sentence = SENTENCES[verdict]
-    else:
-        sentence = f"Several explain it: {', '.join(names)}" if len(names) > 1 else diagnosis["text"].split(". ")[0]
     kept = _of(
         diagnosis, "verdict", "text", "why", "plausible", "best", "gates", "detectable", "confounding", "assumptions",
         "warnings", "notes", "noise", "cannot_test", "readings", "portrait",
     )  # fmt: skip
     kept["gates"] = {name: value for name, value in kept["gates"].items() if name != "simulated_squares"}
-    return {"sentence": sentence, **kept}
+    return {"sentence": kept["text"].split(". ")[0].rstrip("."), **kept}
 
 
 def effects(session: Session) -> list[Picture]:

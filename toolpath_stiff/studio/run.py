@@ -8,7 +8,6 @@ import threading
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO
 
 from toolpath_stiff.case.case import Case
 from toolpath_stiff.case.steps import CASE_FILE
@@ -17,8 +16,6 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
 from toolpath_stiff.studio.server import Studio
 from toolpath_stiff.studio.session import Session
-
-LOCK = ".studio.lock"
 
 
 def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise: int | None) -> Case:
@@ -33,41 +30,23 @@ def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise
     return case
 
 
-def locked(folder: Path) -> IO[str]:
-    """A lock on the case that ends with this process, however that ends. Raises `InputError` where one is held."""
-    stream = (folder / LOCK).open("w")
-    try:
-        import fcntl
-
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except ImportError:  # not on this system: two studios of one case are then noticed when the second one writes
-        pass
-    except OSError:
-        stream.close()
-        raise InputError(
-            f"the case {folder} is open in another studio", hint="use its page; several tabs show the same"
-        ) from None
-    return stream
-
-
 def serve(case: Case, port: int = 0, *, browser: bool = True) -> int:
     """Serve until Ctrl-C or a request to end; returns 0. Raises `InputError` where the port is taken."""
-    with locked(case.folder):
-        os.chdir(case.folder)  # so that files are named as the commands in the history name them
-        case.folder = Path()
-        session = Session(case)
-        try:
-            studio = Studio(session, port)
-        except OSError as error:
-            session.close()
-            raise InputError(f"port {port}: {error.strerror}", hint="leave --port out: a free one is taken") from None
-        print(f"case    {Path.cwd()}\nstudio  {studio.address}\nCtrl-C ends it", flush=True)
-        signal.signal(signal.SIGTERM, lambda *_: threading.Thread(target=studio.close).start())
-        if browser:
-            threading.Thread(target=webbrowser.open, args=(studio.address,), daemon=True).start()
-        try:
-            studio.serve_forever(poll_interval=0.2)
-        except KeyboardInterrupt:
-            session.close()
-            studio.server_close()
+    os.chdir(case.folder)  # so that files are named as the commands in the history name them
+    case.folder = Path()
+    session = Session(case)
+    try:
+        studio = Studio(session, port)
+    except OSError as error:
+        session.close()
+        raise InputError(f"port {port}: {error.strerror}", hint="leave --port out: a free one is taken") from None
+    print(f"case    {Path.cwd()}\nstudio  {studio.address}\nCtrl-C ends it", flush=True)
+    signal.signal(signal.SIGTERM, lambda *_: threading.Thread(target=studio.close).start())
+    if browser:
+        threading.Thread(target=webbrowser.open, args=(studio.address,), daemon=True).start()
+    try:
+        studio.serve_forever(poll_interval=0.2)
+    except KeyboardInterrupt:
+        session.close()
+        studio.server_close()
     return 0
