@@ -37,7 +37,6 @@ from toolpath_stiff.results import FolderResult
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 
@@ -88,7 +87,7 @@ class Comparison(FolderResult):
     """
 
     command: ClassVar[str] = "compare"
-    shown_by: ClassVar[str] = "compare.page"
+    shown_by: ClassVar[str] = "compare"
 
     predictor: Predictor
     data: Readings
@@ -120,11 +119,6 @@ class Comparison(FolderResult):
         import pandas as pd
 
         return pd.read_csv(StringIO(self.view.residuals_csv(self)))
-
-    def plot(self) -> Figure:
-        """Measured against modelled."""
-        figure: Figure = self.view.measured_modelled_png.figure(self)
-        return figure
 
     def _short(self) -> str:
         return f"{self.summary.machine}, mean error {self.summary.baseline.mean_abs_error_percent:.2f} %"
