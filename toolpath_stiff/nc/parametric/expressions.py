@@ -18,28 +18,17 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import and_, or_, xor
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.place import Place
 
-NGC, MACRO_B, EITHER = "RS274/NGC", "Macro B", "either family"
+if TYPE_CHECKING:
+    from toolpath_stiff.nc.parametric.variables import Variables
 
 
-class VariableValues(Protocol):
-    """What expressions ask of the variables (`variables.Variables`)."""
-
-    def get(self, which: str | int, place: Place) -> float | None:
-        """The value of a variable; None: empty."""
-
-    def exists(self, name: str) -> bool:
-        """Whether a named variable has a value."""
-
-    def angle(self, y: float, x: float) -> float:
-        """ATAN[y]/[x], degrees."""
-
-
-Value = Callable[[VariableValues], float | None]  # None: an empty variable of Macro B
+Value = Callable[["Variables"], float | None]  # None: an empty variable of Macro B
 
 NUMBER = re.compile(r"\d+\.?\d*|\.\d+", re.ASCII)
 NAME = re.compile(r"<([^<>]*)>")
@@ -127,10 +116,10 @@ class Scanner:
     def _missing(self, what: str, expected: str) -> InputError:
         return self.fail("the block ends here" if self.done else f"{self.rest()} is not {what}", expected)
 
-    def _worked_out(self, name: str, column: int, work: Callable[[VariableValues], float]) -> Value:
+    def _worked_out(self, name: str, column: int, work: Callable[[Variables], float]) -> Value:
         """A value whose result is a finite real number, or an error at `column`."""
 
-        def value(variables: VariableValues) -> float:
+        def value(variables: Variables) -> float:
             try:
                 return finite(work(variables))
             except (ArithmeticError, ValueError) as error:
@@ -191,17 +180,15 @@ class Scanner:
         where, which = self.place._replace(column=self.column), self.which()
         return lambda variables: variables.get(which(variables), where)
 
-    def which(self) -> Callable[[VariableValues], str | int]:
+    def which(self) -> Callable[[Variables], str | int]:
         """Which variable a `#` means: a number, the number that another one holds, an expression, a name."""
         column = self.column
         named = self.match(NAME)
         if named is not None:
             if self.family == MACRO_B:
-                raise self.fail(
-                    f"#<{named[1]}> is a named variable, which Macro B does not have", "#1 to #999", column=column
-                )
-            word = named[1]
-            return lambda variables: word
+                problem = f"#<{named[1]}> is a named variable, which Macro B does not have"
+                raise self.fail(problem, "#1 to #999", column=column)
+            return lambda variables: named[1]
         inner: Value
         if self.next("#"):
             self._deeper(column)
@@ -212,13 +199,11 @@ class Scanner:
         else:
             literal = self.match(NUMBER)
             if literal is None:
-                raise self.fail(
-                    f"# before {self.rest()}" if not self.done else "# at the end", "the number of a variable"
-                )
+                raise self._missing("a variable", "its number after #")
             constant = float(literal[0])
             inner = lambda variables: constant  # noqa: E731
 
-        def numbered(variables: VariableValues) -> int:
+        def numbered(variables: Variables) -> int:
             variable_number = number(inner(variables))
             if not abs(variable_number) < LARGEST_PLACE or abs(variable_number - round(variable_number)) > EQUAL:
                 raise self.fail(f"#{variable_number:g}", "a whole number", column=column)
@@ -238,13 +223,8 @@ class Scanner:
             operator = token[0]
             rank = BINDS[self.family].get(operator)
             if rank is None:
-                if operator in LOGIC:
-                    raise self.fail(
-                        f"{operator} works on truth values on LinuxCNC and on bits on Fanuc's and Haas' controls",
-                        hint="name the control with --dialect",
-                        column=column,
-                    )
-                raise self.fail(f"{operator} is no operator of {self.family}", column=column)
+                hint = "name the control with --dialect"
+                raise self.fail(f"{operator} is no operator of {self.family}", hint=hint, column=column)
             if rank <= tightest:
                 self.position = begin
                 return left
@@ -267,9 +247,7 @@ class Scanner:
         if name == "EXISTS":
             return self._exists()
         if name == "ROUND" and self.of_word and family == MACRO_B:
-            raise self.fail(
-                "ROUND in a word, where it rounds to the least increment of the control", hint="round in an assignment"
-            )
+            raise self.fail("ROUND in a word, where it rounds to the control's least increment", "it in an assignment")
         if name in ("ATAN", "POW"):
             return self._of_two(name, column)
         argument, act = self.bracket(), FUNCTIONS[name]
@@ -279,7 +257,7 @@ class Scanner:
         """ATAN[y]/[x]; Macro B's ATAN[y,x] and POW[base,exponent] too."""
         start = self.position
         if not self.next("["):
-            raise self.fail(f"{name} without its bracket", "[", column=column)
+            raise self._missing("a bracket", "[")
         first = self.expression()
         if self.family != NGC and self.next(","):
             second = self.expression()
@@ -287,13 +265,11 @@ class Scanner:
         elif name == "ATAN" and self.next("]") and self.next("/"):
             second = self.bracket()
         else:
-            raise self.fail(
-                f"{name} with one value", "ATAN[y]/[x]" if name == "ATAN" else "POW[base,exponent]", column=column
-            )
+            raise self.fail(f"{name} with one value", "ATAN[y]/[x] or POW[base,exponent]", column=column)
         if name == "POW" and self.family == NGC:
             raise self.fail(f"POW is no function of {NGC}", column=column)
 
-        def work(variables: VariableValues) -> float:
+        def work(variables: Variables) -> float:
             left, right = number(first(variables)), number(second(variables))
             return left**right if name == "POW" else variables.angle(left, right)
 

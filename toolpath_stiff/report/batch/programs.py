@@ -76,7 +76,7 @@ def find_programs(arguments: Sequence[str | Found]) -> tuple[list[Found], list[F
 
 def endings() -> tuple[str, ...]:
     """Endings of the files that a folder stands for: NC programs, and cutter-location files."""
-    from toolpath_stiff.nc.words import EXTENSIONS
+    from toolpath_stiff.nc.languages import EXTENSIONS
 
     return NC_ENDINGS + EXTENSIONS
 
