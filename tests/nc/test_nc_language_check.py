@@ -19,7 +19,7 @@ from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.path import sample_moves
+from toolpath_stiff.path.sampling import sample_moves
 
 PROGRAMS = sorted((Path(__file__).parents[2] / "programs").glob("*.nc"))
 

@@ -138,7 +138,7 @@ def test_check_names_each_of_them():
     [
         ("T² P1 Z50\n", "is not a tool"),
         (f"T{'1' * 5000} P1 Z50\n", "is not a tool"),
-        (f"tool,length_mm\n1,{'5' * 140_000}\n", "cannot be read"),
+        (f"tool,length_mm\n1,{'5' * 140_000}\n", "not a CSV file"),
     ],
 )
 def test_tool_tables_without_end(tmp_path, text, found):
@@ -153,6 +153,6 @@ def test_tool_tables_without_end(tmp_path, text, found):
 def test_offsets_without_end(tmp_path):
     file = tmp_path / "offsets.var"
     file.write_text(f"{'5' * 5000} 1.0\n", encoding="utf-8")
-    with pytest.raises(InputError, match="is not an offset") as caught:
+    with pytest.raises(InputError, match="is not TOML") as caught:
         read_offsets(file)
     assert caught.value.line == 1
