@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
-from typing import Any, TypeVar, cast, get_args, get_type_hints
+from typing import Any, TypeVar, Unpack, cast, get_args, get_origin, get_type_hints
 
 from toolpath_stiff.errors import InputError
 
@@ -154,14 +154,18 @@ def _hints(function: Callable[..., Any]) -> dict[str, Any]:
 def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
     """The arguments of a function that are options, by name."""
     function = inspect.unwrap(getattr(function, "__func__", function))
-    texts = parameter_texts(function)
+    texts, hints = parameter_texts(function), _hints(function)
+    for name, hint in tuple(hints.items()):
+        if get_origin(hint) is Unpack:  # the rest of the arguments, as a dictionary of options
+            hints |= _hints(get_args(hints.pop(name))[0])
     arguments = {}
-    for name, hint in _hints(function).items():
+    for name, hint in hints.items():
         parts = [hint, *get_args(hint)]
         marks = [mark for part in parts for mark in getattr(part, "__metadata__", ())]
         option = next((mark for mark in marks if isinstance(mark, Option)), None)
         if option is not None:
-            default = inspect.signature(function).parameters[name].default
+            parameter = inspect.signature(function).parameters.get(name)
+            default = parameter.default if parameter else None
             kinds = [kind for part in parts for kind in (part, *get_args(part)) if kind in (bool, int, float)]
             arguments[name] = Argument(
                 name,

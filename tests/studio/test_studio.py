@@ -204,8 +204,8 @@ def test_a_program_with_tool_lengths_by_dropped_files(running):
         assert tps.Case.open(running.folder).state.reading[key] == f"programs/{name}"
     assert "message" in drop("long.nc", program)
     case = tps.Case.open(running.folder)
-    assert case.program.controller.tools[5].length == 130
-    assert case.program.controller.label == "linuxcnc"
+    assert case.program.request.controller.tools[5].length == 130
+    assert case.program.request.controller.label == "linuxcnc"
     assert running.idle()["program"]["error"] == ""
     for _ in range(5):
         running.do(do="undo")

@@ -214,7 +214,7 @@ class Machine(Result):
         """
         model, setup, said_by = self.model, self.setup, f"--setup {self.setup}"
         if setup is None and program is not None:
-            setup, said_by = program.controller.setup, str(program.given.get("controller"))
+            setup, said_by = program.request.controller.setup, str(program.given.get("controller"))
         check_setup(model.conditions.setup or "", f"machine {self.name}, [setup] name", model)
         check_setup(setup or "", said_by, model, *(other.model for other in beside))
         chosen = "" if setup == NO_SETUP else setup

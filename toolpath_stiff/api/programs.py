@@ -17,7 +17,7 @@ from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
-from toolpath_stiff.nc.request import ZERO, Request
+from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.options import Option, arguments_of, checked
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
@@ -190,12 +190,10 @@ def check(
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
     hexapod = None if on is None else on.model.machine
-    request = Request(
-        part.lines,
-        part.name,
+    request = replace(
+        part.request,
+        lines=part.lines,
         origin=origin_si(origin_mm_deg),
         default_origin=ZERO if hexapod is None else hexapod.default_origin,
-        controller=part.controller,
-        **part.options,
     )
     return check_program(request, hexapod, m_from_mm(step_mm), speed)

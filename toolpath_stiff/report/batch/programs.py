@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.words import EXTENSIONS
+from toolpath_stiff.nc.languages import EXTENSIONS
 
 # Endings of the files that a folder stands for: `.txt` is as often a note or a tool list.
 ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min", *EXTENSIONS)
