@@ -29,7 +29,7 @@ from toolpath_stiff.nc.findings import (
 )
 from toolpath_stiff.nc.languages import foreign_program, refused_program
 from toolpath_stiff.nc.linuxcnc.inputs import split
-from toolpath_stiff.nc.moves import ReadProgram, Recorder
+from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.parametric.statements import uses_variables
 from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun, Tally
@@ -101,7 +101,7 @@ def _check_built_in(request: Request) -> Checked:
     )
 
 
-def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[InputError], list[str]]:
+def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[InputError], list[Remark]]:
     """The run, the modes at its start, its errors, the warnings of its end.
 
     A program with variables is run again with their values, from the start.
@@ -116,10 +116,10 @@ def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[Inp
     return run, start, errors, warnings
 
 
-def _run_to_the_end(run: ProgramRun) -> tuple[list[InputError], list[str]]:
+def _run_to_the_end(run: ProgramRun) -> tuple[list[InputError], list[Remark]]:
     """Run a program; its errors, and the warnings of its end. A file in another language has that one error alone."""
     assert run.tally is not None
-    lines, name, errors, warnings = run.lines, run.name, run.tally.errors, list[str]()
+    lines, name, errors, warnings = run.lines, run.name, run.tally.errors, list[Remark]()
     foreign = refused_program(lines, name, run.state.dialect)
     if foreign is None:
         try:

@@ -77,7 +77,7 @@ def findings_of(errors: Iterable[InputError], program: ReadProgram) -> tuple[Fin
     return in_order(
         [
             *(finding_of(error) for error in errors),
-            *(Finding(line_in(text), 0, "warning", text, WARNING) for text in program.warnings),
+            *(Finding(remark.line, 0, "warning", remark.text, WARNING) for remark in program.warnings),
             *(Finding(0, 0, "assumption", text, NOTE) for text in program.assumptions if text != START),
         ]
     )
@@ -98,10 +98,3 @@ def finding_of(error: InputError) -> Finding:
 def finding_of_unsupported(word: Unsupported) -> Finding:
     """What was read and not acted upon."""
     return Finding(word.line, word.column, word.word, word.reason, NOTE)
-
-
-def line_in(text: str) -> int:
-    """The line that a warning names; 0 if it names none."""
-    _, separator, rest = text.partition("line ")
-    digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
-    return int(digits) if separator and digits else 0

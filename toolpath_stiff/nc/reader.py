@@ -17,7 +17,7 @@ from toolpath_stiff.nc.languages import foreign_program, refused_program
 from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
 from toolpath_stiff.nc.linuxcnc.runner import find_rs274
-from toolpath_stiff.nc.moves import RAPID, ReadProgram
+from toolpath_stiff.nc.moves import RAPID, ReadProgram, Remark
 from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.parametric.statements import uses_variables
@@ -165,7 +165,7 @@ def _run_built_in(
     return on_the_part(program_of(run, request, ending), request, run.state)
 
 
-def program_of(run: ProgramRun, request: Request, ending: Sequence[str]) -> ReadProgram:
+def program_of(run: ProgramRun, request: Request, ending: Sequence[Remark]) -> ReadProgram:
     """What a run made of a program, with the warnings of its end; of a posted one the moves of its own machine."""
     state, frames, warnings = run.state, run.state.frames, [*ending]
     if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
@@ -218,7 +218,7 @@ _LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)
 _LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beginning
 
 
-def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
+def millimetre_warning(state: State, lines: Sequence[str]) -> list[Remark]:
     """That numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
 
     Where whole numbers are increments, posts end those in mm with their point.
@@ -231,4 +231,4 @@ def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
     whole = next((word for word in words if "." not in word and word.strip("XYZIJRxyzijr+-0 \t")), None)
     if whole is None or not any("." in word for word in words) or any(word[-1] == "." for word in words):
         return []
-    return [f"{whole} stands beside numbers with decimals, and none ends with its point: {hint}"]
+    return [Remark(f"{whole} stands beside numbers with decimals, and none ends with its point: {hint}")]
