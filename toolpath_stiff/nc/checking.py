@@ -18,12 +18,10 @@ from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
 from toolpath_stiff.nc.findings import (
     ERROR,
-    NO_CHANGE,
     NOTE,
     Checked,
     Finding,
     UsedCode,
-    finding_of_unsupported,
     findings_of,
     in_order,
 )
@@ -94,7 +92,6 @@ def _check_built_in(request: Request) -> Checked:
         program=program,
         complete=not errors,
         used=_used_codes(tally),
-        unsupported=tuple(finding_of_unsupported(word) for word in state.unsupported),
         findings=findings_of(errors, program),
         start=start,
         end=modal_state(state),
@@ -145,16 +142,11 @@ def _check_cutter_location(request: Request) -> Checked:
     state = CutterLocationState(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
     start, errors = cutter_location.in_force(state), cutter_location.run(state, request.lines, MOST_ERRORS)
     program = cutter_location.program_of(state, request)
-    changes = {word: "what is not known" if noted.doubtful else NO_CHANGE for word, noted in state.noted.items()}
     return Checked(
         program=program,
         complete=not errors,
         used=tuple(
             UsedCode(line, 1, word, meaning_of(word), NOTE, count) for word, (line, count) in state.used_words.items()
-        ),
-        unsupported=tuple(
-            Finding(word.line, word.column, word.word, f"{word.reason}; it would change {changes[word.word]}", NOTE)
-            for word in program.unsupported
         ),
         findings=findings_of(errors, program),
         start=start,
@@ -207,10 +199,6 @@ def _check_by_linuxcnc(request: Request, may_lack: bool = False) -> Checked:
         program=program,
         complete=not errors,
         used=_codes_in_lines(request),
-        unsupported=tuple(
-            Finding(word.line, word.column, word.word, f"{word.reason}; not acted upon", NOTE)
-            for word in program.unsupported
-        ),
         findings=findings_of(errors, program),
     )
 
