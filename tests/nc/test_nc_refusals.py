@@ -113,7 +113,7 @@ def test_missing_file_and_folder(tmp_path):
     ("table", "words"),
     [
         ("", "empty"),
-        ("tool,length\n1,5", "has no unit; expected length_mm"),
+        ("tool,length\n1,5", "expected length_mm"),
         ("tool,diameter_mm\n1,5", "missing"),
         ("tool,length_mm\n1,abc", "length_mm = 'abc'"),
         ("tool,length_mm\n1.5,10", "tool = 1.5; expected a whole number"),

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from toolpath_stiff.errors import FileError, InputError, ProgramError
+from toolpath_stiff.errors import FileError, InputError, ProgramError, TableError
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.nc.place import Place
@@ -180,7 +180,10 @@ def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
         raise Place(file, table.heading_line).fail(problem, f"columns {', '.join(columns)}")
     for line, cells in table.rows:
         place = Place(file, line)
-        row = {key: cell for key, cell in table.record(cells).items() if cell}
+        try:
+            row = {key: cell for key, cell in table.record(cells).items() if cell}
+        except TableError as error:
+            raise place.fail(error.found, error.expected, error.hint) from None
         numbers = {key: _number(row[key], key, place) for key in columns[:4] if key in row}
         wrong = partial(_wrong_cell, place)
         yield line, _tool({**row, **numbers, "number": numbers.get("tool")}, wrong)
