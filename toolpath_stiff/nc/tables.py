@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from toolpath_stiff.errors import FileError, InputError, ProgramError, TableError
+from toolpath_stiff.errors import FileError, InputError, ProgramError
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.nc.place import Place
@@ -182,15 +182,15 @@ def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
         place = Place(file, line)
         try:
             row = {key: cell for key, cell in table.record(cells).items() if cell}
-        except TableError as error:
-            raise place.fail(error.found, error.expected, error.hint) from None
+        except InputError as error:
+            raise error.in_line(file, line) from None
         numbers = {key: _number(row[key], key, place) for key in columns[:4] if key in row}
         wrong = partial(_wrong_cell, place)
         yield line, _tool({**row, **numbers, "number": numbers.get("tool")}, wrong)
 
 
 def _wrong_cell(place: Place, key: str, value: object, expected: str) -> InputError:
-    return place.fail(f"{'tool' if key == 'number' else key} = {value!r}", expected)
+    return place.fail(f"{key} = {value!r}", expected)
 
 
 def _tool(row: Mapping[str, object], wrong: Callable[[str, object, str], InputError]) -> ToolEntry:
