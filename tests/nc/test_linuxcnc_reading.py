@@ -217,7 +217,6 @@ def test_feeds_of_every_kind():
         ("G1 X1 F100\n(abort, no good)\nG1 X5\n", 2, "stopped by the program"),
         ("G1 X1 F100\nG1 X" + "+".join(["[1"] * 99) + "]" * 99 + "\n", 2, "characters"),
         ("T1 M6\nT2\nM61 Q2\nG43\nG1 X1 F10\n", 3, "M61"),
-        ("G0 X10\nG2 X10.00004 I5 F100\n", 2, "may be a full circle"),
         ("G1 X1 F100\nG1 X2 U3\n", 2, "character"),
     ],
 )

@@ -55,10 +55,10 @@ def test_the_rule_holds_for_centres_radii_cycles_and_angles():
 def test_what_was_counted_is_said_and_a_mixed_program_is_warned_of():
     assert any("0.001 mm" in a and "fanuc" in a for a in parse_program("G1 F100. X10", controller=FANUC).assumptions)
     assert not any("fanuc" in a for a in parse_program("G1 F100. X10.", controller=FANUC).assumptions)
-    mixed = parse_program("G1 F100 X10.\nX0\nY20\nX5.\nZ3").warnings
-    assert [w for w in mixed if "Y20 in line 3" in w and "--dialect" in w]
-    assert not any("--dialect" in w for w in parse_program("G1 F100 X10.\nX0\nY2.5\nX0.").warnings)
-    assert not any("--dialect" in w for w in parse_program("G1 F100 X10\nX0\nY20\nX5.5").warnings)
+    mixed = [*map(str, parse_program("G1 F100 X10.\nX0\nY20\nX5.\nZ3").warnings)]
+    assert [w for w in mixed if "line 3: " in w and "Y20" in w and "--dialect" in w]
+    assert not any("--dialect" in w for w in map(str, parse_program("G1 F100 X10.\nX0\nY2.5\nX0.").warnings))
+    assert not any("--dialect" in w for w in map(str, parse_program("G1 F100 X10\nX0\nY20\nX5.5").warnings))
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_numbers_in_increments_that_look_like_millimetres():
     assert not pointed.value.hint
     for text, warned in ((".5", True), (".", False), ("", False)):
         lines = f"G1 F100. X10 (Y5.5)\nY20{text}\n"
-        warnings = parse_program(lines, "p.nc", controller=FANUC).warnings
+        warnings = [*map(str, parse_program(lines, "p.nc", controller=FANUC).warnings)]
         assert any("X10 stands beside numbers with decimals" in w for w in warnings) is warned
         findings = check(Request(tuple(lines.splitlines()), "p.nc", controller=FANUC)).findings
         assert any("X10 stands beside numbers with decimals" in f.text for f in findings) is warned

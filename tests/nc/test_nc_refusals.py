@@ -113,16 +113,16 @@ def test_missing_file_and_folder(tmp_path):
     ("table", "words"),
     [
         ("", "empty"),
-        ("tool,length\n1,5", "not known"),
+        ("tool,length\n1,5", "expected length_mm"),
         ("tool,diameter_mm\n1,5", "missing"),
         ("tool,length_mm\n1,abc", "length_mm = 'abc'"),
-        ("tool,length_mm\n1.5,10", "tool = '1.5'"),
+        ("tool,length_mm\n1.5,10", "tool = 1.5; expected a whole number"),
         ("tool,length_mm\n1,10\n1,20", "appears twice"),
         ("T1 P1 Z5 D6\nnonsense", "not a tool"),
         ("T1 Z1e9", "Z = "),
         ("T1 Z5\nT\N{SUPERSCRIPT TWO} Z5", "tools.tbl:2: .* is not a tool"),
         (f"T{'1' * 5000} Z5", "is not a tool"),
-        (f'tool,length_mm,remark\n1,5,"{"x" * 140_000}"', "tools.tbl:2: a row that cannot be read: field larger"),
+        (f'tool,length_mm,remark\n1,5,"{"x" * 140_000}"', "tools.tbl:2: not a CSV file: field larger"),
     ],
 )
 def test_bad_tool_tables(tmp_path, table, words):
@@ -138,9 +138,9 @@ def test_bad_tool_tables(tmp_path, table, words):
     ("offsets", "words"),
     [
         ("", "empty"),
-        ("G54 = [1, two]", "G54 = 'two'"),
+        ("G54 = [1, two]", "offsets.toml:1:13: the offsets file is not TOML"),
         ("G60 = [1]", "not an offset"),
-        ("G54 = [1,2,3,4,5,6,7,8]", "8 numbers"),
+        ("G54 = [1,2,3,4,5,6,7,8]", "expected 1 to 7 numbers"),
     ],
 )
 def test_bad_offset_files(tmp_path, offsets, words):

@@ -223,21 +223,11 @@ def test_modal_arcs_after_pieces_are_arcs_again():
     assert lines[-1].startswith("G2 G17 X") or lines[-1].startswith("G17 G2 X")
 
 
-def test_inverse_time_feeds_are_shared_out():
-    text = START + "G93 G18 G2 X8 I4 F2\nG94 F100 G1 X0\n"
-    there = at(turn=37)
-    lines = rewrite(text, there, linearise=1e-3)
-    program, again = parse_program(text, origin=there), parse_program("\n".join(lines) + "\n")
-    feed = program.moves.feed[program.moves.line == 3][0]
-    pieces = again.moves.feed[1:-1]
-    # F counts moves per minute: of as many pieces each takes its share of the time; chords are shorter than the arc.
-    np.testing.assert_allclose(pieces, feed, rtol=0.05)
-
-
 def test_pieces_before_the_end_of_the_program_are_refused():
-    program = parse_program(START + "G18 G2 X8 I4 M2\n", origin=at(turn=37))
-    with pytest.raises(InputError, match="M2 in a block"):
-        rewrite_program(program, at(turn=37), HERE, linearise=1e-4)
+    for words, what in (("M2", "M2 in a block"), ("G93 F2", "inverse-time feed")):
+        program = parse_program(f"{START}G18 G2 X8 I4 {words}\n", origin=at(turn=37))
+        with pytest.raises(InputError, match=what):
+            rewrite_program(program, at(turn=37), HERE, linearise=1e-4)
 
 
 def test_large_turns_of_the_tool_are_cut_until_they_lean_no_more():

@@ -337,10 +337,10 @@ def tool_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> 
 
 def operation_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[OperationRow, ...]:
     """Figures of each operation in the order of the run; rapids at `rapid_feed`, m/s."""
-    found = operations(program)
-    parts = _parts(program.moves, found.of_move, len(found.rows), rapid_feed)
+    stretches = operations(program)
+    parts = _parts(program.moves, stretches.of_move, len(stretches.rows), rapid_feed)
     return tuple(
-        OperationRow(**vars(part), **operation_heading(row)) for row, part in zip(found.rows, parts, strict=True)
+        OperationRow(**vars(part), **operation_heading(row)) for row, part in zip(stretches.rows, parts, strict=True)
     )
 
 

@@ -143,7 +143,7 @@ def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, 
     origin = origin or read.origin
     samples = sample_moves(place(read.moves, origin), step=m_from_mm(step_mm), origin=origin)
     left = [f"{read.name}:{word.line}:{word.column}: {word.word}: {word.reason}" for word in read.unsupported]
-    return SampledPath(read.name, samples, list(read.warnings), left)
+    return SampledPath(read.name, samples, list(map(str, read.warnings)), left)
 
 
 @checked

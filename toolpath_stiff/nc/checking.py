@@ -18,18 +18,16 @@ from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
 from toolpath_stiff.nc.findings import (
     ERROR,
-    NO_CHANGE,
     NOTE,
     Checked,
     Finding,
     UsedCode,
-    finding_of_unsupported,
     findings_of,
     in_order,
 )
 from toolpath_stiff.nc.languages import foreign_program, looks_like_cutter_location, refused_program
 from toolpath_stiff.nc.linuxcnc.inputs import split
-from toolpath_stiff.nc.moves import ReadProgram, Recorder
+from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun, Tally
@@ -97,14 +95,13 @@ def _check_built_in(request: Request) -> Checked:
         program=program,
         complete=not errors,
         used=_used_codes(tally),
-        unsupported=tuple(finding_of_unsupported(word) for word in state.unsupported),
         findings=findings_of(errors, program),
         start=start,
         end=modal_state(state),
     )
 
 
-def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[InputError], list[str]]:
+def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[InputError], list[Remark]]:
     """The run, the modes at its start, its errors, the warnings of its end.
 
     A program with variables is run again with their values, from the start.
@@ -118,10 +115,10 @@ def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[Inp
     return run, start, errors, warnings
 
 
-def _run_to_the_end(run: ProgramRun) -> tuple[list[InputError], list[str]]:
+def _run_to_the_end(run: ProgramRun) -> tuple[list[InputError], list[Remark]]:
     """Run a program; its errors, and the warnings of its end. A file in another language has that one error alone."""
     assert run.tally is not None
-    lines, name, errors, warnings = run.lines, run.name, run.tally.errors, list[str]()
+    lines, name, errors, warnings = run.lines, run.name, run.tally.errors, list[Remark]()
     foreign = refused_program(lines, name, run.state.dialect)
     if foreign is None:
         try:
@@ -147,16 +144,11 @@ def _check_cutter_location(request: Request) -> Checked:
     state = CutterLocationState(request.name, copy.deepcopy(request.controller.tools), request.controller.feed)
     start, errors = cutter_location.in_force(state), cutter_location.run(state, request.lines, MOST_ERRORS)
     program = cutter_location.program_of(state, request)
-    changes = {word: "what is not known" if noted.doubtful else NO_CHANGE for word, noted in state.noted.items()}
     return Checked(
         program=program,
         complete=not errors,
         used=tuple(
             UsedCode(line, 1, word, meaning_of(word), NOTE, count) for word, (line, count) in state.used_words.items()
-        ),
-        unsupported=tuple(
-            Finding(word.line, word.column, word.word, f"{word.reason}; it would change {changes[word.word]}", NOTE)
-            for word in program.unsupported
         ),
         findings=findings_of(errors, program),
         start=start,
@@ -209,10 +201,6 @@ def _check_by_linuxcnc(request: Request, may_lack: bool = False) -> Checked:
         program=program,
         complete=not errors,
         used=_codes_in_lines(request),
-        unsupported=tuple(
-            Finding(word.line, word.column, word.word, f"{word.reason}; not acted upon", NOTE)
-            for word in program.unsupported
-        ),
         findings=findings_of(errors, program),
     )
 

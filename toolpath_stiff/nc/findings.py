@@ -6,11 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.moves import ReadProgram, Unsupported
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.state import START
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
-NO_CHANGE = "nothing of the path"
 
 
 @dataclass(frozen=True)
@@ -55,8 +54,6 @@ class Checked:
         Whether the whole program was read.
     used
         Codes in the order of their first appearance.
-    unsupported
-        Words that were read and not acted upon, with what they would change.
     findings
         In the order of lines.
     start, end
@@ -66,10 +63,14 @@ class Checked:
     program: ReadProgram
     complete: bool
     used: tuple[UsedCode, ...]
-    unsupported: tuple[Finding, ...]
     findings: tuple[Finding, ...]
     start: dict[str, str] = field(default_factory=dict)
     end: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def unsupported(self) -> tuple[Finding, ...]:
+        """Words that were read and not acted upon."""
+        return tuple(Finding(word.line, word.column, word.word, word.reason, NOTE) for word in self.program.unsupported)
 
 
 def findings_of(errors: Iterable[InputError], program: ReadProgram) -> tuple[Finding, ...]:
@@ -77,7 +78,7 @@ def findings_of(errors: Iterable[InputError], program: ReadProgram) -> tuple[Fin
     return in_order(
         [
             *(finding_of(error) for error in errors),
-            *(Finding(line_in(text), 0, "warning", text, WARNING) for text in program.warnings),
+            *(Finding(remark.line, 0, "warning", remark.text, WARNING) for remark in program.warnings),
             *(Finding(0, 0, "assumption", text, NOTE) for text in program.assumptions if text != START),
         ]
     )
@@ -93,15 +94,3 @@ def finding_of(error: InputError) -> Finding:
     text = error.found + (f"; expected {error.expected}" if error.expected else "")
     text += f". {error.hint[0].upper()}{error.hint[1:]}" if error.hint else ""
     return Finding(error.line or 0, error.column or 0, "not read", text, ERROR)
-
-
-def finding_of_unsupported(word: Unsupported) -> Finding:
-    """What was read and not acted upon."""
-    return Finding(word.line, word.column, word.word, word.reason, NOTE)
-
-
-def line_in(text: str) -> int:
-    """The line that a warning names; 0 if it names none."""
-    _, separator, rest = text.partition("line ")
-    digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
-    return int(digits) if separator and digits else 0

@@ -17,6 +17,7 @@ from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC
 from toolpath_stiff.nc.codes.tool_length import HOLDS_TIP
 from toolpath_stiff.nc.codes.tools import list_numbers
 from toolpath_stiff.nc.groups import LAST_MODE
+from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Flow, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
@@ -111,7 +112,7 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
         raise block.fail(word, "is not a G code that is known", hint="check the program, or post it without it")
     if code is None:  # it may run anything, a change of kinematics included; its parameters go with it
         state.note(block.line, word, "an M code of one control, not acted upon")
-        state.warnings.append(f"line {block.line}: what {word.text} does on its control is not known")
+        state.warnings.append(Remark(f"what {word.text} does on its control is not known", block.line))
         for other in block.block.words:
             if other.letter in "PQE":
                 state.note(block.line, other, f"parameter of {word.text}")

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.nc.moves import Moves, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import LATHE_HINT
 
@@ -59,12 +59,10 @@ def _signs(lines: Iterable[str]) -> list[tuple[int, str]]:
     return sorted(signs)
 
 
-def lathe_warning(signs: Mapping[str, int], moves: Moves | None) -> list[str]:
+def lathe_warning(signs: Mapping[str, int], moves: Moves | None) -> list[Remark]:
     """What makes a program look like a lathe's (with its line), if nothing of it ever moves along Y."""
     if moves is None or not signs or (moves.start[:, 1] != moves.end[:, 1]).any() or moves.arc_normal[:, 2].any():
         return []
     what, line = next(iter(signs.items()))
-    return [
-        f"line {line}: {what} and no move along Y: this looks like a lathe's program. X is read as a position; where "
-        "it is a diameter, the path is wrong"
-    ]
+    text = f"{what} and no move along Y: this looks like a lathe's program. X is read as a position; "
+    return [Remark(f"{text}where it is a diameter, the path is wrong", line)]

@@ -121,6 +121,17 @@ class Jump(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Remark:
+    """What should be checked: a sentence, and the line of the program that it is about, 0 for the whole of it."""
+
+    text: str
+    line: int = 0
+
+    def __str__(self) -> str:
+        return f"line {self.line}: {self.text}" if self.line else self.text
+
+
+@dataclass(frozen=True)
 class Unsupported:
     """A word of the program that was read, is harmless to the path, and was not acted upon."""
 
@@ -198,7 +209,7 @@ class ReadProgram:
     origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     origin_source: str = "default"
     unsupported: tuple[Unsupported, ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Remark, ...] = ()
     assumptions: tuple[str, ...] = ()
     tools: tuple[ToolUse, ...] = field(default=())
     interpreter: str = "builtin"

@@ -11,13 +11,12 @@ from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, tool_poses
-from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
+from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.recovery import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
-MOST_LINES = 5  # named in one sentence
 OWN_ZERO = (
     "G54 as the program or the controller file sets it is that of the machine that the program was posted for; it does "
     "not say where the work sits here"
@@ -65,7 +64,7 @@ def recovered(
         line, letter, degrees = far[0]
         others = f", and {len(far) - 1} more cuts turn as far" if far[1:] else ""
         advice = f"if the control takes the shorter way, set rollover = true for {letter} in the controller file"
-        warnings.append(f"line {line}: {letter} turns by {degrees:.0f} degrees within one cut{others}; {advice}")
+        warnings.append(Remark(f"{letter} turns by {degrees:.0f} degrees within one cut{others}; {advice}", line))
     lengths = {tool.number: tool.length for tool in program.tools}
     on_part, of_kept = recover_moves(kept, placed, lengths, name, held[known])
     of_move = np.flatnonzero(known)[of_kept]
@@ -138,7 +137,7 @@ def _points_at(kinematics: PostedKinematics, zero: Pose | None, name: str) -> Po
 
 def _known_points(
     moves: Moves, kinematics: PostedKinematics, zero: Pose | None, name: str
-) -> tuple[BoolArray, list[str], list[str]]:
+) -> tuple[BoolArray, list[Remark], list[str]]:
     """(n,) the moves whose ends are known on the part; warnings and assumptions about those to machine points."""
     fixed = np.asarray(moves.from_machine.any(axis=1))
     if not fixed.any():
@@ -158,10 +157,9 @@ def _known_points(
             hint,
         )
     lines = np.unique(moves.line[fixed])
-    shown = ", ".join(str(line) for line in lines[:MOST_LINES])
-    more = f" and {len(lines) - MOST_LINES} more" if len(lines) > MOST_LINES else ""
-    warning = (
-        f"lines {shown}{more}: rapids to or from points of the machine that the program "
-        f"was posted for (G53, G28, G30, another tool length while the tool leans) are left out of the path: {reason}"
+    more = f", in {len(lines)} lines," if len(lines) > 1 else ""
+    text = (
+        f"rapids to or from points of the machine that the program was posted for (G53, G28, G30, another tool length "
+        f"while the tool leans){more} are left out of the path: {reason}"
     )
-    return ~fixed, [warning], []
+    return ~fixed, [Remark(text, int(lines[0]))], []

@@ -18,7 +18,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.saved import leave_level
 from toolpath_stiff.nc.interpreter import execute
-from toolpath_stiff.nc.moves import Jump
+from toolpath_stiff.nc.moves import Jump, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
@@ -81,9 +81,9 @@ class Tally:
                 self.count[code] += 1
 
 
-def beyond_the_end(what: str, row: int, lines: int) -> str:
-    """The warning that lines follow what ends a program in line `row` (from 0)."""
-    return f"what follows {what} in line {row + 1} is not part of the program (lines: {lines})"
+def beyond_the_end(what: str, row: int, lines: int) -> list[Remark]:
+    """The warning that lines follow what ends a program in line `row` (from 0), if any do."""
+    return [Remark(f"what follows {what} is not part of the program (lines: {lines})", row + 1)] if lines else []
 
 
 def without_label(state: State, lines: tuple[str, ...]) -> tuple[str, ...]:
@@ -121,7 +121,7 @@ class ProgramRun:
         self._blocks = 0
         self.jumps: list[Jump] = []
 
-    def run(self) -> list[str]:
+    def run(self) -> list[Remark]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
         row, percent, numbered = 0, False, False
         while row < len(self.lines):
@@ -158,11 +158,8 @@ class ProgramRun:
                     if flow is not Flow.NEXT:
                         to = self._enter(row, flow) if isinstance(flow, Call) else self._return(row, flow)
                         if to is None:
-                            return [
-                                f"M99 in line {row + 1}, outside any subprogram, makes the control start the program "
-                                "again, without end: it is read once",
-                                *self._end(row, "M99"),
-                            ]
+                            again = "M99 outside any subprogram starts the program again, without end: it is read once"
+                            return [Remark(again, row + 1), *self._end(row, "M99")]
                         row = self._jump(row, to)
                         continue
             row += 1
@@ -236,7 +233,7 @@ class ProgramRun:
         problem = f"the subprogram {level.name}, which begins in line {level.first + 1}, has no end"
         return self._fail(row, problem, "M99")
 
-    def _end(self, row: int, what: str, ended: bool = False) -> list[str]:
+    def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
         """A warning if anything but tape marks and the subprograms that ran follows the end."""
         if self._levels and not ended:
             raise self._unended(row)
@@ -245,7 +242,7 @@ class ProgramRun:
             for index, line in enumerate(self.lines[row + 1 :], row + 1)
             if line.strip() not in ("", "%") and index not in self._called and index + 1 not in self._called
         ]
-        return [beyond_the_end(what, row, len(rest))] if rest else []
+        return beyond_the_end(what, row, len(rest))
 
     def _enter(self, row: int, call: Call) -> int:
         """The line at which the called subprogram begins."""

@@ -16,7 +16,7 @@ from toolpath_stiff.nc.languages import foreign_program, looks_like_cutter_locat
 from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
-from toolpath_stiff.nc.moves import RAPID, ReadProgram
+from toolpath_stiff.nc.moves import RAPID, ReadProgram, Remark
 from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
@@ -156,7 +156,7 @@ def _finished(request: Request, run: ProgramRun) -> ReadProgram:
     return on_the_part(program_of(run, request, ending), request, run.state)
 
 
-def program_of(run: ProgramRun, request: Request, ending: Sequence[str]) -> ReadProgram:
+def program_of(run: ProgramRun, request: Request, ending: Sequence[Remark]) -> ReadProgram:
     """What a run made of a program, with the warnings of its end; of a posted one the moves of its own machine."""
     state, frames, warnings = run.state, run.state.frames, [*ending]
     if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
@@ -209,7 +209,7 @@ _LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)
 _LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beginning
 
 
-def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
+def millimetre_warning(state: State, lines: Sequence[str]) -> list[Remark]:
     """That numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
 
     Where whole numbers are increments, posts end those in mm with their point.
@@ -222,4 +222,4 @@ def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
     whole = next((word for word in words if "." not in word and word.strip("XYZIJRxyzijr+-0 \t")), None)
     if whole is None or not any("." in word for word in words) or any(word[-1] == "." for word in words):
         return []
-    return [f"{whole} stands beside numbers with decimals, and none ends with its point: {hint}"]
+    return [Remark(f"{whole} stands beside numbers with decimals, and none ends with its point: {hint}")]

@@ -9,12 +9,13 @@ from functools import cached_property
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import Pose, ShopPose, pose_in_mm
 
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-ORIGIN_WINS = (
+ORIGIN_WINS = Remark(
     f"the program or the offsets file sets G54; {both_names('--origin')} overrides it, other offsets keep their "
     "distance to it"
 )

@@ -14,7 +14,7 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.groups import Group
-from toolpath_stiff.nc.moves import Arc, Recorder, ToolUse, Unsupported
+from toolpath_stiff.nc.moves import Arc, Recorder, Remark, ToolUse, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
 from toolpath_stiff.units import MM_PER_INCH
@@ -266,7 +266,7 @@ class State:
     used_tools: dict[int, ToolUse] = field(default_factory=dict)
     tip_held: list[tuple[int, bool]] = field(default_factory=list)
     unsupported: list[Unsupported] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    warnings: list[Remark] = field(default_factory=list)
     assumptions: list[str] = field(default_factory=list)
     bare: tuple[int, Word] | None = None
     pointed: bool = False

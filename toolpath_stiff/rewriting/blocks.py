@@ -203,10 +203,10 @@ def _piece_count(controls: Controls) -> int:
 def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
     """Straight moves, the first in the block's own line."""
     stop, edit = controls.current and controls.current.code("M stop"), controls.edit
-    if stop:
-        raise controls.refusal(f"{stop[0]} in a block that is written as several", "give it a block of its own")
+    if stop or controls.out.feed_mode == "G93":
+        what = stop[0] if stop else "inverse-time feed (G93)"
+        raise controls.refusal(f"{what} in a block that is written as several", "give it a block of its own, or G94")
     edit.remove("IJKRPLQ")
-    feed = edit.word("F") if controls.out.feed_mode == "G93" else None
     slash = SLASH.match(edit.render()) if edit.block.optional else None
     lead = slash[0] if slash else ""
     lines = []
@@ -215,8 +215,6 @@ def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
             controls.edit, controls.current = edit.next_line(lead), None
         controls.motion_word(code)
         controls.go(controls.of_setup(point), [] if number else controls.axes)
-        if feed is not None:  # of each piece, as G93 counts the moves
-            controls.edit.write("F", feed.value * len(pieces), FEED_DECIMALS)
         if number == 0 or controls.edit.moves:
             lines.append(controls.emit())
         if dwell:

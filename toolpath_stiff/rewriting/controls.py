@@ -85,11 +85,7 @@ class LineEdit:
             if word is not None:
                 index = self._words.index(word)
                 before, _, after = self._parts[2 * index : 2 * index + 3]
-                if not before.strip() and index > 0:
-                    before = ""
-                elif not after.strip():
-                    after = ""
-                self._parts[2 * index : 2 * index + 3] = [before + after]
+                self._parts[2 * index : 2 * index + 3] = [before.rstrip() + after]
                 del self._words[index]
 
     def render(self) -> str:
@@ -164,9 +160,7 @@ class Controls:
     @property
     def digits(self) -> int:
         """Decimals of the numbers written."""
-        if self.decimals is not None:
-            return self.decimals
-        return DECIMALS_INCH if self.out.inch else DECIMALS_MM
+        return self.decimals or (DECIMALS_INCH if self.out.inch else DECIMALS_MM)
 
     @property
     def unit(self) -> float:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 
 from toolpath_stiff.nc.controller import GENERIC, INCREMENT_DEGREE, INCREMENT_INCH, INCREMENT_MM
 from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, CORNERS, Word
 
@@ -19,7 +20,7 @@ INCREMENTS = (
     "as in the dialect {}"
 )
 MIXED = (
-    "some lengths end with their decimal point (X10.), and {} in line {} has none: Fanuc's and Haas' controls count "
+    "some lengths end with their decimal point (X10.), and {} has none: Fanuc's and Haas' controls count "
     "such a number in 0.001 mm or 0.0001 inch; here it counts whole units, unless --dialect says otherwise"
 )
 
@@ -77,4 +78,4 @@ def notice_lengths(state: State, line: int, words: Iterable[Word]) -> None:
         elif state.bare is None and "." not in word.text and "E" not in word.text.upper():
             state.bare = (line, word)
     if state.pointed and state.bare is not None:
-        state.warnings.append(MIXED.format(state.bare[1].text, state.bare[0]))
+        state.warnings.append(Remark(MIXED.format(state.bare[1].text), state.bare[0]))

@@ -6,6 +6,7 @@ What Fanuc's and Haas' programs begin with ("safe start") is here: it switches o
 from __future__ import annotations
 
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, family, g_codes, holds_anyway, m_codes
+from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
 
 WAIT_FOR_INPUT = 66  # LinuxCNC, M-Codes, M66: P or E, and L with the kind of wait
@@ -48,7 +49,7 @@ def scaling_off(state: State, block: CurrentBlock, code: str) -> None:
 def dynamic_offset(state: State, block: CurrentBlock, code: str) -> None:
     """G254: the work offset follows the part where a rotary axis is turned; G255: no longer."""
     if code == "G254":
-        state.warnings.append(f"line {block.line}: {block.codes[code].text}, not acted upon: {_FOLLOWS}")
+        state.warnings.append(Remark(f"{block.codes[code].text}, not acted upon: {_FOLLOWS}", block.line))
 
 
 _PLANNING = "how the control plans ahead: the path is taken as programmed"

@@ -12,7 +12,7 @@ from toolpath_stiff.nc.cutter_location.state import CutterLocationState, drill, 
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angle_of, unit_axis
 from toolpath_stiff.nc.geometry import Vector
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Remark
 
 HOME = "home is the control's: the way there is not part of the path"
 CIRCLE_AXIS = "a circle's axis"
@@ -90,10 +90,8 @@ def from_(state: CutterLocationState, statement: MajorStatement) -> None:
     numbers = state.numbers(statement, 3, 6)
     axis = _axis_of(state, numbers)
     if len(state.recorder):
-        state.warnings.append(
-            f"line {statement.line}: FROM within the path: the tool is taken to stand there; "
-            "how it got there is not given"
-        )
+        text = "FROM within the path: the tool is taken to stand there; how it got there is not given"
+        state.warnings.append(Remark(text, statement.line))
     state.no_circle("FROM/")
     stand(state, state.scaled(numbers[:3]), axis)
 

@@ -20,7 +20,7 @@ from toolpath_stiff.nc.cutter_location.statements import MajorStatement, frame_i
 from toolpath_stiff.nc.cutter_location.vocabulary import execute
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.languages import any_statement
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Unsupported
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Remark, Unsupported
 from toolpath_stiff.nc.request import Request
 
 NO_UNITS = "the file names no UNITS; its numbers are taken as mm"
@@ -29,7 +29,7 @@ OPERATION = re.compile(r"\s*\$\$\s*OPERATION NAME\s*:\s*(.*\S)", re.IGNORECASE)
 PACKED_AT = 50_000  # moves
 
 
-def not_for(request: Request) -> list[str]:
+def not_for(request: Request) -> list[Remark]:
     """A warning about what was asked for and means nothing to a cutter-location file."""
     controller = request.controller
     given = {
@@ -38,7 +38,7 @@ def not_for(request: Request) -> list[str]:
         "posted kinematics": controller.kinematics is not None,
         "block-delete switches": bool(request.switches),
     }
-    return [f"{what} mean nothing to a cutter-location file and are not used" for what in given if given[what]]
+    return [Remark(f"{what} mean nothing to a cutter-location file") for what in given if given[what]]
 
 
 def read(request: Request) -> ReadProgram:
@@ -97,13 +97,13 @@ def run(state: CutterLocationState, lines: tuple[str, ...], most_errors: int = 1
                 _execute(state, statement, point)
         except InputError as error:
             if state.last_word == "END" and not any_statement(lines[here:]):  # notes that a CAM system writes behind it
-                state.warnings.append(f"line {here + 1}: what follows END is no statement, and not read")
+                state.warnings.append(Remark("what follows END is no statement, and not read", here + 1))
                 break
             errors.append(error)
     if len(errors) >= most_errors:
         return errors
     if state.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[index:]):
-        state.warnings.append(f"line {index}: FINI ends the file; what follows is not read")
+        state.warnings.append(Remark("FINI ends the file; what follows is not read", index))
     try:
         state.no_circle("the end of the file")
     except InputError as error:
@@ -145,12 +145,11 @@ def _conclude(state: CutterLocationState) -> None:
         state.assume(NO_UNITS)
     for noted in state.noted.values():
         if noted.doubtful:
-            state.warnings.append(f"line {noted.statement.line}: {noted.statement.shown}: {noted.reason}")
+            state.warnings.append(Remark(f"{noted.statement.shown}: {noted.reason}", noted.statement.line))
     if state.unsmooth and not state.smooth:
-        state.warnings.append(
-            f"line {state.first_unsmooth}: the tool turns back where this arc begins, and no arc of the file begins "
-            "smoothly: check that the arcs turn the right way about their axes"
-        )
+        text = "the tool turns back where this arc begins, and no arc of the file begins smoothly: "
+        remark = Remark(f"{text}check that the arcs turn the right way about their axes", state.first_unsmooth)
+        state.warnings.append(remark)
 
 
 def unsupported(state: CutterLocationState) -> tuple[Unsupported, ...]:

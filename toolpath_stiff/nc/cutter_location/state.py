@@ -17,7 +17,7 @@ from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, d
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
 from toolpath_stiff.nc.geometry import Vector
-from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Move, Recorder, ToolUse
+from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Move, Recorder, Remark, ToolUse
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.strokes import Drilling, strokes
 from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry, tool_of
@@ -90,7 +90,7 @@ class CutterLocationState:
     used_words: dict[str, list[int]] = field(default_factory=dict)  # line of the first, count
     marks: list[tuple[int, str]] = field(default_factory=list)  # line and name of each operation
     assumptions: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    warnings: list[Remark] = field(default_factory=list)
     noted: dict[str, Noted] = field(default_factory=dict)
     smooth: int = 0  # arcs that a straight move enters smoothly, and would turn back into
     unsmooth: int = 0

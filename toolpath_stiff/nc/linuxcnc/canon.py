@@ -37,7 +37,9 @@ HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 LEAVES = re.compile(r"O|.*M0*9[89](?!\d)")  # lines of which rs274 prints no comment: calls, returns, loops, conditions
-FINE_WORD = re.compile(r"[XYZ][-+]?\d*\.\d{4,}[1-9]")  # more decimals than rs274 prints
+# A block that moves in program coordinates, in the modes in force, and says where by numbers alone.
+PLAIN_BLOCK = re.compile(r"(?:G0*[0-3](?![\d.])|[XYZABCIJKRFSP][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII)
+COORDINATE = re.compile(r"([XYZ])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
 ROUNDING = 1e-6  # far less than one of them
@@ -85,7 +87,9 @@ class Follower:
 
     def __post_init__(self) -> None:
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
-        self.fine = any(FINE_WORD.search(line.words) for line in self.lines)
+        self.incremental = any("1" in DISTANCE_MODE.findall(line.plain) for line in self.lines)
+        # The numbers of plain blocks, of this line and before it, in the digits of the program.
+        self.given, self.given_before = dict[str, str](), dict[str, str]()
         self.passed = [0]  # how many of the first lines no run that comes straight on leaves out
         for line in self.lines:
             shows = line.words.strip("%") and not line.optional and not LEAVES.match(line.words)
@@ -117,6 +121,9 @@ class Follower:
         if text.isdigit():
             self._note_jump(int(text))
             self.line, self.moves_of_line = int(text), 0
+            words, self.given_before = self.lines[self.line - 1].words, self.given
+            plain = not self.incremental and PLAIN_BLOCK.fullmatch(words)
+            self.given = {**self.given, **dict(COORDINATE.findall(words))} if plain else {}
             codes = MOTION_CODE.findall(self._words(self.line))
             if codes:
                 self.cycle = codes[-1] in CYCLE_CODES
@@ -301,12 +308,7 @@ class Follower:
         here, there = frames.to_program(start), frames.to_program(end)
         apart = max(abs(here[axis] - there[axis]) for axis in (first, second)) / self.scale
         if apart < SAME_PLACE:
-            named = {AXES[first], AXES[second]} & set(AXIS_WORD.findall(self._words(self.line)))
-            if named and (apart > ROUNDING or self.fine):
-                problem = "an arc that may be a full circle, or shorter than the digits that LinuxCNC's rs274 prints"
-                expected = "numbers of four decimals, and an end that is the start or more than 0.0002 from it"
-                raise self.fail(problem, expected, line=self.line)
-            there = here
+            there = self._end_in_words(here, apart, (first, second))
         middle = list(here)
         middle[first], middle[second] = c1, c2
         beginning, ending, center = ((point[first], point[second]) for point in (here, there, middle))
@@ -317,6 +319,20 @@ class Follower:
             raise self.fail(error.found, error.expected, line=self.line) from None
         x, y, z = (c - r for c, r in zip(frames.to_control(middle), self.reference, strict=False))
         return Arc((x, y, z), frames.turn_direction(geometry.normal_of(self.plane)), sweep)
+
+    def _end_in_words(self, here: Vector, apart: float, axes: tuple[int, int]) -> Vector:
+        """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
+        named, end = AXIS_WORD.findall(self._words(self.line)), list(here)
+        for axis in (axis for axis in axes if AXES[axis] in named):
+            numbers = [given.get(AXES[axis], "nan") for given in (self.given, self.given_before)]
+            step = float(numbers[0]) - float(numbers[1])
+            if not abs(step) <= SAME_PLACE:  # computed, or compensated
+                if apart > ROUNDING:
+                    problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
+                    raise self.fail(problem, "an end that is the start, or more than 0.0002 from it", line=self.line)
+                return here
+            end[axis] += step * self.scale
+        return end
 
     def _find_height(self, end: Vector) -> None:
         """Until a move names Z, rs274 prints the number that Z had before the length changed."""

@@ -23,7 +23,7 @@ from toolpath_stiff.nc.linuxcnc.inputs import (
     tool_numbers,
 )
 from toolpath_stiff.nc.linuxcnc.runner import Run, RunLimits, find_rs274, run_rs274
-from toolpath_stiff.nc.moves import ReadProgram, Unsupported
+from toolpath_stiff.nc.moves import ReadProgram, Remark, Unsupported
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START
 from toolpath_stiff.nc.tables import tool_of
@@ -199,12 +199,9 @@ class _Session:
                     unsupported.append(Unsupported(line.number, column, match[0], LISTED[code]))
         return unsupported
 
-    def _warnings(self, source: str, given: bool) -> list[str]:
+    def _warnings(self, source: str, given: bool) -> list[Remark]:
+        waits = "M66 waits for an input that is not there; what depends on it may differ"
         return [
             *([ORIGIN_WINS] if source == "option" and given else ()),
-            *(
-                f"line {line.number}: M66 waits for an input that is not there; what depends on it may differ"
-                for line in self.lines
-                if WAITS.search(line.plain)
-            ),
+            *(Remark(waits, line.number) for line in self.lines if WAITS.search(line.plain)),
         ]

@@ -10,6 +10,7 @@ from bisect import bisect_right
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.expressions import EQUAL, number
 from toolpath_stiff.nc.parametric.families import NGC
 from toolpath_stiff.nc.parametric.statements import Steering
@@ -239,7 +240,7 @@ class ParametricRun(ValuesRun):
             self._structure = structure_of(self._steerings(), {first for first, *_ in self._files}, self._fail)
         return self._structure
 
-    def _end(self, row: int, what: str, ended: bool = False) -> list[str]:
+    def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
         if self._levels and not ended:
             raise self._unended(self._at)
         if row >= self._main_lines:
@@ -252,7 +253,7 @@ class ParametricRun(ValuesRun):
             for index in range(row + 1, min([*heads, self._main_lines]))
             if self.lines[index].strip() not in ("", "%") and not any(a <= index <= b for a, b in ends)
         ]
-        return [beyond_the_end(what, row, len(rest))] if rest else []
+        return beyond_the_end(what, row, len(rest))
 
 
 NGC_STEPS = {
