@@ -172,8 +172,6 @@ def stiffness_figures(path: EvaluatedPath, rows: BoolArray) -> Document:
 
 def path_length(samples: Samples, rapid: bool) -> float:
     """Length in m of the rapid, or of the cutting moves."""
-    if not len(samples):
-        return 0.0
     step = np.diff(samples.s, prepend=samples.s[0])
     step[np.diff(samples.move, prepend=samples.move[0]) != 0] = 0.0  # a move's first sample repeats the last end
     return float(step[(samples.motion == RAPID) == rapid].sum())
@@ -290,8 +288,6 @@ def _parts(path: EvaluatedPath, of_move: IntArray, wanted: Sequence[int]) -> lis
 
 def rows_of_parts(part: IntArray, count: int) -> list[IntArray]:
     """The rows of each of `count` parts, in order; `part` (n,) says in which each row is."""
-    if count == 1:
-        return [np.arange(len(part))]
     order = np.argsort(part, kind="stable")
     return np.split(order, np.searchsorted(part[order], np.arange(1, count)))[:count]
 

@@ -147,8 +147,8 @@ def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOut
     count = f"{len(after)} sets of parameters, {len(poses)} poses"
     yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}")
     change = _largest(after["neutral"] / before - 1.0)
-    found = f"there it changes the stiffness by up to {100.0 * change:.3g} %; it must not"
-    yield TrialOutcome("neutral value", change <= SAME, "there the effect vanishes" if change <= SAME else found)
+    mistake = f"there it changes the stiffness by up to {100.0 * change:.3g} %; it must not"
+    yield TrialOutcome("neutral value", change <= SAME, "there the effect vanishes" if change <= SAME else mistake)
     changes = 100.0 * (after["typical, high"] / before - 1.0)
     if _largest(changes) > 100.0 * SAME:
         span = f"{changes.min():+.3g} to {changes.max():+.3g} % (median {np.median(changes):+.3g} %)"
@@ -156,11 +156,11 @@ def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOut
     else:  # one drawn from readings may act at a set-up, a load, a corner that is not among these poses
         passed = None if effect.described_from else False
         yield TrialOutcome("size", passed, "at its upper typical value it changes nothing at these poses")
-    found = f"alone and together differ by up to {100.0 * mixed:.3g} %: the poses mix"
-    yield TrialOutcome("poses", mixed <= SAME, "each alone gives what all together give" if mixed <= SAME else found)
+    mistake = f"alone and together differ by up to {100.0 * mixed:.3g} %: the poses mix"
+    yield TrialOutcome("poses", mixed <= SAME, "each alone gives what all together give" if mixed <= SAME else mistake)
     for hook in negative:
-        found = f"{hook} is negative; if both signs are meant, bound the parameter so"
-        yield TrialOutcome("sign", False, found)
+        mistake = f"{hook} is negative; if both signs are meant, bound the parameter so"
+        yield TrialOutcome("sign", False, mistake)
 
 
 def _poses(effect: Effect, machine: Hexapod, seed: int) -> FloatArray:
