@@ -240,16 +240,24 @@ def per_operation(path: EvaluatedPath) -> list[Document]:
 
 
 def per_tool(path: EvaluatedPath) -> list[Document]:
-    """The figures of each tool that cuts, in order of use, with the length of its first cut."""
+    """The figures of each tool that cuts, in order of use; a tool that cuts with two lengths has two rows.
+
+    Rapids with a length that the tool never cuts with (before G43) count with the first that it does.
+    """
     moves, remarks = path.program.moves, {tool.number: tool.remark for tool in path.program.tools}
-    tool = np.unique(moves.tool, return_inverse=True)[1]
-    cuts = np.flatnonzero(moves.motion != RAPID)
-    used, first = np.unique(tool[cuts], return_index=True)
+    tools, tool = np.unique(moves.tool, return_inverse=True)
+    lengths, length = np.unique(moves.tool_length, return_inverse=True)  # nan, the reference tool's, is one of them
+    of_move, cuts = tool * len(lengths) + length, np.flatnonzero(moves.motion != RAPID)
+    used, first = np.unique(of_move[cuts], return_index=True)
     order = np.argsort(first)
+    parts, cuts = used[order], cuts[first[order]]
+    first_of_tool = np.full(len(tools), len(tools) * len(lengths))  # a part of its own where a tool never cuts
+    first_of_tool[tool[cuts][::-1]] = parts[::-1]
+    counts_with = np.where(np.isin(of_move, used), of_move, first_of_tool[tool])
     rows: list[Document] = []
-    for part, cut in zip(_parts(path, tool, used[order].tolist()), cuts[first[order]], strict=True):
-        number, length = int(moves.tool[cut]), float(moves.tool_length[cut])
-        mm = None if math.isnan(length) else mm_from_m(length)
+    for cut, part in zip(cuts, _parts(path, counts_with, parts.tolist()), strict=True):
+        number, in_use = int(moves.tool[cut]), float(moves.tool_length[cut])
+        mm = None if math.isnan(in_use) else mm_from_m(in_use)
         rows.append({"tool": number, "remark": remarks.get(number, ""), "length_mm": mm, **part})
     return rows
 
