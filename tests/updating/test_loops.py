@@ -21,7 +21,7 @@ from toolpath_stiff.planning.result import plan
 from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.tables import TABLES, Tables, tables_of
 from toolpath_stiff.readings.measurements import measured_path, model_stiffness, read_measurements
-from toolpath_stiff.report.compare.page import text
+from toolpath_stiff.report.compare import text
 from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import HiddenMachine

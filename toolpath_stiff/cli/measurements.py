@@ -119,7 +119,7 @@ def update(
     """
     args.replace |= args.force
     check_single(args, output)
-    target = destination(args, tps.Update, args.data, machine=output is None)
+    target = destination(args, tps.Update, args.data, () if output is None else ("machine.toml",))
     fitted = call(args, tps.update, machine_file=output or target.folder / "machine.toml")
     after = [target.write(fitted, plots=not args.no_plots, machine=output is None)]
     if output and fitted.accepted:

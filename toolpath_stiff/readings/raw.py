@@ -28,7 +28,6 @@ from toolpath_stiff.workbooks import split_name
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 READ = (".csv", ".txt", ".dat", ".asc", ".tsv", ".xlsx", ".xlsm")  # of a folder
 OWN_OUTPUT = "_measurements.csv"
@@ -111,21 +110,14 @@ class Reduction(Result):
 
         return pd.DataFrame(self.to_dict()["loops"])
 
-    def plot(self) -> Figure:
-        """Force against deflection of each loop; without records the struts over their dates."""
-        figure: Figure = self.view.reduction_figure(self)
-        return figure
-
-    def __str__(self) -> str:
-        return str(self.view.reduction_text(self))
-
     def _short(self) -> str:
         return f"{self.title}, {len(self.figures)} loop{'s' * (len(self.figures) != 1)}"
 
     def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
         """The measurement file; beside it the picture of the loops, and of dated struts that over their dates."""
-        pictures: Mapping[Path, Content] = self.view.reduction_pictures(self, Path(file)) if plots else {}
-        return {Path(file): measurement_csv(self.figures, self.history), **pictures}
+        out, pictures = Path(file), self.view.pictures(self) if plots else {}
+        beside = {out.with_name(f"{out.stem}_{name}"): content for name, content in pictures.items()}
+        return {out: measurement_csv(self.figures, self.history), **beside}
 
     def save(self, file: str | Path, *, plots: bool = True) -> list[Path]:
         """Write the measurement file and, beside it, the picture of the loops."""

@@ -1,0 +1,211 @@
+"""Sizes of effects that stay hidden: too small for these readings to show, or not excluded beside an explanation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.candidates import LARGEST, SMALLEST, Candidate, CandidateTable
+from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
+from toolpath_stiff.inference.hypotheses import Family
+from toolpath_stiff.inference.least_squares import bounded_step
+from toolpath_stiff.inference.size_priors import LIKELY, log_expected, log_usual
+from toolpath_stiff.stiffness.contract import Effect, Parameter
+
+POWER_80 = 0.8416  # normal quantile of 80 % power
+
+
+TIED = 1e-9  # share by which changes differ that are one and the same: of a factor and of its inverse
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """Smallest size of one parameter that these data would have shown.
+
+    Attributes
+    ----------
+    effect, parameter
+        Which.
+    value
+        SI value of the parameter at that size; nan if no size shows.
+    rms
+        Rms change of ln stiffness that it makes; the largest possible one if no size shows.
+    seen
+        Whether any size within the bounds would have been seen.
+    """
+
+    effect: str
+    parameter: Parameter
+    value: float
+    rms: float
+    seen: bool
+
+
+def detectable_sizes(problem: Problem, families: Sequence[Family], gain_threshold: float) -> list[Detectable]:
+    """Per parameter, the size seen with 80 % power at the threshold that the best of all candidates must pass.
+
+    Of an effect with choices the choice that is hardest to see counts. Only the parameter itself differs from neutral.
+    """
+    wanted = float(np.sqrt(gain_threshold)) + POWER_80
+    detectable = []
+    for family in sorted(families, key=lambda family: family.name):
+        for j in range(len(family.tables[0].candidate.components)):
+            worst: Detectable | None = None
+            for table in family.tables:
+                for sign in problem.prior(table, j).log_sizes:
+                    smallest = _smallest(problem, table, j, sign, wanted)
+                    # Hardest to see: not at all, else by the largest change; of two alike the first.
+                    if worst is None or (
+                        smallest.rms > (1.0 + TIED) * worst.rms if smallest.seen == worst.seen else not smallest.seen
+                    ):
+                        worst = smallest
+            detectable += [worst] if worst else []
+    return detectable
+
+
+def _smallest(problem: Problem, table: CandidateTable, j: int, sign: float, wanted: float) -> Detectable:
+    name, component, prior = table.candidate.name, table.candidate.components[j], problem.prior(table, j)
+    logs, rms, lengths = prior.log_sizes[sign], prior.rms[sign], np.maximum.accumulate(prior.lengths[sign])
+    if lengths[-1] < wanted:
+        return Detectable(name, component.parameter, float("nan"), float(rms[-1]), seen=False)
+    log_size = float(np.interp(wanted, lengths, logs))
+    change = float(np.interp(log_size, logs, rms))
+    return Detectable(name, component.parameter, component.value(sign * float(np.exp(log_size))), change, seen=True)
+
+
+# Rms change of ln stiffness from which an effect matters; assumed: at 5 % of its stiffness the tip's deflection is off
+# by less than the 10 % to which a cutting force is known.
+MATTERS = 0.05
+
+
+SIZES = 16  # a sign, between those that are tabulated
+
+
+@dataclass(frozen=True)
+class Unexcluded:
+    """An effect that the readings neither show nor exclude beside an explanation.
+
+    Attributes
+    ----------
+    effect, candidate, parameter
+        Which; with the choice, and the parameter, that leaves it most room.
+    value
+        SI value of the parameter up to which the readings do not exclude it (95 %), its other parameters neutral.
+    rms
+        Rms change of the tip's ln stiffness that it makes there, on its own.
+    probability
+        Of being there beside the explanation, at any size.
+    """
+
+    effect: Effect
+    candidate: Candidate
+    parameter: Parameter
+    value: float
+    rms: float
+    probability: float = np.nan
+
+
+def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_odds: float) -> list[Unexcluded]:
+    """Effects that may be there beside an explanation at a size that matters, the likeliest first.
+
+    Parameters
+    ----------
+    problem, families
+        Readings; all effects that do something to them.
+    fit
+        The explanation.
+    prior_odds
+        Of one certain further effect being there to none being there.
+    """
+    beside = _Beside(problem, fit)
+    odds: dict[str, float] = {}
+    widest: dict[str, Unexcluded] = {}
+    for family in families:
+        if family.name not in fit.names:
+            seen = ((table, np.flatnonzero(table.columns.any(axis=0)).tolist()) for table in family.tables)
+            rooms = [beside.room(table, j) for table, components in seen for j in components]
+            odds[family.name] = prior_odds * float(np.mean([mean for _, mean in rooms]))
+            widest[family.name] = max((room for room, _ in rooms), key=lambda room: room.rms)
+    whole = 1.0 + sum(odds.values())
+    hidden = [replace(room, probability=odds[name] / whole) for name, room in widest.items() if room.rms >= MATTERS]
+    return sorted(hidden, key=lambda room: (-room.probability, room.effect.name))
+
+
+class _Beside:
+    """An explanation whose law and sizes move along with a further effect, within their bounds."""
+
+    def __init__(self, problem: Problem, fit: Fit) -> None:
+        self.problem, self.fit = problem, fit
+        self.tip = problem.predictor.data.tip
+        self.compliance = np.exp(fit.residual - problem.observed)
+        self.precision = fit.scatter.precision
+        self.weighted = self.precision.times(fit.jacobian.T)
+        prior = law_prior(fit.jacobian.shape[1])
+        self.information = self.weighted @ fit.jacobian + prior
+        free = [fit.parts[i] for i in fit.free]
+        self.pull = -prior @ np.concatenate([fit.law, np.zeros(len(free))])
+        self.low = np.array([-np.inf] * 2 + [min(component.bounds[0] - size, 0.0) for component, size in free])
+        self.high = np.array([np.inf] * 2 + [max(component.bounds[1] - size, 0.0) for component, size in free])
+
+    def room(self, table: CandidateTable, j: int) -> tuple[Unexcluded, float]:
+        """How far component `j` of a table may go: of both signs the one at which it changes more.
+
+        And the mean of the likelihood over the prior of the size, 1 where the readings say nothing.
+        """
+        component = table.candidate.components[j]
+        none, gain, mass = float(self._squares(self.fit.residual[None])[0]), 0.0, 0.0
+        sides = []
+        for sizes in self._sizes(table, j):
+            every = np.zeros((len(sizes), len(table.candidate.components)))
+            every[:, j] = sizes
+            whole = self.problem.base_compliance if table.candidate.effect.is_instrument else self.compliance
+            change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
+            squares = self._squares(self.fit.residual + change)
+            changes = np.sqrt(np.mean(change[:, self.tip] ** 2, axis=1))
+            sides.append((sizes, changes, squares))
+            # Of the prior, as far as sizes are expected; whether the readings would show them does not matter here.
+            weights = np.exp(log_expected(changes) + log_usual(sizes, component.typical()))
+            weights *= np.abs(np.gradient(np.log(np.abs(sizes))))
+            gain, mass = gain + float(weights @ np.exp(0.5 * (none - squares))), mass + float(weights.sum())
+        most = min(none, *(float(squares.min()) for *_, squares in sides)) + LIKELY
+        size, rms = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
+        candidate, value = table.candidate, component.value(size)
+        return Unexcluded(candidate.effect, candidate, component.parameter, value, rms), gain / mass
+
+    def _sizes(self, table: CandidateTable, j: int) -> Iterator[FloatArray]:
+        """Sizes (g,) of each sign, rising."""
+        component = table.candidate.components[j]
+        for sign in component.signs:
+            if table.knots:
+                if sign in table.knots:
+                    logs = table.knots[sign][0]
+                    yield sign * np.exp(np.linspace(logs[0], logs[-1], SIZES))
+                continue
+            scale = float(np.sqrt(np.mean((table.columns[self.tip, j] / self.compliance[self.tip]) ** 2)))
+            ends = np.minimum(np.array([SMALLEST, LARGEST]) / max(scale, 1e-300), component.reach(sign))
+            yield sign * np.geomspace(min(ends[0], 0.1 * ends[1]), ends[1], SIZES)
+
+    def _squares(self, residuals: FloatArray) -> FloatArray:
+        """(g,) squares that are left of residuals (g, n) once law and sizes have moved to fit them best."""
+        gradient = residuals @ self.weighted.T + self.pull
+        moves = np.linalg.solve(self.information, gradient.T).T
+        for k in np.flatnonzero(((moves < self.low) | (moves > self.high)).any(axis=1)).tolist():
+            moves[k] = bounded_step(self.information, gradient[k], self.low, self.high)
+        squares = self.precision.squares(residuals) - 2.0 * (gradient * moves).sum(axis=1)
+        return np.asarray(squares + ((moves @ self.information) * moves).sum(axis=1))
+
+
+def _widest(side: tuple[FloatArray, ...], none: float, most: float) -> tuple[float, float]:
+    """Size and rms at the largest size whose squares are at most `most`; between two by a line.
+
+    `side`: the same and the squares of sizes (g,) of one sign; `none`: the squares at size 0.
+    """
+    sizes, rms, squares = np.concatenate([[[0.0], [0.0], [none]], np.array(side)], axis=1)
+    last = int(np.flatnonzero(squares <= most).max(initial=0))
+    after = min(last + 1, len(squares) - 1)
+    share = float(np.clip((most - squares[last]) / (squares[after] - squares[last]), 0.0, 1.0)) if after > last else 0.0
+    size, value = (float(x[last] + share * (x[after] - x[last])) for x in (sizes, rms))
+    return size, value
