@@ -142,15 +142,15 @@ def test_an_operation_out_of_reach_has_no_figures() -> None:
     check_parts(analysis, "per_operation")
 
 
-def test_a_tool_of_two_lengths_has_the_first_in_its_row() -> None:
+def test_a_tool_of_two_lengths_has_two_rows() -> None:
     moves = [
         {"end": (0.1, 0.0, 0.0), "tool": 1},
         {"end": (0.1, 0.05, 0.0), "tool": 1, "tool_length": 0.08},
         {"end": (0.0, 0.05, 0.0), "tool": 1},
     ]
     rows = make_analysis(moves).to_dict()["per_tool"]
-    assert [(row["tool"], row["length_mm"]) for row in rows] == [(1, None)]
-    assert [row["cutting_length_mm"] for row in rows] == pytest.approx([250.0])
+    assert [(row["tool"], row["length_mm"]) for row in rows] == [(1, None), (1, pytest.approx(80.0))]
+    assert [row["cutting_length_mm"] for row in rows] == pytest.approx([200.0, 50.0])
 
 
 def test_the_approach_before_a_tools_length_is_in_force_is_the_tools_time() -> None:

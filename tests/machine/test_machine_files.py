@@ -190,7 +190,7 @@ def test_from_linuxcnc_reads_pins_and_says_what_it_assumed():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("loadrt trivkins\n", "sets no genhexkins joints"),
+        ("loadrt trivkins\n", "36 joint pins are not set"),
         (HAL.replace("setp genhexkins.base.3.y", "# "), "genhexkins.base.3.y"),
         (HAL + "setp genhexkins.base.0.x 1\n", "set twice"),
         (HAL.replace("base.0.x ", "base.0.x [KIN]X #"), "a number"),

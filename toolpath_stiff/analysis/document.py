@@ -62,9 +62,9 @@ def assumptions(analysis: EvaluatedPath) -> list[str]:
 
 def summarise(analysis: EvaluatedPath) -> Document:
     """The figures of `summary.json`, in the shop's units."""
-    samples, program, at, band = analysis.samples, analysis.program, analysis.at, analysis.parameter_band
-    cutting, headline = samples.cutting & at.reachable, analysis.headline
-    nearest = int(np.argmin(np.where(cutting, at.reach.margin, np.inf)))
+    samples, program, there, band = analysis.samples, analysis.program, analysis.at, analysis.parameter_band
+    cutting, headline = samples.cutting & there.reachable, analysis.headline
+    nearest = int(np.argmin(np.where(cutting, there.reach.margin, np.inf)))
     return {
         "program": program.name,
         "interpreter": program.interpreter,
@@ -78,31 +78,23 @@ def summarise(analysis: EvaluatedPath) -> Document:
         "samples": len(samples),
         "cutting_length_mm": mm_from_m(path_length(samples, rapid=False)),
         "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
-        "time_s": float(samples.t[-1]) if len(samples) else 0.0,
+        "time_s": float(samples.t[-1]),
         **analysis.figures,
-        **({} if band is None else {"parameter_uncertainty": band_figures(band, samples, at.stiffness, headline)}),
+        **({} if band is None else {"parameter_uncertainty": band_figures(band, samples, there.stiffness, headline)}),
         "weakest_places": [describe_sample(analysis, row) for row in analysis.weakest_rows],
         "per_tool": per_tool(analysis),
         "per_operation": per_operation(analysis),
-        "min_margin": float(at.reach.margin[nearest]),
-        "min_margin_limit": at.reach.describe(nearest),
+        "min_margin": float(there.reach.margin[nearest]),
+        "min_margin_limit": there.reach.describe(nearest),
         "min_margin_line": int(samples.line[nearest]),
         "out_of_reach_samples": int(analysis.out_of_reach.sum()),
-        "extrapolated_share": share(at.extrapolated, cutting),
+        "extrapolated_share": share(there.extrapolated, cutting),
         **effects_stated(analysis.model),
         "unsupported": to_dict(program.unsupported),
         "assumptions": assumptions(analysis),
         "warnings": analysis.warnings,
         "version": defaults.VERSION,
     }
-
-
-def idle_on(other: Document) -> list[str]:
-    """Effects of the other machine that wait for something: without them the two machines may look the same."""
-    return [
-        f"{both_names('--compare', other['machine'])}: {idle['effect']} does not act: {idle['reason']}"
-        for idle in other["effects_idle"]
-    ]
 
 
 def compare_summaries(summary: Document, other: Document) -> Document:

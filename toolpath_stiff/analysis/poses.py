@@ -26,6 +26,7 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 if TYPE_CHECKING:
     import pandas as pd
 
+DECIMALS: dict[str, int | None] = {"extrapolated": None, "margin_limit": None}  # a whole number, a word
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
 
@@ -136,7 +137,7 @@ class PoseStiffness(Result):
 
     def csv(self) -> str:
         """The table as the command writes it."""
-        decimals = {name: _decimals(name) for name in self.columns}
+        decimals = {name: DECIMALS.get(name, 4 if name.endswith("N_per_mm") else 6) for name in self.columns}
         return ",".join(decimals) + "\n" + csv_rows(self.columns, decimals)
 
     def __str__(self) -> str:
@@ -148,13 +149,6 @@ class PoseStiffness(Result):
             return f"{len(self.reachable)} poses of {name}, {int(self.reachable.sum())} within reach"
         soft, stiff = (f"{self.columns[f'{which}_N_per_mm'][0]:.0f}" for which in ("softest", "stiffest"))
         return f"{name}, {soft} N/mm along the softest direction, {stiff} along the stiffest"
-
-
-def _decimals(name: str) -> int | None:
-    """Decimals of a column; None: a whole number or a word."""
-    if name in ("extrapolated", "margin_limit"):
-        return None
-    return 4 if name.endswith("N_per_mm") else 6
 
 
 def evaluate_poses(

@@ -12,7 +12,6 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.document import (
     compare_summaries,
-    idle_on,
     required_stiffness_missed,
     summarise,
     words_turn_the_platform,
@@ -135,7 +134,9 @@ class Analysis(EvaluatedPath, FolderResult):
         if self.on_other is not None:
             other = self.on_other.to_dict()
             summary["compare"] = compare_summaries(summary, other)
-            summary["warnings"] = [*self.warnings, *idle_on(other)]
+            option = both_names("--compare", other["machine"])  # without these the two machines may look the same
+            idle = [f"{option}: {row['effect']} does not act: {row['reason']}" for row in other["effects_idle"]]
+            summary["warnings"] = [*self.warnings, *idle]
         finite: dict[str, Any] = without_nan(summary)
         return finite
 

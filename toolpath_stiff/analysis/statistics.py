@@ -172,8 +172,6 @@ def stiffness_figures(path: EvaluatedPath, rows: BoolArray) -> Document:
 
 def path_length(samples: Samples, rapid: bool) -> float:
     """Length in m of the rapid, or of the cutting moves."""
-    if not len(samples):
-        return 0.0
     step = np.diff(samples.s, prepend=samples.s[0])
     step[np.diff(samples.move, prepend=samples.move[0]) != 0] = 0.0  # a move's first sample repeats the last end
     return float(step[(samples.motion == RAPID) == rapid].sum())
@@ -242,16 +240,24 @@ def per_operation(path: EvaluatedPath) -> list[Document]:
 
 
 def per_tool(path: EvaluatedPath) -> list[Document]:
-    """The figures of each tool that cuts, in order of use, with the length of its first cut."""
+    """The figures of each tool that cuts, in order of use; a tool that cuts with two lengths has two rows.
+
+    Rapids with a length that the tool never cuts with (before G43) count with the first that it does.
+    """
     moves, remarks = path.program.moves, {tool.number: tool.remark for tool in path.program.tools}
-    tool = np.unique(moves.tool, return_inverse=True)[1]
-    cuts = np.flatnonzero(moves.motion != RAPID)
-    used, first = np.unique(tool[cuts], return_index=True)
+    tools, tool = np.unique(moves.tool, return_inverse=True)
+    lengths, length = np.unique(moves.tool_length, return_inverse=True)  # nan, the reference tool's, is one of them
+    of_move, cuts = tool * len(lengths) + length, np.flatnonzero(moves.motion != RAPID)
+    used, first = np.unique(of_move[cuts], return_index=True)
     order = np.argsort(first)
+    parts, cuts = used[order], cuts[first[order]]
+    first_of_tool = np.full(len(tools), len(tools) * len(lengths))  # a part of its own where a tool never cuts
+    first_of_tool[tool[cuts][::-1]] = parts[::-1]
+    counts_with = np.where(np.isin(of_move, used), of_move, first_of_tool[tool])
     rows: list[Document] = []
-    for part, cut in zip(_parts(path, tool, used[order].tolist()), cuts[first[order]], strict=True):
-        number, length = int(moves.tool[cut]), float(moves.tool_length[cut])
-        mm = None if math.isnan(length) else mm_from_m(length)
+    for cut, part in zip(cuts, _parts(path, counts_with, parts.tolist()), strict=True):
+        number, in_use = int(moves.tool[cut]), float(moves.tool_length[cut])
+        mm = None if math.isnan(in_use) else mm_from_m(in_use)
         rows.append({"tool": number, "remark": remarks.get(number, ""), "length_mm": mm, **part})
     return rows
 
@@ -290,8 +296,6 @@ def _parts(path: EvaluatedPath, of_move: IntArray, wanted: Sequence[int]) -> lis
 
 def rows_of_parts(part: IntArray, count: int) -> list[IntArray]:
     """The rows of each of `count` parts, in order; `part` (n,) says in which each row is."""
-    if count == 1:
-        return [np.arange(len(part))]
     order = np.argsort(part, kind="stable")
     return np.split(order, np.searchsorted(part[order], np.arange(1, count)))[:count]
 

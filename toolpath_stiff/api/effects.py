@@ -50,7 +50,7 @@ def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> E
     on = machine_from(machine)
     model = on.model.given or on.model.machine
     known_effects([str(file)])  # names that are taken
-    trials = [try_effect(effect, model) for effect in effects_from_file(str(file)).values()]
+    trials = {name: try_effect(effect, model) for name, effect in effects_from_file(str(file)).items()}
     return EffectCheck(str(file), on.name, trials)
 
 

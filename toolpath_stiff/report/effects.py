@@ -19,11 +19,11 @@ TRIAL_WORDS = {True: "good", False: "FAILS", None: "note"}
 def trials_text(check: EffectCheck) -> str:
     """What the trial of each effect of a file showed."""
     lines = []
-    for trial in check.trials:
-        lines.append(f"{trial.effect.name}, on machine {check.machine}: {'good' if trial.passed else 'FAILS'}")
-        width = max(len(outcome.name) for outcome in trial.outcomes)
-        for outcome in trial.outcomes:
-            lines.append(f"  {TRIAL_WORDS[outcome.passed]:<5}  {outcome.name:<{width}}  {outcome.found}")
+    for row in check.to_dict()["effects"]:
+        lines.append(f"{row['effect']}, on machine {check.machine}: {'good' if row['passed'] else 'FAILS'}")
+        width = max(len(outcome["name"]) for outcome in row["checks"])
+        for outcome in row["checks"]:
+            lines.append(f"  {TRIAL_WORDS[outcome['passed']]:<5}  {outcome['name']:<{width}}  {outcome['found']}")
     return "\n".join(lines)
 
 

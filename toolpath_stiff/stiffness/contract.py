@@ -124,7 +124,7 @@ def length_error(typical: tuple[float, float], source: str, meaning: str) -> Par
 
 
 def choice(
-    name: str, bounds: tuple[int, int], source: str, meaning: str, typical: tuple[int, ...] = (), neutral: int = 0
+    name: str, bounds: tuple[int, int], source: str, meaning: str, typical: tuple[int, ...] = (), neutral: float = 0.0
 ) -> Parameter:
     """The parameter that says on which part the effect acts, a whole number."""
     low, *_, high = typical or bounds

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -55,17 +55,9 @@ class TrialOutcome:
     found: str
 
 
-@dataclass(frozen=True)
-class Trial:
-    """All checks of an effect."""
-
-    effect: Effect
-    outcomes: tuple[TrialOutcome, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Whether no check failed."""
-        return all(outcome.passed is not False for outcome in self.outcomes)
+def all_passed(outcomes: Iterable[TrialOutcome]) -> bool:
+    """Whether no check failed."""
+    return all(outcome.passed is not False for outcome in outcomes)
 
 
 def own_effects(model: StiffnessModel, effect_files: Iterable[str | Path]) -> list[Effect]:
@@ -98,13 +90,13 @@ def failure(effect: Effect, machine: Hexapod) -> str:
 @lru_cache(maxsize=256)
 def _failure(effect: Effect, machine: bytes) -> str:
     try:
-        outcomes = try_effect(effect, pickle.loads(machine)).outcomes
+        outcomes = try_effect(effect, pickle.loads(machine))
     except InputError as error:
         return f"cannot be tried: {error}"
     return "; ".join(f"fails the check of its {row.name}: {row.found}" for row in outcomes if row.passed is False)
 
 
-def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> Trial:
+def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> list[TrialOutcome]:
     """Try an effect on a machine, by itself: at its neutral value, typical values and finite bounds.
 
     Parameters
@@ -121,7 +113,7 @@ def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> Trial:
         outcomes += _behaviour(effect, machine.with_changes(effects=(), instruments=()), seed)
     except EffectFault as fault:
         outcomes.append(TrialOutcome("shapes", False, str(fault)))
-    return Trial(effect, tuple(outcomes))
+    return outcomes
 
 
 def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOutcome]:
@@ -147,8 +139,8 @@ def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOut
     count = f"{len(after)} sets of parameters, {len(poses)} poses"
     yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}")
     change = _largest(after["neutral"] / before - 1.0)
-    found = f"there it changes the stiffness by up to {100.0 * change:.3g} %; it must not"
-    yield TrialOutcome("neutral value", change <= SAME, "there the effect vanishes" if change <= SAME else found)
+    mistake = f"there it changes the stiffness by up to {100.0 * change:.3g} %; it must not"
+    yield TrialOutcome("neutral value", change <= SAME, "there the effect vanishes" if change <= SAME else mistake)
     changes = 100.0 * (after["typical, high"] / before - 1.0)
     if _largest(changes) > 100.0 * SAME:
         span = f"{changes.min():+.3g} to {changes.max():+.3g} % (median {np.median(changes):+.3g} %)"
@@ -156,11 +148,11 @@ def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOut
     else:  # one drawn from readings may act at a set-up, a load, a corner that is not among these poses
         passed = None if effect.described_from else False
         yield TrialOutcome("size", passed, "at its upper typical value it changes nothing at these poses")
-    found = f"alone and together differ by up to {100.0 * mixed:.3g} %: the poses mix"
-    yield TrialOutcome("poses", mixed <= SAME, "each alone gives what all together give" if mixed <= SAME else found)
+    mistake = f"alone and together differ by up to {100.0 * mixed:.3g} %: the poses mix"
+    yield TrialOutcome("poses", mixed <= SAME, "each alone gives what all together give" if mixed <= SAME else mistake)
     for hook in negative:
-        found = f"{hook} is negative; if both signs are meant, bound the parameter so"
-        yield TrialOutcome("sign", False, found)
+        mistake = f"{hook} is negative; if both signs are meant, bound the parameter so"
+        yield TrialOutcome("sign", False, mistake)
 
 
 def _poses(effect: Effect, machine: Hexapod, seed: int) -> FloatArray:
@@ -253,7 +245,7 @@ def unit_in_si(unit: str) -> float | None:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class EffectCheck(Result):
-    """Effects of a file tried against the contract: shapes, symmetry, units, neutral value, speed.
+    """Effects of a file tried against the contract: shapes, symmetry, units, neutral value.
 
     Examples
     --------
@@ -273,16 +265,17 @@ class EffectCheck(Result):
 
     file: str
     machine: str
-    trials: list[Trial]
+    trials: Mapping[str, Sequence[TrialOutcome]]  # by the effect's name
 
     @property
     def passed(self) -> bool:
         """Whether every effect keeps the contract."""
-        return all(trial.passed for trial in self.trials)
+        return all(map(all_passed, self.trials.values()))
 
     def to_dict(self) -> dict[str, Any]:
         """Each check of each effect."""
-        rows = [{"effect": t.effect.name, "passed": t.passed, "checks": to_dict(t.outcomes)} for t in self.trials]
+        trials = self.trials.items()
+        rows = [{"effect": name, "passed": all_passed(made), "checks": to_dict(made)} for name, made in trials]
         return {"file": self.file, "machine": self.machine, "passed": self.passed, "effects": rows}
 
     def to_frame(self) -> pd.DataFrame:
