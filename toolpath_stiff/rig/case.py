@@ -69,12 +69,8 @@ def rows_of(table: Table, elapsed: FloatArray | None = None) -> Rows:
 
 def clamp_of(table: Table) -> IntArray:
     """(n,) group of each row: its clamp, or without that column its pose and set-up."""
-    if "clamp" in table:
-        keys = [(int(clamp),) for clamp in table["clamp"]]
-    else:
-        setups = table.get("setup", [DEFAULT_SETUP] * len(table["x_mm"]))
-        poses = zip(*(table[name] for name in POSE if name in table), strict=True)
-        keys = [(*(float(v) for v in pose), str(setup)) for pose, setup in zip(poses, setups, strict=True)]  # type: ignore[misc]
+    columns = ["clamp"] if "clamp" in table else [name for name in (*POSE, "setup") if name in table]
+    keys = list(zip(*(np.asarray(table[name]).tolist() for name in columns), strict=True))
     numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
     return np.array([numbers[key] for key in keys])
 
