@@ -146,7 +146,7 @@ def test_columns_of_the_joints_agree_with_the_predictors():
     visits = possible_visits(nist(), menu(), (), np.random.default_rng(2))
     some = visits.readings.select(np.arange(0, len(visits.readings), 401))
     predictor = Predictor(nist(), some)
-    assert joint_columns(predictor.base, some) == pytest.approx(predictor.joint_columns(), rel=1e-6, abs=1e-9)
+    assert joint_columns(predictor.base, some) == pytest.approx(predictor.joint_columns, rel=1e-6, abs=1e-9)
 
 
 # -- what splits what --------------------------------------------------------------------------------------------------

@@ -31,6 +31,7 @@ from toolpath_stiff.correction.words import NEEDED
 from toolpath_stiff.diagnosis.diagnose import FEWEST
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, testable_effects
+from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
@@ -40,7 +41,6 @@ from toolpath_stiff.inference.hypotheses import score_families, signatures, tabl
 from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.stiffness.contract import Effect
 
 TRIED = 4  # candidates a step of `--auto`, the most likely first

@@ -21,11 +21,11 @@ from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.fits import baseline
 from toolpath_stiff.inference.left_out import HeldOut
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.model import build_model, setup_of
 

@@ -11,7 +11,7 @@ from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.path import place_orientations
+from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.paths import placed_path
 from toolpath_stiff.placement.working import Search

@@ -14,7 +14,7 @@ import numpy as np
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import headline_rows, plunging_rows
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.path import Samples, sample_moves
+from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.placement.paths import placed_path
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.rows import PlacementRow
