@@ -16,6 +16,7 @@ from numpy.random import Generator
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE, with_effect
@@ -94,7 +95,7 @@ class DrawnCase:
     """
 
     rows: Table
-    truth: dict[str, Any]
+    truth: Document
     nominal: Nominal
     machine: HiddenMachine
     nuisances: Nuisances
@@ -131,7 +132,7 @@ def effects_of_layout(layout: str) -> tuple[str, ...]:
     return tuple(name for name in CATALOGUE if name not in lacking)
 
 
-def make_case(seed: int, *args: Any, **named: Any) -> tuple[Table, dict[str, Any]]:
+def make_case(seed: int, *args: Any, **named: Any) -> tuple[Table, Document]:
     """Rows and truth of the same as `draw_case`."""
     case = draw_case(seed, *args, **named)
     return case.rows, case.truth
