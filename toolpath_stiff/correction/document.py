@@ -83,7 +83,6 @@ def _support(support: Support) -> Document:
         "reasons": list(support.reasons),
         "mean_abs_error_percent": percent_of(support.error),
         "held_out_error_percent": percent_of(support.held_out_error),
-        "held_out_reduction_percent": percent_of(support.fall),
         "held_out_gain_in_se": json_number(support.gain_in_se, 3),
         "likelihood_gain": json_number(support.likelihood_gain),
         "threshold": json_number(support.threshold),

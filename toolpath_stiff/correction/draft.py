@@ -72,9 +72,6 @@ class EffectDraft(EffectFile):
     def __str__(self) -> str:
         return self.text or self.reason
 
-    def _short(self) -> str:
-        return super()._short() if self.text else self.reason
-
     def save(self, file: str | Path) -> Path:
         """Write the file, whole or not at all; raises `InputError` where nothing is drafted."""
         if not self.text:

@@ -38,7 +38,7 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect, base_fit, baseline
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import score_families, signatures, tables_of
-from toolpath_stiff.inference.left_out import error_falls, gain_in_standard_errors
+from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.stiffness.contract import Effect
@@ -81,8 +81,6 @@ def build_ladder(task: UpdateTask) -> Update:
 
 
 def _check(task: UpdateTask, names: Sequence[str]) -> None:
-    if task.strut_law and task.keep_strut_law:
-        raise InputError("--strut-law and --keep-strut-law", expected="one of them")
     if not names and not task.strut_law and not task.auto:
         raise InputError("nothing to update", expected="--add EFFECT, --strut-law or --auto")
     lacking = int(np.isnan(task.data.stiffness).sum())
@@ -183,7 +181,6 @@ class _Work:
     def support(self, before: LadderStep, fit: Fit, j: int, candidates: Sequence[Candidate]) -> Support:
         """Judge effect j of a fit against the model with the other effects."""
         name, after = fit.names[j], self.step("", fit)
-        fall = float(error_falls(before.held, after.held).mean())
         in_se = gain_in_standard_errors(before.held, after.held)
         others = self.field(before.fit)
         problem, threshold = others.problem, others.threshold
@@ -209,7 +206,7 @@ class _Work:
                 f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {threshold:.1f} by "
                 "chance once in twenty campaigns"
             )
-        return Support(name, in_se, fall, after.error, after.held.mean_error, gained, threshold, tuple(reasons))
+        return Support(name, in_se, after.error, after.held.mean_error, gained, threshold, tuple(reasons))
 
     def next_effect(self, before: LadderStep) -> tuple[LadderStep | None, tuple[Support, ...]]:
         """The most likely effect that the data support on top of a step, and the supports of all that were tried."""

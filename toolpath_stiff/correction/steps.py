@@ -126,8 +126,6 @@ class Support:
         Its name.
     gain_in_se
         Fall of the error at left-out points over its standard error; nan where nothing can be left out.
-    fall
-        That fall, relative.
     error, held_out_error
         Mean errors with it, in sample and at left-out points.
     likelihood_gain, threshold
@@ -138,7 +136,6 @@ class Support:
 
     effect: str
     gain_in_se: float
-    fall: float
     error: float
     held_out_error: float
     likelihood_gain: float

@@ -7,13 +7,13 @@ one of their ends, or some of its axes, stays where it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from toolpath_stiff.analysis.loads import Load, headline_rows
-from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, product
+from toolpath_stiff.arrays import AnyArray, ArrayColumns, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
 from toolpath_stiff.path.placing import place, place_orientations
@@ -23,9 +23,6 @@ from toolpath_stiff.units import Pose
 
 Read = Callable[[Pose], ReadProgram]  # the program as it is read where its zero sits there
 SHIFT = np.array([0.011, 0.017, 0.023, 0.0, 0.0, 0.0])  # m; tells the axes of a point that follow the work from others
-_Leg = tuple[
-    int, FloatArray, FloatArray, BoolArray
-]  # row of the move; ends (2, 6), in the machine (2, 3), which follow
 LEG_SAMPLES = 40  # of an anchored rapid, at most; 25 mm apart over a metre, and reach changes slowly
 
 COLUMNS = ("position", "tangent", "abc", "weight", "line", "tool_length", "cutting")  # as sampled
@@ -172,13 +169,24 @@ def _anchored(program: ReadProgram, present: FloatArray, read: Read | None) -> A
         if len(again) == len(moves):
             moved = _tips(place(again, further)) - _tips(place(moves, zero))
             follows = np.asarray(np.abs(moved - SHIFT[:3]) < np.abs(moved))
-    ends, machine = np.stack([moves.start, moves.end]), _tips(place(moves, zero))
     rows = np.flatnonzero(_bound(moves))
-    legs = [(i, ends[:, i], machine[:, i], follows[:, i]) for i in rows.tolist()]
+    of_moves: list[AnyArray] = [np.stack([moves.start, moves.end]), _tips(place(moves, zero)), follows]
+    legs = [np.swapaxes(ends[:, rows], 0, 1) for ends in of_moves]
     if len(rows) and rows[0] == 0 and program.dialect != CUTTER_LOCATION:
+        rows = np.append(rows, [0, 0, 0])
         standing = _tips(place(moves.take(slice(0, 1)), present))[:, 0]
-        legs += _approach(ends[:, 0], standing, follows[:, 0])
-    return _sampled(legs, moves)
+        approach = _approach(legs[0][0], standing, legs[2][0])
+        legs = [np.concatenate(pair) for pair in zip(legs, approach, strict=True)]
+    ends, machine, moved_with = legs
+    lengths = np.linalg.norm(machine[:, 1] - machine[:, 0], axis=1)
+    counts = np.clip(np.ceil(lengths / 5e-3), 2, LEG_SAMPLES).astype(np.int64)
+    leg = np.repeat(np.arange(len(rows)), counts)
+    u = np.concatenate([np.zeros(0), *(np.linspace(0.0, 1.0, count) for count in counts)])
+    ends, move = ends[leg], rows[leg]
+    abc = ends[:, 0, 3:] + u[:, None] * (ends[:, 1, 3:] - ends[:, 0, 3:])
+    return Anchored(
+        ends[:, :, :3], machine[leg], moved_with[leg], u, abc, moves.tool_length[move], move, moves.line[move]
+    )
 
 
 def _bound(moves: Moves) -> BoolArray:
@@ -194,38 +202,18 @@ def _tips(moves: Moves) -> FloatArray:
     return np.stack([moves.start[:, :3], moves.end[:, :3]])
 
 
-def _approach(ends: FloatArray, machine: FloatArray, follows: BoolArray) -> list[_Leg]:
-    """The first rapid once more, from where the control stands now: straight, and X and Y before Z.
+def _approach(ends: FloatArray, machine: FloatArray, follows: BoolArray) -> list[AnyArray]:
+    """(3, 2, .) the first rapid once more, from where the control stands now: straight, and X and Y before Z.
 
     Its start does not move with the work when an offset is keyed in, or when the program is rewritten.
     """
-    corner = np.array([True, True, False]) & follows[1]
-    start, end = (ends[0], machine[0], np.zeros(3, dtype=bool)), (ends[1], machine[1], follows[1])
-    between = (np.concatenate([ends[1, :2], ends[0, 2:]]), np.concatenate([machine[1, :2], machine[0, 2:]]), corner)
-    return [
-        (0, np.stack([first[0], last[0]]), np.stack([first[1], last[1]]), np.stack([first[2], last[2]]))
-        for first, last in ((start, end), (start, between), (between, end))
-    ]
-
-
-def _sampled(legs: Sequence[_Leg], moves: Moves) -> Anchored:
-    """Samples of straight rapids, evenly along each."""
-    lengths = [float(np.linalg.norm(machine[1] - machine[0])) for _, _, machine, _ in legs]
-    counts = [int(np.clip(np.ceil(length / 5e-3), 2, LEG_SAMPLES)) for length in lengths]
-    leg = np.repeat(np.arange(len(legs)), counts)
-    move = np.array([row for row, _, _, _ in legs], dtype=np.int64)[leg]
-    ends = np.array([ends for _, ends, _, _ in legs]).reshape(-1, 2, 6)[leg]
-    u = np.concatenate([np.zeros(0), *(np.linspace(0.0, 1.0, count) for count in counts)])
-    return Anchored(
-        work=ends[:, :, :3],
-        machine=np.array([machine for _, _, machine, _ in legs]).reshape(-1, 2, 3)[leg],
-        follows=np.array([follows for _, _, _, follows in legs], dtype=bool).reshape(-1, 2, 3)[leg],
-        u=u,
-        abc=ends[:, 0, 3:] + u[:, None] * (ends[:, 1, 3:] - ends[:, 0, 3:]),
-        tool_length=moves.tool_length[move],
-        move=move,
-        line=moves.line[move],
+    between = [np.append(pair[1, :2], pair[0, 2:]) for pair in (ends, machine)]
+    places = (
+        np.stack([ends[0], between[0], ends[1]]),
+        np.stack([machine[0], between[1], machine[1]]),
+        np.stack([np.zeros(3, dtype=bool), np.array([True, True, False]) & follows[1], follows[1]]),
     )
+    return [place[[[0, 2], [0, 1], [1, 2]]] for place in places]
 
 
 def representative_path(path: WorkPath, count: int) -> WorkPath:

@@ -16,6 +16,7 @@ from numpy.random import Generator
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE, with_effect
@@ -69,12 +70,8 @@ def rows_of(table: Table, elapsed: FloatArray | None = None) -> Rows:
 
 def clamp_of(table: Table) -> IntArray:
     """(n,) group of each row: its clamp, or without that column its pose and set-up."""
-    if "clamp" in table:
-        keys = [(int(clamp),) for clamp in table["clamp"]]
-    else:
-        setups = table.get("setup", [DEFAULT_SETUP] * len(table["x_mm"]))
-        poses = zip(*(table[name] for name in POSE if name in table), strict=True)
-        keys = [(*(float(v) for v in pose), str(setup)) for pose, setup in zip(poses, setups, strict=True)]  # type: ignore[misc]
+    columns = ["clamp"] if "clamp" in table else [name for name in (*POSE, "setup") if name in table]
+    keys = list(zip(*(np.asarray(table[name]).tolist() for name in columns), strict=True))
     numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
     return np.array([numbers[key] for key in keys])
 
@@ -98,7 +95,7 @@ class DrawnCase:
     """
 
     rows: Table
-    truth: dict[str, Any]
+    truth: Document
     nominal: Nominal
     machine: HiddenMachine
     nuisances: Nuisances
@@ -135,7 +132,7 @@ def effects_of_layout(layout: str) -> tuple[str, ...]:
     return tuple(name for name in CATALOGUE if name not in lacking)
 
 
-def make_case(seed: int, *args: Any, **named: Any) -> tuple[Table, dict[str, Any]]:
+def make_case(seed: int, *args: Any, **named: Any) -> tuple[Table, Document]:
     """Rows and truth of the same as `draw_case`."""
     case = draw_case(seed, *args, **named)
     return case.rows, case.truth

@@ -7,9 +7,8 @@ mechanics behind them is in `structure` and `hidden`. `strength` runs from 0 (no
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -97,7 +96,7 @@ class Hideable:
         What is drawn beside the strength: which strut, which axis, which sign, which proportions.
     """
 
-    change: Callable[[HiddenMachine, Mapping[str, Any]], Shape]
+    change: Callable[[HiddenMachine, Shape], Shape]
     grow: Grow
     draw: Draw = _no_shape
 
@@ -163,7 +162,7 @@ def at_strength(name: str, shape: Shape, strength: float) -> Shape:
     return _scaled("size", OUTSIDE[name].limit, *(key for key in shape if key != "sign"))(strength, shape)
 
 
-def with_effect(hidden: HiddenMachine, name: str, parameters: Mapping[str, Any]) -> HiddenMachine:
+def with_effect(hidden: HiddenMachine, name: str, parameters: Shape) -> HiddenMachine:
     """The machine with one more effect; parameters in shop units by the catalogue's names."""
     if name in CATALOGUE:
         return dataclasses.replace(hidden, **CATALOGUE[name].change(hidden, parameters))

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.documents import to_dict
+from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import Content, read_bytes, read_text, write_atomically
 from toolpath_stiff.results_folder import Rules, write_folder
@@ -87,14 +87,14 @@ def seal(case: DrawnCase) -> bytes:
     return MAGIC + digest + _scrambled(body, digest)
 
 
-def unseal(file: str | Path) -> tuple[DrawnCase, dict[str, Any]]:
+def unseal(file: str | Path) -> tuple[DrawnCase, Document]:
     """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
     content = read_bytes(file, "the sealed truth")
     digest = content[len(MAGIC) : len(MAGIC) + DIGEST]
     body = _scrambled(content[len(MAGIC) + DIGEST :], digest)
     if not content.startswith(MAGIC) or not hmac.compare_digest(digest, hmac.digest(KEY, body, "sha256")):
         raise InputError("the seal is broken: the file was changed or is no sealed truth", file=str(file))
-    sealed: dict[str, Any] = json.loads(zlib.decompress(body[4 : 4 + int.from_bytes(body[:4], "big")]))
+    sealed: Document = json.loads(zlib.decompress(body[4 : 4 + int.from_bytes(body[:4], "big")]))
     machine: dict[str, Any] = {k: np.array(v) if isinstance(v, list) else v for k, v in sealed["machine"].items()}
     machine["spindle"] = tuple(sealed["machine"]["spindle"])
     if sealed["machine"]["unknown"] is not None:

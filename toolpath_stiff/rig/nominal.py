@@ -157,8 +157,8 @@ def _numbers(toml: TomlReader, where: str, *shape: int) -> FloatArray:
         numbers = np.array(math.nan)
     fits = len(numbers.shape) == len(shape) and all(a in (b, -1) for a, b in zip(shape, numbers.shape, strict=True))
     if not fits or not np.isfinite(numbers).all():
-        count = " x ".join(map(str, shape)).replace("-1", "some") or "one"
-        raise toml.error(f"{where} = {'missing' if value is None else repr(value)}", f"{count} numbers", where=where)
+        expected = f"{' x '.join(map(str, shape)).replace('-1', 'some')} numbers" if shape else "a number"
+        raise toml.error(f"{where} = {'missing' if value is None else repr(value)}", expected, where=where)
     return numbers
 
 

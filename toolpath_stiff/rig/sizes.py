@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -48,7 +47,7 @@ class Scale:
         change = np.where(np.isfinite(logs), logs - self.base, math.inf)
         return np.where(np.abs(change) <= LARGEST_SINGLE, change, math.inf)
 
-    def draw(self, name: str, size: float | None, rng: Generator) -> tuple[dict[str, Any], dict[str, float]]:
+    def draw(self, name: str, size: float | None, rng: Generator) -> tuple[Shape, dict[str, float]]:
         """Shape, and their size and detectability."""
         shape = draw_shape(name, rng, self.vertices, self.setups)
         fraction = rng.random()
