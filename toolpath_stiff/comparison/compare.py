@@ -30,6 +30,7 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import base_fit
 from toolpath_stiff.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.measurements import Readings
@@ -204,7 +205,8 @@ def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int,
     """Everything under one noise model."""
     predictor, values = residuals.predictor, residuals.values
     spread = covariance(noise, predictor)
-    scattering = Scattering(noise, spread, predictor.data.clamp, residuals.places, draws, seed)
+    places = repeat_groups(predictor.data, apart=("force", "loop"))
+    scattering = Scattering(noise, spread, predictor.data.clamp, places, draws, seed)
     structure = find_structure(values, residuals.patterns, scattering)
     problem = Problem(predictor, Scatter.of(noise, spread))
     law = base_fit(problem, law_free=True) if len(values) >= FEWEST_TO_REFIT else None

@@ -79,7 +79,7 @@ def compare_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
     base, refit = summary.baseline, summary.baseline.strut_law_refitted
     findings = summary.findings
     sections = [
-        section("Findings" if findings else "No pattern stands out from scatter", _findings(summary)),
+        section("Findings", _findings(summary)),
         picture("measured_modelled.png", pictures, QUESTIONS),
         section("Errors by direction, plane and set-up", _errors(summary)),
         *(picture(f"{name}.png", pictures, QUESTIONS) for name in ("planes", "machine", "strips")),
@@ -113,13 +113,14 @@ def _by_noise(figures: Mapping[str, float], form: str) -> str:
 
 
 def _findings(summary: ComparisonSummary) -> Markup:
-    """Findings with their probabilities, or the strongest hints."""
+    """Findings with their probabilities."""
+    if not summary.findings:
+        return markup("<p>{}</p>", "No pattern stands out from scatter.")
     rows = []
-    for hint in summary.findings or summary.hints:
-        cells = [hint.text, f"{hint.statistic:+.1f}", f"{hint.p_adjusted:.2g}"]
-        rows.append(("finding" if summary.findings else "out", [*cells, ", ".join(hint.indistinguishable_from) or "-"]))
-    first = "finding" if summary.findings else "the strongest hints"
-    return table((first, "t", "p, corrected", "looks the same in these data"), rows, (1, 2))
+    for finding in summary.findings:
+        alike = ", ".join(finding.indistinguishable_from) or "-"
+        rows.append(("finding", [finding.text, f"{finding.statistic:+.1f}", f"{finding.p_adjusted:.2g}", alike]))
+    return table(("finding", "t", "p, corrected", "looks the same in these data"), rows, (1, 2))
 
 
 def groups(summary: ComparisonSummary) -> list[tuple[str, GroupErrors]]:
@@ -236,8 +237,7 @@ def text(comparison: Comparison) -> str:
     lines = [summary.text, "", *_table(summary), *_refitted(summary), "", "findings"]
     lines += [f"  {plain(hint.text)} (p = {hint.p_adjusted:.2g})" for hint in summary.findings]
     if not summary.findings:
-        lines.append("  none: no pattern stands out from scatter. The strongest hints:")
-        lines += [f"  - {plain(hint.text)} (p = {hint.p_adjusted:.2g})" for hint in summary.hints]
+        lines.append("  none: no pattern stands out from scatter")
     for hint in summary.findings:
         if hint.indistinguishable_from:
             others = ", ".join(hint.indistinguishable_from)
