@@ -195,10 +195,20 @@ def compare(
     scattering = answers[-1].scattering
     summary = certain(summary_of(residuals, answers, cannot, beside, seed))
     return Comparison(
-        residuals.predictor, data, noises, residuals.log_model, residuals.values, np.sqrt(scattering.square),
-        scattering.covariance, scattering.places, answers[-1].structure.excess, tuple(residuals.numbers),
-        tuple(residuals.names), load_path_shares(residuals.predictor.base, data), summary,
-    )  # fmt: skip
+        residuals.predictor,
+        data,
+        noises,
+        residuals.log_model,
+        residuals.values,
+        np.sqrt(scattering.square),
+        scattering.covariance,
+        scattering.places,
+        answers[-1].structure.excess,
+        tuple(residuals.numbers),
+        tuple(residuals.names),
+        load_path_shares(residuals.predictor.base, data),
+        summary,
+    )
 
 
 def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int, seed: int) -> Answer:

@@ -301,13 +301,12 @@ def _checks(answers: Sequence[Answer]) -> list[CheckOutcome]:
 def _tests(answers: Sequence[Answer]) -> list[PatternTest]:
     """Every pattern on its own, the strongest first; probabilities are the larger of the noise models."""
     p = [{test.pattern: test.p_adjusted for test in answer.structure.tests} for answer in answers]
-    tests = [
-        PatternTest(
-            *_about(test.pattern), list(test.pattern.same), test.statistic,
-            max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in p),
-        )
-        for test in answers[-1].structure.tests
-    ]  # fmt: skip
+
+    def tested(test: FoundPattern) -> PatternTest:
+        worst = max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in p)
+        return PatternTest(*_about(test.pattern), list(test.pattern.same), test.statistic, worst)
+
+    tests = [tested(test) for test in answers[-1].structure.tests]
     return sorted(tests, key=lambda test: -abs(test.statistic))
 
 

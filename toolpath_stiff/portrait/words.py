@@ -61,7 +61,7 @@ CAUSES = {
     "vertex": "{vertex}",
     "rocking": "the {link} {rocks}",
     "tilting": "the {link} {tips} under the load's moment",
-    "give": "the {link} gives way {gives}",
+    "give": "the {link} gives way {way}",
 }
 
 
@@ -93,19 +93,25 @@ def term_words(term: Term) -> str:
 def _cause(term: Term) -> str:
     """Link, place and direction."""
     single, link, direction, more = term.where is not None, term.link, term.direction, term.size >= 0.0
-    gives = GIVES.get(direction, "")
-    if link in ("tool", "platform"):
-        gives = {**GIVES, **OF_HEAD}.get(direction, "")
-    vertex = f"{link} vertex {term.where} gives" if single else f"the vertices of the {link} give"
-    strut, joint = (f"strut {term.where}", "joint") if single else ("the struts", "joints")
-    softer = f"{strut} {'is' if single else 'are'} {'softer' if more else 'stiffer'}"
+    strut, joint, give = (f"strut {term.where}", "joint", "gives") if single else ("the struts", "joints", "give")
+    ways = {**GIVES, **OF_HEAD} if link in ("tool", "platform") else GIVES
+    vertex = f"{link} vertex {term.where}" if single else f"the vertices of the {link}"
     words = {
-        "along": f" along {direction}" if direction in ("X", "Y", "Z") else "", "large": "large" if more else "small",
-        "of": f" of {strut}" if single else "", "softer": softer, "strut": strut, "gives": gives,
-        "pin": f"{term.action.removesuffix(' pin')} {joint} of {strut} give{'s' if single else ''}",
-        "vertex": f"{vertex} way {GIVES.get(direction, '')}", "pinned": PINNED.get(direction, ""), "link": link,
-        "rocks": ROCKS.get(direction, ""), "tips": TIPS.get(direction, ""), "column": term.column, "axis": direction,
-    }  # fmt: skip
+        "link": link,
+        "strut": strut,
+        "column": term.column,
+        "axis": direction,
+        "large": "large" if more else "small",
+    }
+    words |= {"along": f" along {direction}" if direction in ("X", "Y", "Z") else "", "way": ways.get(direction, "")}
+    words |= {
+        "of": f" of {strut}" if single else "",
+        "rocks": ROCKS.get(direction, ""),
+        "tips": TIPS.get(direction, ""),
+    }
+    words["softer"] = f"{strut} {'is' if single else 'are'} {'softer' if more else 'stiffer'}"
+    words["pin"] = f"{term.action.removesuffix(' pin')} {joint} of {strut} {give}"
+    words["vertex"] = f"{vertex} {give} way {GIVES.get(direction, '')}"
     return CAUSES[term.action].format(**words, **term.constants)
 
 
