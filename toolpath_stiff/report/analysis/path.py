@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.analysis.results import Analysis
-    from toolpath_stiff.path import Samples
+    from toolpath_stiff.path.sampling import Samples
 
 
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches

@@ -18,7 +18,9 @@ def text(placed: Placement) -> str:
     best, present, count = placed.chosen, placed.present, len(placed.front)
     first = len(placed.worse) + placed.search.nothing_better
     label = "picked" if placed.picked else "recommended"
-    which = f"placement {best.number} of {count}, picked" if placed.picked else f"objective {placed.objective}"
+    which = (
+        f"placement {best.number} of {count}, picked" if placed.picked else f"objective {placed.task.rules.objective}"
+    )
     lines = [
         *(f"warning         {warning}" for warning in placed.warnings[:first]),
         f"program         {placed.best.program.name} on {machine_text(placed.machine_stated)}, load {placed.best.load}",

@@ -49,7 +49,7 @@ def front_picture(placed: Placement) -> Figure:
     axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncol=3, fontsize=9)
     colour_scale(figure, dots, (0.845, 0.12, 0.022, 0.69), "weakest place, N/mm (more is better)")
     text = f"machine {machine_text(placed.machine_stated)}   ·   load {placed.best.load}"
-    text += f"   ·   objective {placed.objective}"
+    text += f"   ·   objective {placed.task.rules.objective}"
     heading(figure, 0.12, 0.94, f"Placements of {plain(placed.best.program.name)}", 0.045, text)
     return figure
 

@@ -77,7 +77,7 @@ def _put_off(package: str, name: str) -> None:
 def _heading(figure: Figure, placed: Placement) -> float:
     """Title and machine; returns how far down the page it reaches."""
     title = textwrap.wrap(f"Set-up of {plain(placed.best.program.name)}", 52)
-    which = "picked from the front" if placed.picked else f"recommended, objective {placed.objective}"
+    which = "picked from the front" if placed.picked else f"recommended, objective {placed.task.rules.objective}"
     about = [
         *textwrap.wrap(
             f"machine {machine_text(placed.machine_stated)}: {plain(placed.best.machine.title)}", FULL_LETTERS
