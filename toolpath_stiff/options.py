@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
 from typing import Any, TypeVar, cast, get_args, get_type_hints
@@ -172,6 +172,30 @@ def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
                 default is inspect.Parameter.empty,
             )
     return arguments
+
+
+def words_of(function: Callable[..., Any], given: Mapping[str, Any]) -> list[str]:
+    """Arguments of a function as the command takes them; those that are the function's own values go without saying.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> words_of(tps.place, {"x_mm": (-50, 50), "z_values_mm": (700, 800), "partial": None})
+    ['--x', '-50:50', '--z-values', '700,800']
+    """
+    words: list[str] = []
+    for name, argument in arguments_of(function).items():
+        value = given.get(name)
+        if value is None or value is False or value == argument.default:
+            continue
+        if isinstance(value, Mapping):
+            value = [f"{key}={part:.10g}" for key, part in value.items()]
+        several = value if isinstance(value, list | tuple | frozenset | set) else [value]
+        shown = [f"{part:.10g}" if isinstance(part, int | float) else str(part) for part in several]
+        joined = shown if argument.option.count else [(":" if argument.option.read is low_high else ",").join(shown)]
+        option = argument.option.name.split()[-1]
+        words += [option] if value is True else [word for text in joined for word in (option, text)]
+    return words
 
 
 def parameter_texts(function: Callable[..., Any]) -> dict[str, str]:
