@@ -15,8 +15,8 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, dense, make_problem, simple_noise, table_1
 from tests.updating.test_evidence import by_hand, logs_by_hand, one_table, scatter
 from toolpath_stiff.inference.confounding import CONFOUNDED, Confounding, confounding
+from toolpath_stiff.inference.detectable import Detectable, detectable_sizes
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.hidden_sizes import Detectable, detectable_sizes
 from toolpath_stiff.inference.hypotheses import Family, score_families, score_single
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.active import ActiveEffect

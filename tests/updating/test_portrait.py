@@ -18,9 +18,8 @@ from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.portrait.alike import looks_the_same
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.dictionary import crossed, dictionary_of
-from toolpath_stiff.portrait.document import alike_entry, portrait_entry
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
-from toolpath_stiff.portrait.words import term_words
+from toolpath_stiff.portrait.words import alike_entry, portrait_entry, term_words
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case, exercise
 from toolpath_stiff.stiffness.active import ActiveEffect

@@ -10,10 +10,10 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, make_problem, predictor_for, simple_noise
 from toolpath_stiff.inference.candidates import candidates_of
 from toolpath_stiff.inference.fits import fit_effects
-from toolpath_stiff.inference.hidden_sizes import MATTERS, not_excluded
 from toolpath_stiff.inference.hypotheses import Family, tables_of
 from toolpath_stiff.inference.several import LinearSearch, search_pairs, search_triples
 from toolpath_stiff.inference.size_priors import LIKELY
+from toolpath_stiff.inference.unexcluded import MATTERS, not_excluded
 from toolpath_stiff.stiffness.catalogue import find_effect
 
 NAMES = ("weak_strut", "table_compliance", "spindle_compliance", "frame_compliance", "thermal_drift", "gauge_scale")

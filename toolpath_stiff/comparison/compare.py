@@ -30,6 +30,7 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import base_fit
 from toolpath_stiff.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.measurements import Readings
@@ -187,17 +188,28 @@ def compare(
     scattering = answers[-1].scattering
     summary = certain(summary_of(residuals, answers, cannot, beside, seed))
     return Comparison(
-        residuals.predictor, data, noises, residuals.log_model, residuals.values, np.sqrt(scattering.square),
-        scattering.covariance, scattering.places, answers[-1].structure.excess, tuple(residuals.numbers),
-        tuple(residuals.names), load_path_shares(residuals.predictor.base, data), summary,
-    )  # fmt: skip
+        residuals.predictor,
+        data,
+        noises,
+        residuals.log_model,
+        residuals.values,
+        np.sqrt(scattering.square),
+        scattering.covariance,
+        scattering.places,
+        answers[-1].structure.excess,
+        tuple(residuals.numbers),
+        tuple(residuals.names),
+        load_path_shares(residuals.predictor.base, data),
+        summary,
+    )
 
 
 def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int, seed: int) -> Answer:
     """Everything under one noise model."""
     predictor, values = residuals.predictor, residuals.values
     spread = covariance(noise, predictor)
-    scattering = Scattering(noise, spread, predictor.data.clamp, residuals.places, draws, seed)
+    places = repeat_groups(predictor.data, apart=("force", "loop"))
+    scattering = Scattering(noise, spread, predictor.data.clamp, places, draws, seed)
     structure = find_structure(values, residuals.patterns, scattering)
     problem = Problem(predictor, Scatter.of(noise, spread))
     law = base_fit(problem, law_free=True) if len(values) >= FEWEST_TO_REFIT else None

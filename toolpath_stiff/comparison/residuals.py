@@ -8,16 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
 from toolpath_stiff.comparison.structure import Pattern
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.readings.measurements import Readings, model_stiffness
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
@@ -110,11 +107,6 @@ class Residuals:
         numbers, (names, notes) = variables(predictor, log_model), labels(data)
         values = np.log(data.stiffness) - log_model
         return cls(predictor, log_model, values, numbers, names, notes, patterns(data, numbers, names))
-
-    @cached_property
-    def places(self) -> NDArray[np.int64]:
-        """(n,) number of the place: pose, direction, tool and set-up, whatever the load and the repeat."""
-        return repeat_groups(self.predictor.data, apart=("force", "loop"))
 
 
 def directions(data: Readings) -> TextArray:

@@ -78,7 +78,7 @@ class PatternTest:
 
 
 @dataclass(frozen=True)
-class PatternHint:
+class PatternFinding:
     """A pattern in words."""
 
     text: str
@@ -145,8 +145,8 @@ class ComparisonSummary:
     by_plane: dict[str, GroupErrors]
     by_setup: dict[str, GroupErrors]
     by_plane_and_direction: dict[str, GroupErrors]
-    findings: list[PatternHint]
-    by_noise: dict[str, list[PatternHint]]
+    findings: list[PatternFinding]
+    by_noise: dict[str, list[PatternFinding]]
     tests: list[PatternTest]
     outliers: list[FarReading]
     loops: BesideTip
@@ -158,13 +158,9 @@ class ComparisonSummary:
     warnings: list[str]
     notes: list[str]
     suspect_rows: list[SuspectEntry]
-    hints: list[PatternHint]
     text: str
     question: str
     next: tuple[str, ...] = ()  # commands that go on from here
-
-
-HINTS = 3  # patterns named where none stands out
 
 
 MOST_ALIKE = 6  # patterns named as not to be told apart
@@ -219,7 +215,7 @@ def summary_of(
     baseline = _baseline(values, answers)
     by_noise = {
         answer.noise.name: [
-            _hint(detection, values, first=i == 0) for i, detection in enumerate(answer.structure.patterns)
+            _finding(detection, values, first=i == 0) for i, detection in enumerate(answer.structure.patterns)
         ]
         for answer in answers
     }
@@ -254,7 +250,6 @@ def summary_of(
         warnings=list(data.warnings),
         notes=[*data.notes, *doubts],
         suspect_rows=suspects,
-        hints=[] if findings else _hints(last, tests, values),
         text=" ".join(filter(None, text)),
         question=question_text,
     )
@@ -306,13 +301,12 @@ def _checks(answers: Sequence[Answer]) -> list[CheckOutcome]:
 def _tests(answers: Sequence[Answer]) -> list[PatternTest]:
     """Every pattern on its own, the strongest first; probabilities are the larger of the noise models."""
     p = [{test.pattern: test.p_adjusted for test in answer.structure.tests} for answer in answers]
-    tests = [
-        PatternTest(
-            *_about(test.pattern), list(test.pattern.same), test.statistic,
-            max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in p),
-        )
-        for test in answers[-1].structure.tests
-    ]  # fmt: skip
+
+    def tested(test: FoundPattern) -> PatternTest:
+        worst = max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in p)
+        return PatternTest(*_about(test.pattern), list(test.pattern.same), test.statistic, worst)
+
+    tests = [tested(test) for test in answers[-1].structure.tests]
     return sorted(tests, key=lambda test: -abs(test.statistic))
 
 
@@ -320,14 +314,14 @@ def _about(pattern: Pattern) -> tuple[str, str, str, str, int]:
     return pattern.name, pattern.variable, pattern.direction, pattern.kind, int(pattern.rows.sum())
 
 
-def _hint(test: FoundPattern, values: FloatArray, *, first: bool) -> PatternHint:
+def _finding(test: FoundPattern, values: FloatArray, *, first: bool) -> PatternFinding:
     """A pattern as compare.json has it; `first` as of `sentence`."""
     text, size = sentence(test, values, first)
     alike = [*test.pattern.same, *(other.name for other in test.alike)][:MOST_ALIKE]
-    return PatternHint(text, test.statistic, test.p_adjusted, *_about(test.pattern), size, alike)
+    return PatternFinding(text, test.statistic, test.p_adjusted, *_about(test.pattern), size, alike)
 
 
-def _shared_findings(answers: Sequence[Answer], by_noise: dict[str, list[PatternHint]]) -> list[PatternHint]:
+def _shared_findings(answers: Sequence[Answer], by_noise: dict[str, list[PatternFinding]]) -> list[PatternFinding]:
     """Findings that hold under every noise model, with the larger of their probabilities."""
     fewest = min(answers, key=lambda answer: len(answer.structure.patterns))
     kept = []
@@ -335,18 +329,6 @@ def _shared_findings(answers: Sequence[Answer], by_noise: dict[str, list[Pattern
         others = [answer.least_p(detection.pattern) for answer in answers if answer is not fewest]
         kept.append(replace(finding, p_adjusted=max([finding.p_adjusted, *others])))
     return [finding for finding in kept if finding.p_adjusted < SIGNIFICANT]
-
-
-def _hints(last: Answer, tests: list[PatternTest], values: FloatArray) -> list[PatternHint]:
-    """The strongest patterns, each of another variable and not like one before, where nothing stands out."""
-    kept: list[PatternHint] = []
-    alike: set[Pattern] = set()
-    p = {test.pattern: test.p_adjusted for test in tests}
-    for test in sorted(last.structure.tests, key=lambda test: -abs(test.statistic)):
-        if len(kept) < HINTS and test.pattern not in alike and test.pattern.variable not in {h.variable for h in kept}:
-            kept.append(replace(_hint(test, values, first=True), p_adjusted=p[test.pattern.name]))
-            alike |= {*test.alike}
-    return kept
 
 
 def _far_readings(residuals: Residuals, last: Answer) -> list[FarReading]:

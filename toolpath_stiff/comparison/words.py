@@ -6,7 +6,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import ALL
-from toolpath_stiff.comparison.structure import SIGNIFICANT, FoundPattern, Pattern
+from toolpath_stiff.comparison.structure import FoundPattern, Pattern
 from toolpath_stiff.stiffness.sizes import about
 
 NOUGHT = 0.3  # of a course's change: a residual below is nothing beside it
@@ -47,9 +47,7 @@ def sentence(finding: FoundPattern, residual: FloatArray, first: bool) -> tuple[
         f"{percent(first_end):+.2g} % at {_short(low, largest)}{unit} to "
         f"{percent(last_end):+.2g} % at {_short(high, largest)}{unit} {readings}"
     )
-    cause = ""
-    if finding.p_adjusted < SIGNIFICANT:
-        cause = _as_if(pattern, first_end, last_end, low / 100.0, high / 100.0)
+    cause = _as_if(pattern, first_end, last_end, low / 100.0, high / 100.0)
     return (f"{cause}: {text}" if cause else _capital(text)), size
 
 

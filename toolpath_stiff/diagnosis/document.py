@@ -11,9 +11,10 @@ from toolpath_stiff.diagnosis.rows import HypothesisRow, HypothesisRows, percent
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why, would_tell
 from toolpath_stiff.documents import Document, certain, to_dict
 from toolpath_stiff.inference.confounding import CONFOUNDED
-from toolpath_stiff.inference.hidden_sizes import Detectable, Unexcluded
+from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.judgement import Judgement
-from toolpath_stiff.portrait.document import alike_entry, portrait_entry
+from toolpath_stiff.inference.unexcluded import Unexcluded
+from toolpath_stiff.portrait.words import alike_entry, portrait_entry
 from toolpath_stiff.units import json_number, mm_from_m, n_per_um_from_n_per_m
 
 FIGURES = ("probability", "log_evidence", "words")

@@ -105,21 +105,13 @@ def rows_of(diagnosis: Examination) -> HypothesisRows:
     refitted = replace(
         _row(diagnosis, NONE, main.base.log_evidence),
         label="strut law refitted (none)", title="no further effect", held_out_gain_in_se=None,
-        adequate=main.base_gate.probability > FALSE_ALARM,
     )  # fmt: skip
     likely = main.probability
     chance = json_number(likely.get(OUTSIDE, 0.0))
     families = sorted(main.families, key=lambda f: (-likely.get(f.name, 0.0), -f.log_evidence, f.name))
     candidates = [_candidate(diagnosis, family) for family in families]
-    pairs = [
-        replace(
-            _row(diagnosis, pair.name, pair.log_evidence),
-            adequate=main.gates[pair.name].probability > ADEQUATE,
-            adequate_probability=json_number(main.gates[pair.name].probability, 3),
-        )
-        for pair in main.pairs
-        if pair.name in diagnosis.fits and pair.name in main.gates
-    ]
+    tried = [pair for pair in main.pairs if pair.name in diagnosis.fits and pair.name in main.gates]
+    pairs = [_row(diagnosis, pair.name, pair.log_evidence) for pair in tried]
     pairs.sort(key=lambda row: (-(row.probability or 0.0), -(row.log_evidence or 0.0)))
     every = [*candidates, *pairs]
     offered = max((row for row in every if row.offered), key=lambda row: row.probability or 0.0, default=None)
@@ -136,6 +128,7 @@ def _row(diagnosis: Examination, name: str, log_evidence: float) -> HypothesisRo
     if not any(size.any() for size in fit.sizes):
         fit, held = diagnosis.base, base
     labels = {candidate.name: candidate.label for candidate in fit.candidates}
+    gate, alone = main.gates.get(name), main.base_gate.probability > FALSE_ALARM
     return HypothesisRow(
         name,
         " + ".join(labels.get(effect, effect) for effect in name.split(" + ")),
@@ -150,25 +143,21 @@ def _row(diagnosis: Examination, name: str, log_evidence: float) -> HypothesisRo
         held_out_error_percent=percent_of(held.mean_error),
         held_out_rms_percent=percent_of(held.rms),
         held_out_gain_in_se=0.0 if held is base else json_number(gain_in_standard_errors(base, held), 3),
+        adequate=alone if gate is None else gate.probability > ADEQUATE,
+        adequate_probability=None if gate is None else json_number(gate.probability, 3),
     )
 
 
 def _candidate(diagnosis: Examination, family: Family) -> HypothesisRow:
     """A single effect; where it fits best when it is absent, without sizes."""
-    gate = diagnosis.main.gates.get(family.name)
-    base_passes = diagnosis.main.base_gate.probability > FALSE_ALARM
-    row = replace(_row(diagnosis, family.name, family.log_evidence), title=family.effect.title)
+    main, name = diagnosis.main, family.name
+    alone = main.base_gate.probability > FALSE_ALARM
+    row = replace(_row(diagnosis, name, family.log_evidence), title=family.effect.title)
     if not row.sizes:
-        return replace(row, adequate=base_passes, eligible=False, remark="fits best when it is absent")
-    bounded = diagnosis.fits[family.name].at_upper_bound()
-    remark = "not tested further" if gate is None and not base_passes else ""
-    return replace(
-        row,
-        adequate=base_passes if gate is None else gate.probability > ADEQUATE,
-        adequate_probability=None if gate is None else json_number(gate.probability, 3),
-        eligible=not bounded,
-        remark=f"{', '.join(bounded)} at its bound" if bounded else remark,
-    )
+        return replace(row, adequate=alone, eligible=False, remark="fits best when it is absent")
+    bounded = diagnosis.fits[name].at_upper_bound()
+    remark = "" if name in main.gates or alone else "not tested further"
+    return replace(row, eligible=not bounded, remark=f"{', '.join(bounded)} at its bound" if bounded else remark)
 
 
 def row_words(diagnosis: Examination, name: str) -> str:

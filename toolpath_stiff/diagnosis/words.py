@@ -15,10 +15,10 @@ from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR
-from toolpath_stiff.inference.hidden_sizes import MATTERS, Unexcluded
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
 from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
+from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.planning.plan import INDICATORS
 from toolpath_stiff.portrait.words import alike_text
 from toolpath_stiff.stiffness.sizes import joined

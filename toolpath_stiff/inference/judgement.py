@@ -39,10 +39,10 @@ from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
-from toolpath_stiff.inference.hidden_sizes import Unexcluded, not_excluded
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.several import Combination, search_pairs, search_triples
+from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
 from toolpath_stiff.stiffness.contract import Effect
 
 NONE = "none"

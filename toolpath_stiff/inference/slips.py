@@ -57,7 +57,7 @@ SET_ASIDE = 1e2  # variance of ln k of a row that is left out
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
 
-MENDED = ("position", "angles", "direction")  # columns of the readings that a slip may change
+MENDED = ("position", "angles", "direction", "stiffness")  # columns of the readings that a slip may change
 
 
 # Columns, field of the readings, usual slips, SI value of their unit.
@@ -76,9 +76,7 @@ class Slip:
     column, stands, meant
         What is wrong: a column, what stands there and what it would be (of the first row).
     mended
-        Column of the readings -> (k, 3) as it would be, where it is another.
-    change
-        (k,) of ln k where that is known without a model, of a unit; else None.
+        Column of the readings -> (k, 3) or (k,) as it would be, where it is another.
     """
 
     rows: Rows
@@ -86,7 +84,6 @@ class Slip:
     stands: str
     meant: str
     mended: Mapping[str, FloatArray]
-    change: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,12 +125,10 @@ class SuspectEntry:
 
 def mended(data: Readings, suspects: Sequence[Suspect]) -> Readings:
     """The readings with the likeliest slip of each suspect mended."""
-    columns = {name: getattr(data, name).copy() for name in (*MENDED, "stiffness")}
+    columns = {name: getattr(data, name).copy() for name in MENDED}
     for slip in (suspect.slip for suspect in suspects):
         for name, values in slip.mended.items():
             columns[name][slip.rows] = values
-        if slip.change is not None:
-            columns["stiffness"][slip.rows] /= np.exp(slip.change)
     return replace(data, **columns)
 
 
@@ -264,7 +259,7 @@ def _slips_of_row(data: Readings, row: Rows) -> Iterator[Slip]:
     value = float(n_per_mm_from_n_per_m(data.stiffness[row[0]]))
     for unit, factor in UNITS.items():
         meant = f"{value / factor:.6g} (the number stands in {unit})"
-        yield Slip(row, "stiffness_N_per_mm", f"{value:.6g}", meant, {}, np.array([np.log(factor)]))
+        yield Slip(row, "stiffness_N_per_mm", f"{value:.6g}", meant, {"stiffness": data.stiffness[row] / factor})
 
 
 def _slips_of_pose(data: Readings, rows: Rows) -> Iterator[Slip]:
@@ -288,27 +283,23 @@ def _axis(direction: FloatArray) -> str:
 
 
 def _changes(problem: Problem, fit: Fit, slips: Sequence[Slip]) -> list[FloatArray]:
-    """By how much the modelled ln k of its rows rises when a slip is mended; nan where the model has no answer.
-
-    A number in another unit is too large by a factor: that counts as a model that is too small by it.
-    """
+    """By how much modelled over measured ln k of its rows rises when a slip is mended; nan where there is no answer."""
     predictor = problem.predictor
     data, rows = predictor.data, np.concatenate([slip.rows for slip in slips])
 
     def column(name: str) -> FloatArray:
         return np.concatenate([slip.mended.get(name, getattr(data, name)[slip.rows]) for slip in slips])
 
-    taken = replace(
-        data.select(rows), position=column("position"), angles=column("angles"), direction=column("direction")
-    )
+    position, angles, direction, stiffness = map(column, MENDED)
+    taken = replace(data.select(rows), position=position, angles=angles, direction=direction, stiffness=stiffness)
     law = scaled_law(predictor.machine.strut_law, fit.law)
     model = build_model(predictor.machine.with_changes(strut_law=law), predictor.effect_files, fit.effects)
     try:
         logs = np.log(model_stiffness(model, taken))
     except InputError:  # one of the poses is none that the machine can take
         logs = np.full(len(rows), np.nan)
-    moved = np.split(logs - (problem.observed - fit.residual)[rows], np.cumsum([len(slip.rows) for slip in slips])[:-1])
-    return [change if slip.change is None else slip.change for slip, change in zip(slips, moved, strict=True)]
+    moved = logs - np.log(taken.stiffness) + fit.residual[rows]
+    return np.split(moved, np.cumsum([len(slip.rows) for slip in slips])[:-1])
 
 
 def _log_odds(problem: Problem, fit: Fit, slips: Sequence[Slip], taken: BoolArray) -> FloatArray:

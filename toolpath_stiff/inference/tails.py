@@ -17,7 +17,7 @@ MOST_TERMS = 10_000  # next to x = a about 6 sqrt(a) terms are needed
 SMALL = 1e-15  # share that the terms left out may have
 
 
-TOGETHER = 8  # terms between two looks at who needs more
+TOGETHER = 8  # terms between two looks at whether more are needed
 
 
 LEAST = 1e-300
@@ -46,15 +46,11 @@ def _series(a: FloatArray, x: FloatArray) -> FloatArray:
     with np.errstate(divide="ignore"):
         term = 1.0 / a
     total = term.copy()
-    rows = np.arange(len(x))  # where there is more to add
     for k in range(1, MOST_TERMS):
         term = term * (x / (a + k))
-        total[rows] += term
-        if k % TOGETHER == 0:
-            more = term > SMALL * total[rows]
-            rows, term, a, x = rows[more], term[more], a[more], x[more]
-            if not len(rows):
-                break
+        total += term
+        if k % TOGETHER == 0 and not (term > SMALL * total).any():
+            break
     return total
 
 
@@ -67,17 +63,10 @@ def _fraction(a: FloatArray, x: FloatArray) -> FloatArray:
     below = x + 1.0 - a
     inverse = 1.0 / below
     total, ratio = inverse.copy(), np.full(x.shape, np.inf)
-    rows = np.arange(len(x))  # where it still changes
     for k in range(1, MOST_TERMS):
-        share = k * (a - k)
-        below = below + 2.0
-        inverse = 1.0 / (below + share * inverse)
-        ratio = below + share / ratio
-        factor = inverse * ratio
-        total[rows] *= factor
-        if k % TOGETHER == 0:
-            more = np.abs(factor - 1.0) > SMALL
-            rows, a, below, inverse, ratio = rows[more], a[more], below[more], inverse[more], ratio[more]
-            if not len(rows):
-                break
+        share, below = k * (a - k), below + 2.0
+        inverse, ratio = 1.0 / (below + share * inverse), below + share / ratio
+        total *= inverse * ratio
+        if k % TOGETHER == 0 and not (np.abs(inverse * ratio - 1.0) > SMALL).any():
+            break
     return total

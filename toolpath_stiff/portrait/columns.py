@@ -306,17 +306,7 @@ class Ground:
 
     def column(self, term: Term) -> FloatArray:
         """(n,) m/N per unit (SI) of a term's size."""
-        share = self.share(term)
-        if share.ndim == 1 and any(self.values(*variable).ndim == 2 for variable in _asked(term)):
-            raise ValueError(f"{term.link} has no {' or '.join(term.variables)} of its own")
-        shape = self.shape(term)
-        return np.asarray(self.columns(term, share, shape[None])[0])
-
-
-def _asked(term: Term) -> list[tuple[str, str]]:
-    """Variables with their columns."""
-    pairs = [(term.variable, term.column)]
-    return pairs if term.times is None else [*pairs, (term.times.variable, term.times.column)]
+        return np.asarray(self.columns(term, self.share(term), self.shape(term)[None])[0])
 
 
 def _each(shape: FloatArray, term: Term) -> FloatArray:

@@ -1,18 +1,15 @@
-"""A portrait in an engineer's words."""
+"""A portrait in an engineer's words, and as parts of diagnose.json in shop units."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from toolpath_stiff.documents import Document
 from toolpath_stiff.portrait.alike import Alike
+from toolpath_stiff.portrait.portrait import Portrait, Sized
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.stiffness.terms import PINS, SWINGS, Term
-from toolpath_stiff.units import RAD_PER_DEG
-
-if TYPE_CHECKING:
-    from toolpath_stiff.portrait.portrait import Portrait, Sized
-
+from toolpath_stiff.units import RAD_PER_DEG, json_number
 
 # Variable -> how it is said, SI value of the unit shown, that unit.
 SAID: dict[str, tuple[str, float, str]] = {
@@ -64,7 +61,7 @@ CAUSES = {
     "vertex": "{vertex}",
     "rocking": "the {link} {rocks}",
     "tilting": "the {link} {tips} under the load's moment",
-    "give": "the {link} gives way {gives}",
+    "give": "the {link} gives way {way}",
 }
 
 
@@ -96,19 +93,25 @@ def term_words(term: Term) -> str:
 def _cause(term: Term) -> str:
     """Link, place and direction."""
     single, link, direction, more = term.where is not None, term.link, term.direction, term.size >= 0.0
-    gives = GIVES.get(direction, "")
-    if link in ("tool", "platform"):
-        gives = {**GIVES, **OF_HEAD}.get(direction, "")
-    vertex = f"{link} vertex {term.where} gives" if single else f"the vertices of the {link} give"
-    strut, joint = (f"strut {term.where}", "joint") if single else ("the struts", "joints")
-    softer = f"{strut} {'is' if single else 'are'} {'softer' if more else 'stiffer'}"
+    strut, joint, give = (f"strut {term.where}", "joint", "gives") if single else ("the struts", "joints", "give")
+    ways = {**GIVES, **OF_HEAD} if link in ("tool", "platform") else GIVES
+    vertex = f"{link} vertex {term.where}" if single else f"the vertices of the {link}"
     words = {
-        "along": f" along {direction}" if direction in ("X", "Y", "Z") else "", "large": "large" if more else "small",
-        "of": f" of {strut}" if single else "", "softer": softer, "strut": strut, "gives": gives,
-        "pin": f"{term.action.removesuffix(' pin')} {joint} of {strut} give{'s' if single else ''}",
-        "vertex": f"{vertex} way {GIVES.get(direction, '')}", "pinned": PINNED.get(direction, ""), "link": link,
-        "rocks": ROCKS.get(direction, ""), "tips": TIPS.get(direction, ""), "column": term.column, "axis": direction,
-    }  # fmt: skip
+        "link": link,
+        "strut": strut,
+        "column": term.column,
+        "axis": direction,
+        "large": "large" if more else "small",
+    }
+    words |= {"along": f" along {direction}" if direction in ("X", "Y", "Z") else "", "way": ways.get(direction, "")}
+    words |= {
+        "of": f" of {strut}" if single else "",
+        "rocks": ROCKS.get(direction, ""),
+        "tips": TIPS.get(direction, ""),
+    }
+    words["softer"] = f"{strut} {'is' if single else 'are'} {'softer' if more else 'stiffer'}"
+    words["pin"] = f"{term.action.removesuffix(' pin')} {joint} of {strut} {give}"
+    words["vertex"] = f"{vertex} {give} way {GIVES.get(direction, '')}"
     return CAUSES[term.action].format(**words, **term.constants)
 
 
@@ -192,3 +195,62 @@ def variable_label(term: Term) -> tuple[str, float]:
     """Of an axis: what a term varies with and its unit, and the SI value of that unit."""
     name, si, unit = SAID.get(term.variable, (term.variable, 1.0, ""))
     return (f"{name}, {unit}" if unit else name), si
+
+
+SHARES = ("explained", "error", "held_out_rms", "noise_floor")  # of a portrait
+
+
+def portrait_entry(portrait: Portrait) -> Document:
+    """A portrait as diagnose.json has it."""
+    return {
+        "text": portrait_text(portrait),
+        "links": _shares("link", portrait.links),
+        "variables": _shares("variable", portrait.variables),
+        "terms": [_sized(sized) for sized in portrait.terms],
+        "indistinguishable": [
+            {**_sized(sized), "probability": json_number(sized.probability or 0.0, 3)} for sized in portrait.alike
+        ],
+        **{f"{name}_percent": json_number(100.0 * getattr(portrait, name), 4) for name in SHARES},
+        "look_elsewhere": json_number(portrait.look_elsewhere, 3),
+    }
+
+
+def alike_entry(name: str, alike: Alike) -> Document:
+    """What else would look the same as a named effect, as diagnose.json has it."""
+    return {
+        "text": alike_text(name, alike),
+        "links": _shares("link", alike.links),
+        "variables": _shares("variable", alike.variables),
+        "terms": [
+            {**_term(term), "share": json_number(share, 3), "words": term_words(term)} for term, share in alike.terms
+        ],
+    }
+
+
+def _shares(key: str, shares: Sequence[tuple[str, float]]) -> list[Document]:
+    """Names with their probabilities."""
+    return [{key: name, "probability": json_number(share, 3)} for name, share in shares]
+
+
+def _sized(sized: Sized) -> Document:
+    """A term with its interval, and the change of stiffness that it makes."""
+    return {
+        **_term(sized.term),
+        "interval": [json_number(end / sized.term.si) for end in sized.interval],
+        "rms_percent": json_number(100.0 * sized.rms, 3),
+        "words": term_words(sized.term),
+    }
+
+
+def _term(term: Term) -> Document:
+    """A term of the dictionary with its size; `where` is a strut or a vertex, `second_variable` null without one."""
+    return {
+        "link": term.link,
+        "where": term.where,
+        "direction": term.direction,
+        "variable": term.variable,
+        "second_variable": None if term.times is None else term.times.variable,
+        "shape": term.shape,
+        "size": json_number(term.size / term.si),
+        "unit": term.unit,
+    }

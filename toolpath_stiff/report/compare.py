@@ -76,7 +76,7 @@ def page(comparison: Comparison, drawn: Mapping[str, Drawing]) -> str:
     headline = findings[0].text if findings else f"{mean} off in the mean as given, without a pattern"
     head = readings_head("compare", comparison.document, "Where does the model fail?", headline, figures)
     sections: list[Section] = [
-        ("Findings" if findings else "No pattern stands out from scatter", _findings(summary)),
+        ("Findings", _findings(summary)),
         "measured_modelled.png",
         ("Errors by direction, plane and set-up", errors(summary), f"Machine file as given. Bias: {BIAS}."),
         *("planes.png", "machine.png", "strips.png"),
@@ -100,13 +100,14 @@ def _by_noise(figures: Mapping[str, float], form: str) -> str:
 
 
 def _findings(summary: ComparisonSummary) -> Table:
-    """Findings with their probabilities, or the strongest hints."""
+    """Findings with their probabilities."""
     rows = [
-        (hint.text, f"{hint.statistic:+.1f}", f"{hint.p_adjusted:.2g}", ", ".join(hint.indistinguishable_from) or "-")
-        for hint in summary.findings or summary.hints
+        (row.text, f"{row.statistic:+.1f}", f"{row.p_adjusted:.2g}", ", ".join(row.indistinguishable_from) or "-")
+        for row in summary.findings
     ]
-    first, kind = ("finding", "finding") if summary.findings else ("the strongest hints", "out")
-    return Table((first, ">t", ">p, corrected", "looks the same in these data"), rows, [kind] * len(rows))
+    kinds = ["finding"] * len(rows) if rows else ["out"]
+    none = [("No pattern stands out from scatter", "-", "-", "-")]
+    return Table(("finding", ">t", ">p, corrected", "looks the same in these data"), rows or none, kinds)
 
 
 def groups(summary: ComparisonSummary) -> list[tuple[str, GroupErrors]]:
@@ -201,12 +202,12 @@ def text(comparison: Comparison) -> str:
     lines = [summary.text, "", f"machine file as given; bias: {BIAS}", *errors(summary).lines()]
     lines += [*_refitted(summary), "", "findings"]
     if not summary.findings:
-        lines.append("  none: no pattern stands out from scatter. The strongest hints:")
-    lines += [f"  {plain(hint.text)} (p = {hint.p_adjusted:.2g})" for hint in summary.findings or summary.hints]
-    for hint in summary.findings:
-        if hint.indistinguishable_from:
-            others = ", ".join(hint.indistinguishable_from)
-            lines.append(f"  ({plain(hint.pattern)} looks the same here as: {plain(others)})")
+        lines.append("  none: no pattern stands out from scatter")
+    lines += [f"  {plain(finding.text)} (p = {finding.p_adjusted:.2g})" for finding in summary.findings]
+    for finding in summary.findings:
+        if finding.indistinguishable_from:
+            others = ", ".join(finding.indistinguishable_from)
+            lines.append(f"  ({plain(finding.pattern)} looks the same here as: {plain(others)})")
     lines += [*loops_text(summary.loops), *history_text(summary.history), "", "checks without a model"]
     lines += [f"  {plain(check.text)}" for check in summary.model_free.checks]
     lines += [f"  {check.check}: {check.reason}" for check in summary.model_free.cannot_check]
