@@ -23,11 +23,11 @@ from toolpath_stiff.report.pictures.style import new_figure, picture_file
 
 
 def path_picture(analysis, **look) -> bytes:
-    return picture_file("path.png", path, analysis, look)
+    return picture_file("path.png", path, analysis, **look)
 
 
 def profile_picture(analysis, **look) -> bytes:
-    return picture_file("profile.png", profile, analysis, look)
+    return picture_file("profile.png", profile, analysis, **look)
 
 
 def pixels(png: bytes) -> np.ndarray:

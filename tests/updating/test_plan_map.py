@@ -55,6 +55,6 @@ def test_the_same_picture_every_time(mapped):
     def drawn(of):
         return visits_drawn(of.visits, of.chosen, of.kinds, found, ("a $title", "b"))
 
-    first, again = (picture_file("plan.png", drawn, plan, {}) for _ in range(2))
+    first, again = (picture_file("plan.png", drawn, plan) for _ in range(2))
     assert first == again and first.startswith(b"\x89PNG")
     assert visits_drawn(plan.visits, plan.chosen, plan.kinds, None, ("a", "b")).axes

@@ -21,7 +21,6 @@ from toolpath_stiff.units import number
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from toolpath_stiff.report.pages import Drawing
 
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
@@ -40,7 +39,7 @@ def other_samples(table: str) -> tuple[str, ...]:
     return tuple(name for name in ("samples.csv", "samples.parquet") if not name.endswith(table))
 
 
-def page(analysis: Analysis, drawn: dict[str, Drawing], *, show_plunges: bool = False) -> Iterator[str]:
+def page(analysis: Analysis, drawn: dict[str, bytes], *, show_plunges: bool = False) -> Iterator[str]:
     """The page, in pieces."""
     from toolpath_stiff.report.analysis_page import page_pieces  # with numbers of a script, which a text needs not
 

@@ -19,8 +19,6 @@ from toolpath_stiff.files import Content
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.report.pages import Drawing
-
 
 def view_of(shown_by: str) -> ModuleType:
     """The view of results of this name."""
@@ -55,22 +53,21 @@ def files(
     }
     if not plots:
         return contents
-    style = _style()
-    drawn: dict[str, Drawing] = {}
+    style, asked = _style(), getattr(view, "QUESTIONS", {})
+    drawn: dict[str, bytes] = {}
     for name, draw in pictures_of(result.shown_by).items():
-        if name in omit:
-            continue
-        if name not in getattr(view, "QUESTIONS", {}):
-            contents[name] = partial(style.picture_file, name, draw, result, look)
-        elif (picture := style.drawing(draw, result)) is not None:
-            contents[name] = drawn[name] = picture
+        if name in asked and name not in omit:
+            drawn |= {name: content} if (content := style.picture_file(name, draw, result, style.SHARP)) else {}
+        elif name not in omit:
+            contents[name] = partial(style.picture_file, name, draw, result, **look)
+    contents |= drawn
     return contents | ({view.PAGE: partial(view.page, result, drawn, **look)} if hasattr(view, "PAGE") else {})
 
 
 def picture(result: Any, **look: Any) -> bytes:
     """The first picture of a result as PNG."""
     name, draw = next(iter(pictures_of(result.shown_by).items()))
-    content: bytes = _style().picture_file(name, draw, result, look)
+    content: bytes = _style().picture_file(name, draw, result, **look)
     return content
 
 

@@ -16,8 +16,7 @@ from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import directions, planes
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.colours import DIRECTIONS, FAINT, INK, MUTED, RED, RESIDUAL, WITHIN
-from toolpath_stiff.report.pictures.before_after import BAND, one_to_one
-from toolpath_stiff.report.pictures.compare_machine import machine, near_rows
+from toolpath_stiff.report.pictures.before_after import BAND, MAPS, maps, one_to_one, panels
 from toolpath_stiff.report.pictures.history import history
 from toolpath_stiff.report.pictures.load_path import load_path
 from toolpath_stiff.report.pictures.style import Look, new_figure, panel, round_ticks
@@ -29,6 +28,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 MOST_CHANGES = 12  # of set-up or file that are marked
 WIDTH = 14.0  # inches
 OPAQUEST = 1.8  # times the largest residual would be drawn opaque: figures stay legible on it
+SIDE = 2.6  # inches, of a map
 SIDES = 2.0  # standard deviations of the bars and bands: 95 %
 
 
@@ -76,8 +76,7 @@ def measured_modelled(comparison: Comparison) -> Figure:
             beside.plot(ends, [float(np.mean(residual[rows]))] * 2, color=colour, lw=1.6, ls="--", zorder=2)
     beside.set_xscale("log")
     round_ticks(beside.xaxis, *beside.get_xlim())
-    beside.set_xlabel("modelled stiffness, N/mm")
-    beside.set_ylabel(RESIDUAL_AXIS)
+    beside.set(xlabel="modelled stiffness, N/mm", ylabel=RESIDUAL_AXIS)
     beside.set_title("the difference; dashed: mean of a direction", fontsize=10)
     _legend(axes, comparison, along, shapes)
     return figure
@@ -126,8 +125,7 @@ def strips(comparison: Comparison) -> Figure:
             chosen = rows & (data.setup == setup)
             axes.plot(order[chosen], residual[chosen], marker, **look)
         _changes(axes, data.setup, data.file, i == 0)
-        axes.set_xlim(0.0, len(data) + 1.0)
-        axes.set_ylim(edges.min() - margin, edges.max() + margin)
+        axes.set(xlim=(0.0, len(data) + 1.0), ylim=(edges.min() - margin, edges.max() + margin))
         axes.set_ylabel(f"{axis}, %", weight="bold", color=DIRECTIONS[axis])
         _name_far_off(axes, comparison, axis, residual)
         last = i == len(present) - 1
@@ -164,9 +162,16 @@ def _name_far_off(axes: Axes, comparison: Comparison, axis: str, residual: Float
         )  # fmt: skip
 
 
+def _near_rows(comparison: Comparison) -> NDArray[np.bool_]:
+    """(n,) readings that are not far off."""
+    near = np.ones(len(comparison.residual), dtype=bool)
+    near[[reading.reading - 1 for reading in comparison.summary.outliers]] = False
+    return near
+
+
 def by_plane(comparison: Comparison) -> Figure:
     """Mean residual by plane and direction, a signed percentage a cell with its standard error."""
-    data, near = comparison.data, near_rows(comparison)
+    data, near = comparison.data, _near_rows(comparison)
     along, where = directions(data), planes(data)
     columns = [axis for axis in DIRECTIONS if (along == axis).any()]
     columns += ["all"] if len(columns) > 1 else []
@@ -208,6 +213,16 @@ def by_plane(comparison: Comparison) -> Figure:
     return figure
 
 
+def where_it_fails(comparison: Comparison) -> Figure:
+    """The residuals seen from above, plane by plane, direction by direction."""
+    rows, columns = panels(comparison.data)
+    width, height = max(1.9 + SIDE * len(columns), 11.0), 1.4 + SIDE * len(rows)
+    question = "Where does the model fail? Alike all around, or on one side?"
+    figure = new_figure(width, height, question, f"{RESIDUAL_AXIS}; {MAPS}")
+    maps(figure, comparison.data, comparison.residual, (0.95, height - 1.2, SIDE))
+    return figure
+
+
 def over_dates(comparison: Comparison) -> Figure | None:
     """Struts over their dates."""
     return history(comparison.summary.history)
@@ -216,7 +231,7 @@ def over_dates(comparison: Comparison) -> Figure | None:
 PICTURES = {
     "measured_modelled.png": measured_modelled,
     "planes.png": by_plane,
-    "machine.png": machine,
+    "machine.png": where_it_fails,
     "strips.png": strips,
     "variables.png": variables,
     "load_path.png": load_path,

@@ -177,10 +177,12 @@ def _lay_out(span: FloatArray) -> tuple[Figure, list[Axes], tuple[float, float, 
 
 def _set_up(axes: Axes, across: int, up: int, middle: FloatArray, span: FloatArray) -> None:
     names = "XYZ"
-    axes.set_xlabel(f"{names[across]} mm")
-    axes.set_ylabel(f"{names[up]} mm")
-    axes.set_xlim(middle[across] - span[across] / 2, middle[across] + span[across] / 2)
-    axes.set_ylim(middle[up] - span[up] / 2, middle[up] + span[up] / 2)
+    axes.set(
+        xlabel=f"{names[across]} mm",
+        ylabel=f"{names[up]} mm",
+        xlim=(middle[across] - span[across] / 2, middle[across] + span[across] / 2),
+        ylim=(middle[up] - span[up] / 2, middle[up] + span[up] / 2),
+    )
     box = axes.get_window_extent()
     axes.xaxis.set_major_locator(MaxNLocator(max(2, int(box.width // 75)), steps=[1, 2, 2.5, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(max(2, int(box.height // 50)), steps=[1, 2, 2.5, 5, 10]))

@@ -100,8 +100,7 @@ def visits_drawn(
         low, high = (f"{mm_from_m(float(group[end])):.5g}" for end in (0, -1))
         axes.set_title(f"z = {low}{'' if low == high else f' to {high}'} mm{words}", fontsize=10)
         below = which + across >= len(groups) and leaning == len(kinds_of_panel) - 1
-        axes.set_xlabel("X mm" if below else "")
-        axes.set_ylabel("Y mm" if column == 0 else "")
+        axes.set(xlabel="X mm" if below else "", ylabel="Y mm" if column == 0 else "")
         axes.tick_params(labelleft=column == 0, labelbottom=below)
     if drawn is not None:
         bar = panel(figure, width - 0.95, 1.05, 0.18, height - 2.2)
@@ -145,9 +144,7 @@ def _marks(
                 ha="right" if left else "left", va="bottom" if above else "top", fontsize=7.5, zorder=7, bbox=box,
             )  # fmt: skip
             labelled.add(numbers[k])
-    axes.set_xlim(-half, half)
-    axes.set_ylim(-half, half)
-    axes.set_aspect("equal")
+    axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
     axes.grid(visible=False)
 
 
