@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from toolpath_stiff.comparison.loop_readings import BesideTip
+from toolpath_stiff.report.pages import Section
 from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import plain
-
-if TYPE_CHECKING:
-    from toolpath_stiff.comparison.loop_readings import BesideTip
-    from toolpath_stiff.report.pages import Section
 
 MOST_ROWS = 40  # on a page; all are in the document
 REMARK = (

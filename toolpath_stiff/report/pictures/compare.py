@@ -8,10 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import directions, planes
 from toolpath_stiff.inference.errors import deviation_percent
@@ -78,25 +76,22 @@ def measured_modelled(comparison: Comparison) -> Figure:
     round_ticks(beside.xaxis, *beside.get_xlim())
     beside.set(xlabel="modelled stiffness, N/mm", ylabel=RESIDUAL_AXIS)
     beside.set_title("the difference; dashed: mean of a direction", fontsize=10)
-    _legend(axes, comparison, along, shapes)
+    _legend(axes, comparison, shapes)
     return figure
 
 
-def _legend(axes: Axes, comparison: Comparison, along: NDArray[np.str_], shapes: dict[str, str]) -> None:
-    """Directions with their mean error; set-ups if there are several."""
-    keys: list[Line2D | Patch] = []
-    for axis, colour in DIRECTIONS.items():
-        if (along == axis).any():
-            errors = comparison.summary.by_direction[axis]
-            mean, bias = errors.mean_abs_error_percent, errors.bias_percent
-            text = f"{axis}: mean error {mean:.1f} %, bias {bias:+.1f} %"
-            keys.append(Line2D([], [], marker="o", ls="", color=colour, label=text))
-    if len(shapes) > 1:
-        for setup, marker in list(shapes.items())[: len(MARKERS)]:
-            name = shortened(plain(setup) or "(no name)", 30)
-            keys.append(Line2D([], [], marker=marker, ls="", color=MUTED, label=f"set-up {name}"))
-    keys.append(Patch(color=WITHIN, label="within 10 %"))
-    axes.legend(handles=keys, loc="upper left", frameon=True, framealpha=0.9, edgecolor="none", fontsize=9)
+def _legend(axes: Axes, comparison: Comparison, shapes: dict[str, str]) -> None:
+    """Directions with their errors; set-ups if there are several."""
+    errors = comparison.summary.by_direction
+    texts = {
+        axis: f"{axis}: mean error {of.mean_abs_error_percent:.1f} %, bias {of.bias_percent:+.1f} %"
+        for axis, of in errors.items()
+    }
+    keys = [Line2D([], [], marker="o", ls="", color=DIRECTIONS[axis], label=text) for axis, text in texts.items()]
+    for setup, marker in list(shapes.items())[: len(MARKERS)] if len(shapes) > 1 else []:
+        name = shortened(plain(setup) or "(no name)", 30)
+        keys.append(Line2D([], [], marker=marker, ls="", color=MUTED, label=f"set-up {name}"))
+    axes.legend(handles=keys, loc="upper left", framealpha=0.9, edgecolor="none", fontsize=9, title="grey: within 10 %")
 
 
 def strips(comparison: Comparison) -> Figure:
@@ -127,7 +122,10 @@ def strips(comparison: Comparison) -> Figure:
         _changes(axes, data.setup, data.file, i == 0)
         axes.set(xlim=(0.0, len(data) + 1.0), ylim=(edges.min() - margin, edges.max() + margin))
         axes.set_ylabel(f"{axis}, %", weight="bold", color=DIRECTIONS[axis])
-        _name_far_off(axes, comparison, axis, residual)
+        far = np.array(
+            [reading.reading for reading in comparison.summary.outliers if reading.direction == axis], dtype=int
+        )
+        axes.plot(far, residual[far - 1], "o", ms=10, mfc="none", mec=RED, mew=1.4, zorder=4)
         last = i == len(present) - 1
         axes.tick_params(labelbottom=last)
         axes.set_xlabel("reading, in the order of the file" if last else "")
@@ -143,23 +141,8 @@ def _changes(axes: Axes, setup: NDArray[np.str_], file: NDArray[np.str_], named:
     if named and 1 < len(starts) <= MOST_CHANGES:
         for start in starts:
             text = shortened(plain(str(setup[start])) or "(no name)", 18)
-            axes.annotate(
-                text, (start + 0.6, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -3),
-                textcoords="offset points", va="top", fontsize=8, color=MUTED,
-            )  # fmt: skip
-
-
-def _name_far_off(axes: Axes, comparison: Comparison, axis: str, residual: FloatArray) -> None:
-    """File lines of the readings that are far off."""
-    for far in comparison.summary.outliers[:12]:
-        if far.direction != axis:
-            continue
-        i = far.reading - 1
-        axes.plot(i + 1, residual[i], "o", ms=10, mfc="none", mec=RED, mew=1.4, zorder=4)
-        axes.annotate(
-            f"line {far.line}", (i + 1, residual[i]), xytext=(8, 0), textcoords="offset points", va="center",
-            fontsize=8, color=RED, zorder=5,
-        )  # fmt: skip
+            look: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "fontsize": 8}
+            axes.annotate(text, (start + 0.6, 1.0), xytext=(2, -3), va="top", color=MUTED, **look)
 
 
 def _near_rows(comparison: Comparison) -> NDArray[np.bool_]:

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from toolpath_stiff.analysis.machine_check import MachineCheck
-from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Hexapod
@@ -22,9 +21,9 @@ STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
 LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
 
 
-def machine_at(of: Machine, *, pose_mm_deg: Sequence[float] | None = None) -> Figure:
-    """A machine at one pose."""
-    return _views(of.model.machine, of.standing(pose_mm_deg)[0])
+def machine_at(_: object, *, machine: Hexapod, pose: FloatArray) -> Figure:
+    """A machine at one pose (6,) in m and rad."""
+    return _views(machine, pose)
 
 
 def machine_checked(check: MachineCheck) -> Figure:

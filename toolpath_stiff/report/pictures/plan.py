@@ -36,7 +36,6 @@ MOST_ACROSS = 5  # panels in a row
 NARROWEST = 8.0  # inches, for the headings
 ROOM = 1.2  # half a panel, of the farthest pose: marks lean and have labels
 CLOSE = 0.06  # m between marks whose labels would cover each other
-SHORT = 6  # letters of a label that has room on either side
 ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
 
 
@@ -137,8 +136,6 @@ def _marks(
             near = [j for j in here if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
             place = list(dict.fromkeys(numbers[j] for j in near)).index(numbers[k]) % 4
             left, above = (x > 0.25 * half) != (place >= 2), place % 2 == 0
-            if lean.any() and place == 0 and len(numbers[k]) < SHORT:  # not upon the line
-                left, above = bool(lean[0] > 0.0), bool(lean[1] <= 0.0)
             axes.annotate(
                 numbers[k], (x, y), xytext=(-7 if left else 7, 6 if above else -6), textcoords="offset points",
                 ha="right" if left else "left", va="bottom" if above else "top", fontsize=7.5, zorder=7, bbox=box,
