@@ -28,7 +28,7 @@ from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.nc.reader import read_program
 from toolpath_stiff.nc.tables import read_tool_table
-from toolpath_stiff.path import sample_moves
+from toolpath_stiff.path.sampling import sample_moves
 
 PACKAGE = "linuxcnc-uspace"
 TOLERANCE = 0.01  # mm and degrees

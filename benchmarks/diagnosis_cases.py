@@ -26,7 +26,6 @@ from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
 from toolpath_stiff.rig import exercise
-from toolpath_stiff.rig.case import again
 from toolpath_stiff.rig.exercise import read_plan
 
 LAYOUTS = ("tilted", "paper")
@@ -239,7 +238,7 @@ def _measured(
     file.write_text(plan_csv(plan_rows(plan.visits, visits, set(before.data.point.tolist()))), encoding="utf-8")
     table = read_plan(str(file), case.nominal)
     table["clamp"] = table["clamp"] + CLAMPS_LATER
-    return again(case.nominal, case.machine, case.nuisances, table, np.random.default_rng(seed))
+    return case.again(table, np.random.default_rng(seed))
 
 
 def _rows_of_clamps(table: dict[str, Any], clamps: Sequence[int]) -> str:

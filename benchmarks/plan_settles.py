@@ -32,7 +32,7 @@ from toolpath_stiff.planning.result import plan
 from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.tables import TABLES, tables_of
 from toolpath_stiff.readings.measurements import read_measurements
-from toolpath_stiff.rig.case import DrawnCase, again, draw_case
+from toolpath_stiff.rig.case import DrawnCase, draw_case
 from toolpath_stiff.rig.exercise import csv_text, read_plan
 
 POSES = 6
@@ -124,7 +124,7 @@ def _measured(case: DrawnCase, planned: RivalPlan, visit: int, file: Path, numbe
         row["clamp"], row["point"] = number + 1, f"{file.stem}"
     file.write_text(plan_csv(rows))
     table = read_plan(str(file), case.nominal)
-    file.write_text(csv_text(again(case.nominal, case.machine, case.nuisances, table, np.random.default_rng(number))))
+    file.write_text(csv_text(case.again(table, np.random.default_rng(number))))
     return str(file)
 
 

@@ -11,7 +11,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
 from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.sizes import NuisanceCovariance, scale_of
+from toolpath_stiff.rig.sizes import NuisanceCovariance, Scale
 
 STEP = 0.05  # relative change of a parameter, for differences
 
@@ -24,7 +24,7 @@ def shows_beside(case: DrawnCase) -> list[float]:
     over the same without the effect. Where the others act is taken for known; a parameter at 0 stays there.
     """
     rows, effects = rows_of(case.rows), case.truth["effects"]
-    known = scale_of(case.nominal, rows, clamp_of(case.rows), case.nuisances).covariance
+    known = Scale(case.nominal, rows, clamp_of(case.rows), case.nuisances).covariance
 
     def logs(present: Sequence[Mapping[str, Any]]) -> FloatArray:
         machine = HiddenMachine()

@@ -20,7 +20,8 @@ if __name__ == "__main__":
 
 import toolpath_stiff
 from toolpath_stiff.nc.codes.code import EVERYWHERE, Code, holds_anyway
-from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED
+from toolpath_stiff.nc.codes.refused import REFUSED
+from toolpath_stiff.nc.codes.registry import ALIASES, CODES
 from toolpath_stiff.nc.cutter_location.vocabulary import DOUBTFUL, LISTED, READ, WORDS
 from toolpath_stiff.nc.cutter_location.vocabulary import REFUSED as REFUSED_WORD
 from toolpath_stiff.rig.unknowns import UNKNOWNS

@@ -155,7 +155,7 @@ def joint_columns_are_shared() -> Iterator[None]:
     from toolpath_stiff.planning import forecasts
     from toolpath_stiff.stiffness.effect_source import is_foreign
 
-    of_readings, of_plan = Predictor.joint_columns, forecasts.joint_columns
+    of_readings, of_plan = Predictor.joint_columns.func, forecasts.joint_columns
 
     def for_readings(own: Predictor) -> FloatArray:
         """`Predictor.joint_columns`."""
@@ -168,7 +168,7 @@ def joint_columns_are_shared() -> Iterator[None]:
         return joint_columns_once("plan", model.given, readings, lambda: of_plan(model, readings))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Predictor, "joint_columns", for_readings)
+        patch.setattr(Predictor, "joint_columns", property(for_readings))
         patch.setattr(forecasts, "joint_columns", for_plan)
         yield
 

@@ -22,7 +22,7 @@ def portrait(links: dict[str, float], variables: dict[str, float], held: float |
         "variables": [{"variable": variable, "probability": p} for variable, p in variables.items()],
         "terms": [TERM], "indistinguishable": [TERM | {"probability": 0.2}],
         "explained_percent": 90.0, "error_percent": 2.0,
-        "held_out_rms_percent": held, "noise_floor_percent": 2.0, "smooth_rms_percent": 3.0, "look_elsewhere": 0.001,
+        "held_out_rms_percent": held, "noise_floor_percent": 2.0, "look_elsewhere": 0.001,
     }  # fmt: skip
 
 

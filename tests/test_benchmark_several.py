@@ -22,7 +22,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.case import clamp_of, draw_case, rows_of
 from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.sizes import scale_of
+from toolpath_stiff.rig.sizes import Scale
 
 
 def record(truth: dict[str, float], verdict: str, plausible: list[str], **more: Any) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def test_an_effect_shows_beside_another_by_what_that_cannot_take_up() -> None:
     assert 0.0 < first < case.truth["effects"][0]["detectability"] * 1.2
     assert 0.0 < second < case.truth["effects"][1]["detectability"] * 1.2
     rows, clamps = rows_of(case.rows), clamp_of(case.rows)
-    known = scale_of(case.nominal, rows, clamps, case.nuisances).covariance
+    known = Scale(case.nominal, rows, clamps, case.nuisances).covariance
     covariance = known.spread @ known.spread.T + known.noise * np.eye(len(clamps))
     covariance += case.nuisances.clamping**2 * (clamps[:, None] == clamps)
     root = np.linalg.inv(np.linalg.cholesky(covariance))

@@ -13,9 +13,9 @@ from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import assert_same_path, debian_programs
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.nc.controller import read_controller
-from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.reader import read_program
-from toolpath_stiff.path import move_durations
+from toolpath_stiff.path.sampling import move_durations
 from toolpath_stiff.rotations import rotation_matrices
 
 FOLDER = Path(__file__).parent.parent / "programs"

@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
     from toolpath_stiff.nc.program import Program as Program
-    from toolpath_stiff.path import SampledPath as SampledPath
+    from toolpath_stiff.path.table import SampledPath as SampledPath
     from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
     from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
     from toolpath_stiff.placement.result import Placement as Placement
@@ -121,7 +121,7 @@ _PUBLIC = {
         "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
     "nc.program": ("Program",),
-    "path": ("SampledPath",),
+    "path.table": ("SampledPath",),
     "placement.case_study": ("CaseStudy",),
     "placement.keep_out": ("KeepOut",),
     "placement.result": ("Placement",),

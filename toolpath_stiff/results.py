@@ -18,6 +18,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+def frame_of(rows: Any, columns: list[str] | None = None) -> pd.DataFrame:
+    """Rows or columns as a DataFrame: pandas is loaded when the first one is asked for."""
+    import pandas as pd
+
+    return pd.DataFrame(rows, columns=columns)
+
+
 # Called with what is being done, how much of it is done, and how much there is (0: not known).
 Progress = Callable[[str, int, int], None]
 

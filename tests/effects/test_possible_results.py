@@ -105,7 +105,7 @@ def test_an_indefinite_form_is_refused_however_small_its_share(tmp_path):
     ("key", "value", "told"),
     [
         ("stiffness_N_per_um", "[5e-324, 5e-324]", "stiffness_N_per_um = 4.94066e-324"),
-        ("length_mm", "[1e-300, 2e-300]", "the lengths are all but equal"),
+        ("length_mm", "[1e-300, 2e-300]", "0.001 mm apart or more"),
     ],
 )
 def test_machine_files_with_absurd_laws_are_refused_with_their_line(tmp_path, capsys, key, value, told):

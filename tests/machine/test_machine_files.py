@@ -44,7 +44,7 @@ BAD_FILES = [
     (changed("length_mm = 150.0", ""), "[reference_tool] length_mm is missing"),
     (changed("stiffness_N_per_um = [46.5, 32.5]", "stiffness_N_per_um = [46.5]"), "2 or more numbers in N/um"),
     (changed("stiffness_N_per_um = [46.5, 32.5]", "stiffness_N_per_um = [46.5, -1]"), "stiffness_N_per_um = -1"),
-    (changed("length_mm = [2561.6, 3213.2]", "length_mm = [2561.6, 2561.6]"), "both lengths are equal"),
+    (changed("length_mm = [2561.6, 3213.2]", "length_mm = [2561.6, 2561.6]"), "0.001 mm apart or more"),
     (changed("    [304.77, 330.0, 296.97],\n", ""), "6 rows of 3 numbers"),
     (changed("    [304.77, 330.0, 296.97],\n", "    [304.77, 330.0],\n"), "6 rows of 3 numbers"),
     (

@@ -5,7 +5,7 @@ import pytest
 from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import TABLE_RS274, assert_same_path
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.reader import parse_program, read_program
 
 HEAD = "G90 G17 F10\n"

@@ -17,7 +17,7 @@ from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.path import sample_moves
+from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.rewriting.program import rewrite_program
 
 LINUXCNC = Controller(DIALECTS["linuxcnc"])

@@ -14,8 +14,8 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import DIALECTS, Controller
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
-from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.reader import parse_program, read_program
@@ -89,7 +89,7 @@ def test_a_placement_is_not_written_into_it(tmp_path, capsys):
     program.write_text(SLOT)
     out = tmp_path / "out"
     assert main(["place", str(program), "--rotate", "30", "--out", str(out), "--write", str(written)]) == 2
-    assert "not a program that a control runs" in capsys.readouterr().err
+    assert "for a post processor (a cutter-location file)" in capsys.readouterr().err
     assert not written.exists() and not out.exists()
     blocks = offset_blocks(read_program(program), (0.1, 0, 0.8, 0, 0, 0.5))
     assert not blocks.linuxcnc and "posted from it" in blocks.linuxcnc_reason
@@ -188,12 +188,12 @@ def test_a_tap_feeds_in_and_out():
 @pytest.mark.parametrize("word", ["ROTABL/ATANGL,0", "ROTABL/0,BAXIS", "ROTATE/TABLE,INCR,0.0"])
 def test_a_table_that_turns_by_nothing_is_listed(word):
     program = parse_program(f"{CUTS}{word}\nGOTO/4,0,9\nFINI\n", "p.apt")
-    assert [(note.line, note.reason) for note in program.unsupported] == [(5, "a rotary axis that stays at 0")]
+    assert [(note.line, note.reason) for note in program.unsupported] == [(5, "0 changes nothing")]
     with pytest.raises(InputError, match="turns the work or the head"):
         parse_program(f"{CUTS}{word.replace('0', '30', 1)}\nGOTO/4,0,9\nFINI\n", "p.apt")
 
 
-@pytest.mark.parametrize("word", ["MODE/TURN", "TOOLNO/1,TURN"])
+@pytest.mark.parametrize("word", ["MODE/TURN"])
 def test_turning_is_doubted(word):
     program = parse_program(f"{CUTS}{word}\nGOTO/4,0,9\nFINI\n", "p.apt")
     assert any(text.startswith(f"line 5: {word}: turning") for text in program.warnings)

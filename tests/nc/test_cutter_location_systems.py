@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.nc.cutter_location import MM, START, read, refused
-from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
-from toolpath_stiff.path import sample_moves
+from toolpath_stiff.path.sampling import sample_moves
 
 
 def test_helix_of_ptcs_manual():

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.reader import parse_program
 
 ROUNDING_M = 1e-12  # sums and cosines of numbers up to 1 m
@@ -79,7 +79,7 @@ def test_rotation_lies_within_offsets_and_shifts():
     ("text", "words"),
     [
         ("G68 X0 Y0", "without its angle"),
-        ("G68 X0 Y0 Z0 I0 J0 K1 R30", "rotation in space"),
+        ("G68 X0 Y0 Z0 I0 J0 K1 R30", "in space"),
         ("G18 G68 X0 Z0 R30", "in the plane G18"),
         ("G68 X0 Y0 R30\nG18", "another plane"),
         ("G68 X0 Y0 R30\nG55", "another work offset"),
@@ -93,7 +93,7 @@ def test_rotation_lies_within_offsets_and_shifts():
         ("G68 X0 Y0 R30 G1 F100", "axis words"),
         ("G0 X5 Y5\nG68 X0 Y0 R30\nG1 F100 X1", "first move after G68"),
         ("G0 X5 Y5\nG68 X0 Y0 R30\nG69 G1 F100 X1", "first move after G69"),
-        ("G68 X0 Y0 R30\nG1 F100 X5 Y5\nG69 G91 X1 Y0", "incremental in the first move after G69"),
+        ("G68 X0 Y0 R30\nG1 F100 X5 Y5\nG69 G91 X1 Y0", "incremental, in the first move after G69"),
         ("G16 G1 F100 X5", "half of a polar point"),
         ("G16 G1 F100 Y5", "half of a polar point"),
         ("G16 G1 F100 X5 Y5\nG91 X5", "polar radius in incremental mode"),

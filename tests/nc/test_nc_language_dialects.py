@@ -228,7 +228,7 @@ def test_inline_offsets_and_linuxcnc_s_own_files(tmp_path):
         ("[[tools]]\nnumber = 1\nlength = 3", "length is not known"),
         ("[[tools]]\nnumber = 1\n[[tools]]\nnumber = 1", "appears twice"),
         ("[[tools]]\nnumber = 1\ndiameter_mm = 0", "more than 0"),
-        ("[[tools]]\nnumber = 1\nmaterial = 3", "are texts"),
+        ("[[tools]]\nnumber = 1\nmaterial = 3", "expected texts"),
         ('offsets = "nothing.var"', "cannot read"),
     ],
 )

@@ -128,7 +128,7 @@ def test_machine_coordinates_stay_when_the_work_moves():
     text = "G1 F100 X1 Y2 Z3\nG53 G0 Z900\n"
     for origin in ((0.1, 0.2, 0.8, 0, 0, 0), (0.3, -0.1, 0.7, 0.1, 0.2, 0.5)):
         program = parse_program(text, origin=origin)
-        from toolpath_stiff.path import place
+        from toolpath_stiff.path.placing import place
 
         moves = place(program.moves, origin)
         assert moves.end[-1, 2] == pytest.approx(0.9)

@@ -16,11 +16,11 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import Controller, read_controller
-from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import ARC, RAPID, ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.path import move_durations, sample_moves
+from toolpath_stiff.path.sampling import move_durations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 
 TOLERANCE_MM = 1e-3

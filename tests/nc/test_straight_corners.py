@@ -13,7 +13,7 @@ from toolpath_stiff.nc.controller import Controller, dialect_named
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.path import sample_moves
+from toolpath_stiff.path.sampling import sample_moves
 
 RADIUS = 3.0
 ROOT = math.sqrt(2.0)

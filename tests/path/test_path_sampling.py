@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from tests.moves_factory import make_moves
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.geometry import move_lengths
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import RAPID, held_once
-from toolpath_stiff.path import place, place_orientations, sample_moves
+from toolpath_stiff.path.placing import place, place_orientations
+from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 
 ROUNDING = 1e-12  # m: a few hundred units in the last place of a metre

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
-from toolpath_stiff.path import place, place_orientations
+from toolpath_stiff.path.placing import place, place_orientations
 from toolpath_stiff.rotations import rotation_matrices
 
 

@@ -12,7 +12,7 @@ from tests.nc import rs274
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
-from toolpath_stiff.path import place
+from toolpath_stiff.path.placing import place
 from toolpath_stiff.rewriting.offset_blocks import offset_blocks
 
 PROGRAMS = Path(__file__).parents[2] / "programs"

@@ -19,7 +19,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.tables import read_tool_table
-from toolpath_stiff.path import place
+from toolpath_stiff.path.placing import place
 from toolpath_stiff.placement.placing import rewriting_differences
 from toolpath_stiff.rewriting.program import rewrite_program
 

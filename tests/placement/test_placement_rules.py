@@ -21,7 +21,7 @@ from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program
-from toolpath_stiff.path import place
+from toolpath_stiff.path.placing import place
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules

@@ -336,10 +336,11 @@ def test_nothing_better_is_said_first_with_how_hard_it_was_looked_for():
     best = search_placements(Search(MODEL, path, TANGENTIAL, Bounds(here, here + np.array([0, 0, 0.3, 0, 0, 0]))))
     at = best.front[-1]
     close = Bounds(at, at + np.array([0, 0, 1e-9, 0, 0, 0]))
-    found = search_placements(Search(MODEL, path, TANGENTIAL, close, present=at))
+    search = Search(MODEL, path, TANGENTIAL, close, present=at)
+    found = search_placements(search)
     assert found.alone and found.searches == 3
-    told = nothing_better_words(SearchRecord({}, 1, (), found.pose_evaluations, found.searches, True))
-    assert f"3 searches from the beginning, {found.pose_evaluations} poses" in told
+    told = nothing_better_words(SearchRecord({}, 1, (), search.poses, found.searches, True))
+    assert f"3 searches from the beginning, {search.poses} poses" in told
 
 
 def test_placement_json_is_the_same_on_another_processor(tmp_path):

@@ -823,7 +823,6 @@ PORTRAIT = {
     "variables": [{"variable": "y", "probability": 0.72}],
     "held_out_rms_percent": 2.346,
     "noise_floor_percent": 1.987,
-    "smooth_rms_percent": 2.111,
     "explained_percent": 61.0,
     "terms": [],
 }

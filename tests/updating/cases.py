@@ -173,7 +173,7 @@ def predictor_for(data: Readings) -> Predictor:
     design = (*(np.asarray(getattr(data, name)).tobytes() for name in DESIGN), data.missing)
     if design not in PREDICTORS:
         PREDICTORS[design] = Predictor(nist(), data)
-        PREDICTORS[design].joint_columns()  # kept with the predictor from now on
+        assert PREDICTORS[design].joint_columns.size  # kept with the predictor from now on
     found = copy.copy(PREDICTORS[design])
     idle = idle_on(found.base, data).values()
     found.data = replace(data, warnings=tuple(dict.fromkeys((*data.warnings, *idle))))
@@ -246,13 +246,25 @@ def judged(seed: int, layout: str = "tilted", hidden: str = "none", size: float 
 def make_problem(machine: Hexapod, data: Readings, noise: Noise) -> tuple[Problem, FloatArray]:
     """Data, model and scatter, ready for fits; and the covariance (n, n) of ln readings."""
     problem = Problem.of(Predictor(machine, data), noise)
-    return problem, problem.scatter.covariance.dense()
+    return problem, dense(problem.scatter.covariance)
 
 
 def correlated_covariance(own: ArrayLike, shared: ArrayLike) -> Covariance:
     """Of n readings with variances (n,) of their own, not clamped together, and shared columns (n, q)."""
     own = np.asarray(own, dtype=float)
     return Covariance(own, Groups.by(np.arange(len(own))), 0.0, np.asarray(shared, dtype=float).T)
+
+
+def dense(covariance: Covariance) -> FloatArray:
+    """(n, n), written out."""
+    same = covariance.groups.of[:, None] == covariance.groups.of[None, :]
+    return np.diag(covariance.own_variance) + covariance.common * same + covariance.shared.T @ covariance.shared
+
+
+def selected(covariance: Covariance, kept: NDArray[np.bool_]) -> Covariance:
+    """Of some of the readings."""
+    groups = Groups.by(covariance.groups.of[kept])
+    return Covariance(covariance.own_variance[kept], groups, covariance.common, covariance.shared[:, kept])
 
 
 def examined(machine: Hexapod, data: Readings, **options: Any) -> Diagnosis:

@@ -12,13 +12,12 @@ from scipy.linalg import subspace_angles
 from scipy.stats import norm
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, make_problem, simple_noise, table_1
+from tests.updating.cases import campaign, dense, make_problem, simple_noise, table_1
 from tests.updating.test_evidence import by_hand, logs_by_hand, one_table, scatter
-from toolpath_stiff.inference.confounding import CONFOUNDED, Confounding, _linked, confounding
-from toolpath_stiff.inference.detectable import Detectable, detectable_sizes
+from toolpath_stiff.inference.confounding import CONFOUNDED, Confounding, confounding
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.hypotheses import Family, score_families
-from toolpath_stiff.inference.quadrature import score_single
+from toolpath_stiff.inference.hidden_sizes import Detectable, detectable_sizes
+from toolpath_stiff.inference.hypotheses import Family, score_families, score_single
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
@@ -63,7 +62,7 @@ def test_correlations_are_cosines_between_subspaces(case):
     """Readings whitened by the square root of the projected inverse covariance; the worst choice of each counts."""
     problem, families, found = case()
     law = problem.law_jacobian(np.zeros(2), problem.base_compliance)
-    root = np.linalg.cholesky(np.linalg.inv(problem.scatter.covariance.dense() + 0.2**2 * law @ law.T)).T
+    root = np.linalg.cholesky(np.linalg.inv(dense(problem.scatter.covariance) + 0.2**2 * law @ law.T)).T
 
     def spans(family: Family) -> list[FloatArray]:
         columns = [root @ (table.columns / problem.base_compliance[:, None]) for table in family.tables]
@@ -101,13 +100,6 @@ def test_sets_stand_together():
         apart = {name for name in found.names if not any(name in group for group in found.sets)}
         for name in apart:
             assert sum(found.matrix[found.names.index(name)] > CONFOUNDED) == 1
-
-
-def test_links_chain():
-    close = np.eye(5, dtype=bool)
-    for i, j in ((0, 2), (2, 4)):
-        close[i, j] = close[j, i] = True
-    assert _linked(close) == [[0, 2, 4], [1], [3]]
 
 
 def sizes(problem: Problem, families: list[Family], threshold: float = 9.0) -> dict[tuple[str, str], Detectable]:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, read_text
+from tests.updating.cases import campaign, dense, read_text
 from tests.updating.test_diagnose import SADDLE
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
@@ -110,7 +110,7 @@ def test_what_is_foretold_is_the_normal_distribution_given_the_other_readings(de
     """Against dense matrices: conditional mean and covariance of each left-out point."""
     fit = described[0].fits["saddle"]
     labels = np.where(OLD, "seen", np.char.add("new ", DATA.point))
-    whole, squares = fit.scatter.covariance.dense(), 0.0
+    whole, squares = dense(fit.scatter.covariance), 0.0
     moves = held_out(fit, labels).moves
     for move, label in zip(moves, np.unique(labels), strict=True):
         out = labels == label

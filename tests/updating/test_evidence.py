@@ -29,8 +29,7 @@ from tests.updating.cases import (
 )
 from toolpath_stiff.inference.candidates import CandidateTable, candidates_of, tabulate
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Problem
-from toolpath_stiff.inference.hypotheses import probabilities, score_families, score_family
-from toolpath_stiff.inference.quadrature import score_single
+from toolpath_stiff.inference.hypotheses import probabilities, score_families, score_family, score_single
 from toolpath_stiff.stiffness.catalogue import find_effect
 
 FloatArray = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import active, campaign, make_problem, simple_noise
+from tests.updating.cases import active, campaign, dense, make_problem, simple_noise
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.rows import fitted_sizes
 from toolpath_stiff.inference.candidates import Candidate, candidates_of
@@ -75,7 +75,7 @@ def test_the_best_fit_is_the_best_fit(name, choice, start, truth):
     chosen = candidate(name, choice)
     free = tuple(range(len(start)))
     found = fit_effects(problem, [chosen], [np.array(start)], free, np.zeros(2))
-    whiten = np.linalg.cholesky(np.linalg.inv(problem.scatter.covariance.dense())).T
+    whiten = np.linalg.cholesky(np.linalg.inv(dense(problem.scatter.covariance))).T
     unit = np.array([c.typical()[1] if np.isfinite(c.typical()[1]) else 1.0 for c in chosen.components])
 
     def residual(x: FloatArray) -> FloatArray:
@@ -159,7 +159,7 @@ def test_components_that_trade_off_against_each_other_end_in_one_place(seed):
     starts = [np.array([s, s, s, t]) for s, t in ((1e-9, 1e-9), (1e-9, 1e-10), (1e-10, 1e-12))]
     fits = [fit_effects(problem, [table], [start], (0, 1, 2, 3), np.zeros(2)) for start in starts]
     costs = [cost(problem, fit.law, [table.active(fit.sizes[0])]) for fit in fits]
-    whiten = np.linalg.cholesky(np.linalg.inv(problem.scatter.covariance.dense())).T
+    whiten = np.linalg.cholesky(np.linalg.inv(dense(problem.scatter.covariance))).T
 
     def residual(x: FloatArray) -> FloatArray:
         logs = problem.predictor.log_stiffness(x[:2], [table.active(x[2:] * 1e-9)])

@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 from scipy.stats import binom, chi2, kstest
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, correlated_covariance, make_problem, simple_noise
+from tests.updating.cases import campaign, correlated_covariance, dense, make_problem, simple_noise
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.gates import (
@@ -167,7 +167,7 @@ def test_largest_gain_is_that_of_non_negative_least_squares(columns):
     rng = np.random.default_rng(columns)
     n = 15
     covariance = correlated_covariance(rng.uniform(0.5, 2.0, n), rng.normal(size=(n, 3)))
-    projected = np.linalg.inv(covariance.dense())
+    projected = np.linalg.inv(dense(covariance))
     root = np.linalg.cholesky(projected).T
     shape = rng.normal(size=(n, columns))
     subsets = [list(s) for s in ([0], [1], [2], [0, 1], [0, 2], [1, 2], [0, 1, 2]) if max(s) < columns]

@@ -10,7 +10,7 @@ from scipy.stats import ttest_1samp
 
 from tests.conftest import seeds
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, make_problem, simple_noise
+from tests.updating.cases import campaign, dense, make_problem, selected, simple_noise
 from toolpath_stiff.inference.candidates import candidates_of
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Fit, Problem
@@ -41,7 +41,7 @@ def honest(whole: Fit) -> np.ndarray:
         out = DATA.point == label
         rest = make_problem(nist(), DATA.select(~out), NOISE.select(~out))[0]
         # The same joint positions and struts are uncertain: the covariance of the readings that stay.
-        rest = Problem(rest.predictor, Scatter.of(NOISE.select(~out), PROBLEM.scatter.covariance.select(~out)))
+        rest = Problem(rest.predictor, Scatter.of(NOISE.select(~out), selected(PROBLEM.scatter.covariance, ~out)))
         again = fit_effects(rest, whole.candidates, whole.sizes, whole.free, whole.law)
         residual[out] = (PROBLEM.observed - PROBLEM.predictor.log_stiffness(again.law, again.effects))[out]
     return residual
@@ -96,7 +96,7 @@ def test_products_of_what_stays_are_those_of_its_own_covariance():
         for label, out, found in zip(which, left_out, products, strict=True):
             assert out.tolist() == np.flatnonzero(points.of == label).tolist()
             stay = np.setdiff1d(np.arange(12), out)
-            weighted = columns[stay].T @ np.linalg.inv(covariance.dense()[np.ix_(stay, stay)])
+            weighted = columns[stay].T @ np.linalg.inv(dense(covariance)[np.ix_(stay, stay)])
             assert found[:, :2] == pytest.approx(weighted @ columns[stay], rel=1e-9)
             assert found[:, 2] == pytest.approx(weighted @ residual[stay], rel=1e-9)
             count += len(out)

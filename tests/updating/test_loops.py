@@ -22,7 +22,7 @@ from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.tables import TABLES, Tables, tables_of
 from toolpath_stiff.readings.measurements import measured_path, model_stiffness, read_measurements
 from toolpath_stiff.report.compare import text
-from toolpath_stiff.rig.case import again, draw_case
+from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import HiddenMachine
 from toolpath_stiff.rig.loops import true_displacements
@@ -126,7 +126,7 @@ def test_loops_add_up_to_the_tip(at_poses):
         return loop_compliance(model, path, DIRECTIONS, [measuring_loop(name)], which)
 
     assert read("spindle") + read("platform") == pytest.approx(read("tip"), rel=1e-12)
-    forces = exact.under_load(model, path, DIRECTIONS).forces
+    forces = exact.under_load(model, path, DIRECTIONS)[3]
     of_struts = sum(forces[:, i] * (read(f"strut {i + 1}") + read(f"joint {i + 1}")) for i in range(6))
     assert of_struts == pytest.approx(read("platform"), rel=1e-12)
     assert read("joint 2 platform") + read("joint 2 frame") == pytest.approx(read("joint 2"), rel=1e-12)
@@ -213,7 +213,7 @@ def measured_again(case, file, loops, seed: int = 1):
     x, y, z, direction, loop, force = zip(*rows, strict=True)
     plan = {"x_mm": np.array(x), "y_mm": np.array(y), "z_mm": np.array(z), "direction": list(direction)}
     plan |= {"loop": list(loop), "force_N": np.array(force)}
-    table = again(case.nominal, case.machine, case.nuisances, plan, np.random.default_rng(seed))
+    table = case.again(plan, np.random.default_rng(seed))
     file.write_text(csv_text(table))
     return str(file)
 

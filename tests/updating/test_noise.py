@@ -11,7 +11,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from tests.conftest import seeds
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, correlated_covariance, readings_by_hand, simple_noise, table_1
+from tests.updating.cases import campaign, correlated_covariance, dense, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.noise import Scatter, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
@@ -149,7 +149,7 @@ def test_covariance_is_that_of_simulated_campaigns():
     data = campaign(0, "paper", nuisances=nuisances)[0]
     predictor = Predictor(nist(), data)
     noise = simple_noise(len(data), 0.01, 0.02, 0.03, 1e-3)
-    root = np.linalg.inv(np.linalg.cholesky(covariance(noise, predictor).dense()))
+    root = np.linalg.inv(np.linalg.cholesky(dense(covariance(noise, predictor))))
     model = predictor.log_stiffness()
     count = 60
     logs = [np.log(campaign(seed, "paper", nuisances=nuisances)[0].stiffness) - model for seed in seeds(0, count)]
@@ -169,7 +169,7 @@ def test_covariance_is_that_of_simulated_campaigns():
     # is below 0.44 of that once in 10,000 times, and the edge is at 0.42.
     for without in ({"clamping": 0.0}, {"strut_spread": 0.0}, {"joint_error": 0.0}):
         parts = {"repeat": 0.01, "clamping": 0.02, "strut_spread": 0.03, "joint_error": 1e-3} | without
-        bare = np.linalg.inv(np.linalg.cholesky(covariance(simple_noise(len(data), **parts), predictor).dense()))
+        bare = np.linalg.inv(np.linalg.cholesky(dense(covariance(simple_noise(len(data), **parts), predictor))))
         assert farthest(np.array(logs) @ bare.T) > edge
 
 

@@ -26,7 +26,7 @@ from toolpath_stiff.planning.menu import Costs, Menu
 from toolpath_stiff.planning.outlook import expected_outcome
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.result import Plan
-from toolpath_stiff.planning.visits import Matters, possible_visits
+from toolpath_stiff.planning.visits import possible_visits
 from toolpath_stiff.report.plan import text
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.nominal import reachable as rig_reachable
@@ -51,7 +51,7 @@ def best_gap(truth: str, other: str, **changes) -> float:
 @pytest.fixture(scope="module")
 def made_up():
     """Forecasts of two rivals and a third, their visits and the noise."""
-    visits = possible_visits(nist(), menu(), Matters(load=True), np.random.default_rng(1))
+    visits = possible_visits(nist(), menu(), {"force_N"}, np.random.default_rng(1))
     named = [*rivals("frame_compliance", "joint_moment_stiffness"), rivals("joint_compliance", "none")[1]]
     forecasts, good, scatter = forecast_all(nist(), named, visits.readings)
     assert good.all()
@@ -91,7 +91,7 @@ def test_another_visit_never_narrows_a_gap(made_up, seed):
 def test_a_gauge_off_by_a_known_factor(scale):
     """Readings along X, two a visit, differ by ln(1 + s), all others by nothing: sqrt(2 n) |ln(1 + s)| / (sqrt 2 r)."""
     known = [Rival("none"), Rival("gauge_scale", effects=(active("gauge_scale", [scale]),))]
-    visits = possible_visits(nist(), menu(oblique=False), Matters(), np.random.default_rng(0))
+    visits = possible_visits(nist(), menu(oblique=False), (), np.random.default_rng(0))
     forecasts, _, scatter = forecast_all(nist(), known, visits.readings, strut_spread=0.0, joint_error=0.0)
     assert not scatter.any()
     share = pair_shares(visits, *forecasts, ReadingNoise(0.02, 0.0, scatter))
@@ -143,10 +143,10 @@ def test_a_verdict_is_settled_where_a_diagnosis_would_name_it():
 
 def test_columns_of_the_joints_agree_with_the_predictors():
     """One tensor a pose here, one reading after the other there; 0.1 % of a step's own curvature apart."""
-    visits = possible_visits(nist(), menu(), Matters(), np.random.default_rng(2))
+    visits = possible_visits(nist(), menu(), (), np.random.default_rng(2))
     some = visits.readings.select(np.arange(0, len(visits.readings), 401))
     predictor = Predictor(nist(), some)
-    assert joint_columns(predictor.base, some) == pytest.approx(predictor.joint_columns(), rel=1e-6, abs=1e-9)
+    assert joint_columns(predictor.base, some) == pytest.approx(predictor.joint_columns, rel=1e-6, abs=1e-9)
 
 
 # -- what splits what --------------------------------------------------------------------------------------------------
@@ -225,14 +225,14 @@ def test_a_plan_beats_visits_drawn_at_random():
 @pytest.mark.parametrize("machine", ["nist", "genhexkins", "nategh_agheli"])
 def test_every_possible_visit_is_reachable_for_the_rig_as_well(machine):
     """The rig has kinematics and a reader of limits of its own."""
-    visits = possible_visits(load_machine(machine), Menu(), Matters(), np.random.default_rng(0))
+    visits = possible_visits(load_machine(machine), Menu(), (), np.random.default_rng(0))
     assert len(visits) > 100
     assert rig_reachable(load_nominal(machine), visits.pose[:, :3], visits.pose[:, 3:], visits.extension).all()
 
 
 def test_poses_are_tilted_no_further_and_lie_no_wider_than_allowed():
     wanted = menu(radius=0.2, max_tilt=np.radians(10.0), heights=(0.6, 0.9), measured=np.zeros((0, 6)), labels=())
-    visits = possible_visits(nist(), wanted, Matters(), np.random.default_rng(0))
+    visits = possible_visits(nist(), wanted, (), np.random.default_rng(0))
     assert max(visits.tilt(v) for v in range(len(visits))) <= np.radians(10.0) + 1e-9
     assert np.hypot(*visits.pose[:, :2].T).max() <= 0.2 + 1e-9
     assert set(np.round(visits.pose[:, 2], 9)) == {0.6, 0.9}
@@ -304,6 +304,6 @@ def test_menus_that_cannot_be(change):
 
 def test_no_set_up_is_used_lower_than_it_was_measured():
     """Table 1 has the riser at 1268 mm only, and nothing below 353 mm."""
-    visits = possible_visits(nist(), menu(), Matters(setup=True), np.random.default_rng(0))
+    visits = possible_visits(nist(), menu(), {"setup"}, np.random.default_rng(0))
     assert visits.pose[visits.setup == "riser", 2].min() > 1.26
     assert 0.35 < visits.pose[visits.setup == "no riser", 2].min() < 0.5

@@ -95,7 +95,7 @@ def test_strut_columns_are_what_the_rig_sees_of_a_softer_strut():
 
 def test_joint_columns_are_what_the_rig_sees_of_displaced_joints():
     """The same small displacement of every third coordinate; rig and model both let the control know nothing of it."""
-    columns, before = tilted().joint_columns(), shown_by_rig(HiddenMachine())
+    columns, before = tilted().joint_columns, shown_by_rig(HiddenMachine())
     assert columns.shape == (288, 36)
     for coordinate in range(0, 18, 3):
         error = np.zeros(18)

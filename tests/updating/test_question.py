@@ -12,8 +12,8 @@ from tests.updating.cases import campaign, examined, predictor_for, table_1
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
+from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.file import load_machine
 
 ASKED = "Are these readings of this machine?"
@@ -26,7 +26,7 @@ TENFOLD = replace(TABLE, stiffness=10.0 * TABLE.stiffness)
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (CONSTANT, "all alike"),
+        (CONSTANT, "do not follow the model"),
         (SHUFFLED, "do not follow the model"),
         (replace(TABLE, stiffness=TABLE.stiffness[::-1]), "do not follow the model"),
         (TENFOLD, "9.9 times what the model says"),

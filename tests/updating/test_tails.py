@@ -1,12 +1,12 @@
-"""Tails of distributions against SciPy's."""
+"""The tail of chi-square against SciPy's."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
-from toolpath_stiff.inference.tails import normal_below, surprise
+from toolpath_stiff.inference.tails import surprise
 
 
 def test_surprise_is_the_tail_of_chi_square_even_where_it_underflows():
@@ -22,8 +22,3 @@ def test_surprise_is_the_tail_of_chi_square_even_where_it_underflows():
 
 def test_no_freedom_is_surprised_by_anything():
     assert np.isinf(surprise(np.array([[0.0], [1.0]]), np.array([0.0]))).all()
-
-
-def test_normal_tail():
-    x = np.linspace(-9.0, 9.0, 37)
-    assert [normal_below(one) for one in x.tolist()] == pytest.approx(norm.cdf(x).tolist(), rel=1e-13)

@@ -232,21 +232,13 @@ def _evaluate_rows(task: _Task, rows: slice | IntArray) -> None:
     compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force, task.route)
     refuse_no_number(machine, tip, within & np.isnan(compliance[:, 0, 0]))
 
-    def softest(some: BoolArray, across: FloatArray | None) -> FloatArray:
-        """Softest directions under the load, of some rows; nan where these are out of reach."""
-        directions = np.full((int(some.sum()), 3), np.nan)
-        inside, both = within[some], some & within
-        turn = None if rotation is None else rotation[both]
-        normals = None if across is None else across[inside]
-        directions[inside] = core.extreme_directions(model, tip[both], turn, tool[both], force, across=normals)
-        return directions
-
-    direction, substituted = load_directions(
-        task.load, compliance, tip, rotation, task.tangent[rows], softest if model.load_dependent else None
-    )
+    direction, substituted = load_directions(task.load, compliance, tip, rotation, task.tangent[rows])
     if model.load_dependent:
+        there = (tip[within], turned, tool[within], force)
+        if task.load.kind == "softest":
+            direction[within] = core.extreme_directions(model, *there)
         along = np.full(len(tip), np.nan)
-        along[within] = core.compliance_along(model, direction[within], tip[within], turned, tool[within], force)
+        along[within] = core.compliance_along(model, direction[within], *there)
     else:
         along = np.einsum("ni,nij,nj->n", direction, compliance, direction)
     stiffness = 1.0 / along

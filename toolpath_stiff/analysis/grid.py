@@ -15,7 +15,7 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, UnreachableError
-from toolpath_stiff.results import FolderResult
+from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
@@ -113,9 +113,8 @@ class StiffnessMap(FolderResult):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a point of the grid: x_mm, y_mm, z_mm, stiffness_N_per_mm (nan out of reach), reachable."""
-        import pandas as pd
-
-        return pd.concat([pd.DataFrame(columns) for columns in self.columns()], ignore_index=True)
+        planes = list(self.columns())
+        return frame_of({name: np.concatenate([plane[name] for plane in planes]) for name in planes[0]})
 
     def _short(self) -> str:
         return f"{self.model.machine.name}, load {self.load}, {self.stiffness.size} points"

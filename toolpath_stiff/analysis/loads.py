@@ -11,9 +11,7 @@ softest direction across it), so its figures are all of one kind; the other load
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -21,9 +19,6 @@ from toolpath_stiff import defaults, rotations
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.core import signed
-
-# Poses (n,) of all and, unless all directions are meant, unit vectors (k, 3) to stay across: to directions (k, 3).
-Softest = Callable[[BoolArray, FloatArray | None], FloatArray]
 
 LOADS = ("tangential", "axial", "normal", "softest", "radial", "x", "y", "z")
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -66,12 +61,7 @@ def parse_load(text: str) -> Load:
 
 
 def load_directions(
-    load: Load,
-    compliance: FloatArray,
-    position: FloatArray,
-    rotation: FloatArray | None,
-    tangent: FloatArray,
-    softest: Softest | None = None,
+    load: Load, compliance: FloatArray, position: FloatArray, rotation: FloatArray | None, tangent: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
     """Unit vectors of the load at n poses, and where the softest direction had to stand in.
 
@@ -87,8 +77,6 @@ def load_directions(
         (n, 3, 3); None: vertical spindle.
     tangent
         (n, 3) unit vectors of the motion, 0 where the tip does not move.
-    softest
-        Where to find the softest directions if they are not the compliance's own (`Softest`).
 
     Returns
     -------
@@ -98,17 +86,15 @@ def load_directions(
     directions, known = geometric_directions(load, position, rotation, tangent)
     if known.all():
         return directions, ~known
-    softest = softest or partial(_softest_of, compliance)
-    if load.kind == "softest":
-        return softest(~known, None), known
-    directions, still = directions.copy(), ~known & ~np.any(tangent != 0.0, axis=1)
-    plunge = ~known & ~still
-    if plunge.any():
+    plunge = ~known & np.any(tangent != 0.0, axis=1) & (load.kind != "softest")
+    seen = compliance.copy()
+    if plunge.any():  # the softest direction across the axis
         axis = np.broadcast_to(np.array(AXES["z"]), directions.shape) if rotation is None else rotation[:, :, 2]
-        directions[plunge] = softest(plunge, axis[plunge])
-    if still.any():
-        directions[still] = softest(still, None)
-    return directions, ~known
+        across = np.eye(3) - axis[plunge, :, None] * axis[plunge, None, :]
+        seen[plunge] = across @ compliance[plunge] @ across
+    directions = directions.copy()
+    directions[~known] = principal_directions(seen[~known])
+    return directions, ~known & (load.kind != "softest")
 
 
 def geometric_directions(
@@ -141,14 +127,6 @@ def _radial(position: FloatArray) -> FloatArray:
     directions[:, 2] = 0.0
     directions[radius < 1e-9] = AXES["x"]
     return directions
-
-
-def _softest_of(compliance: FloatArray, rows: BoolArray, axis: FloatArray | None) -> FloatArray:
-    """Softest directions of some rows of the compliance (n, 3, 3), in the planes across `axis` if it is given."""
-    if axis is None:
-        return principal_directions(compliance[rows])
-    across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
-    return principal_directions(across @ compliance[rows] @ across)
 
 
 def principal_directions(compliance: FloatArray, softest: bool = True) -> FloatArray:

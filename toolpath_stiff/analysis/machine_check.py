@@ -11,7 +11,7 @@ from toolpath_stiff.analysis.poses import PoseStiffness, evaluate_poses
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import Pose, mm_from_m, n_per_um_from_n_per_m
 
@@ -89,11 +89,9 @@ class MachineCheck(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a finding: severity (wrong, doubtful, warning), text."""
-        import pandas as pd
-
         kinds = (("wrong", self.wrong), ("doubtful", self.doubtful), ("warning", self.warnings))
         rows = [(severity, text) for severity, texts in kinds for text in texts]
-        return pd.DataFrame(rows, columns=["severity", "text"])
+        return frame_of(rows, columns=["severity", "text"])
 
     def picture(self) -> bytes:
         """The same as a PNG."""

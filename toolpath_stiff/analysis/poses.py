@@ -17,7 +17,7 @@ from toolpath_stiff.documents import without_nan
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, reach
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
@@ -124,9 +124,7 @@ class PoseStiffness(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a pose, the columns of `tps pose --csv`."""
-        import pandas as pd
-
-        return pd.DataFrame(self.columns)
+        return frame_of(self.columns)
 
     def to_dict(self) -> dict[str, Any]:
         """Of a single pose its figures; of several, a list of them under "poses", null where out of reach."""

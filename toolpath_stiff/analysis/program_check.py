@@ -18,13 +18,14 @@ from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import check
+from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.findings import ERROR, WARNING, Finding, UsedCode, in_order
-from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.path import BLOCK, Samples, move_durations, place, sample_moves
-from toolpath_stiff.results import Result
+from toolpath_stiff.path.placing import place
+from toolpath_stiff.path.sampling import BLOCK, Samples, move_durations, sample_moves
+from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
 
@@ -261,9 +262,7 @@ class ProgramCheck(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """The findings, one a row."""
-        import pandas as pd
-
-        return pd.DataFrame(to_dict(self.findings), columns=["line", "column", "code", "text", "severity"])
+        return frame_of(to_dict(self.findings), columns=["line", "column", "code", "text", "severity"])
 
     def save(self, file: str | Path) -> Path:
         r"""Write the JSON document to a file, whole or not at all.

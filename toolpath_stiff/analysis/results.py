@@ -27,8 +27,9 @@ from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import Moves, ReadProgram
-from toolpath_stiff.path import Samples, place, sample_moves
-from toolpath_stiff.results import FolderResult
+from toolpath_stiff.path.placing import place
+from toolpath_stiff.path.sampling import Samples, sample_moves
+from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model, condition_warnings
 from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
@@ -117,9 +118,7 @@ class Analysis(EvaluatedPath, FolderResult):
 
     def to_frame(self) -> pd.DataFrame:
         """The samples as a pandas DataFrame, columns as in `samples.csv` (mm, degrees, N/mm)."""
-        import pandas as pd
-
-        return pd.DataFrame(sample_columns(self))
+        return frame_of(sample_columns(self))
 
     def to_dict(self) -> dict[str, Any]:
         """The document of `summary.json`."""

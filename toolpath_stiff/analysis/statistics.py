@@ -18,7 +18,8 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.operations import Operation, Operations, operations
-from toolpath_stiff.path import PATH_COLUMNS, Samples, path_columns
+from toolpath_stiff.path.sampling import Samples
+from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 

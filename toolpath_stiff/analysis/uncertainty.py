@@ -16,7 +16,7 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.path import Samples
+from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 

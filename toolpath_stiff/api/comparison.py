@@ -10,6 +10,7 @@ from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.compare import compare as compare_readings
+from toolpath_stiff.hints import hint
 from toolpath_stiff.options import checked
 from toolpath_stiff.results import Progress, teller
 
@@ -62,5 +63,6 @@ def compare(
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     teller(progress)("comparing")
-    comparison = compare_readings(question.model, question.readings, asked=question.request, **question.common)
-    return replace(comparison, inputs=question.inputs)
+    comparison = compare_readings(question.model, question.readings, **question.common)
+    following = hint("which effect would explain it", question.request.command("diagnose"))
+    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=(following,)))

@@ -93,7 +93,7 @@ def update(
     task = UpdateTask(
         question.model, question.readings, [add] if isinstance(add, str) else list(add), strut_law=strut_law,
         keep_strut_law=keep_strut_law, auto=auto, force=force, objective=objective, files=question.files,
-        machine_file=str(machine_file), asked=question.request, progress=teller(progress), **question.common,
+        machine_file=str(machine_file), request=question.request, progress=teller(progress), **question.common,
     )  # fmt: skip
     return replace(update_machine(task), inputs=question.inputs, opened=opened)
 

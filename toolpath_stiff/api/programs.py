@@ -19,7 +19,9 @@ from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.nc.request import ZERO, Request
 from toolpath_stiff.options import Option, arguments_of, checked
-from toolpath_stiff.path import SampledPath, place, sample_moves
+from toolpath_stiff.path.placing import place
+from toolpath_stiff.path.sampling import sample_moves
+from toolpath_stiff.path.table import SampledPath
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, n_per_m_from_n_per_mm
 

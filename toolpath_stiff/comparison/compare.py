@@ -16,17 +16,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.comparison.answers import Answer, summary_of
 from toolpath_stiff.comparison.load_path import LinkShares, load_path_shares
 from toolpath_stiff.comparison.loop_readings import BesideTip, beside_tip, strut_history
 from toolpath_stiff.comparison.principles import Check, assess, model_free_checks
 from toolpath_stiff.comparison.residuals import ReadingNames, Residuals, Variable
 from toolpath_stiff.comparison.structure import Scattering, find_structure
-from toolpath_stiff.comparison.summary import ComparisonSummary
+from toolpath_stiff.comparison.summary import Answer, ComparisonSummary, summary_of
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import base_fit
@@ -141,7 +139,6 @@ def compare(
     effect_files: Sequence[str | Path] = (),
     seed: int = 0,
     draws: int = DRAWS,
-    asked: Asked | None = None,
 ) -> Comparison:
     """How far the model is from measurements, where, and how much of it is more than scatter.
 
@@ -161,8 +158,6 @@ def compare(
         Of the simulated scatter.
     draws
         Simulated sets of readings.
-    asked
-        What the commands that go on from here carry.
 
     Raises
     ------
@@ -189,26 +184,14 @@ def compare(
     noises = noise_models(data, noise, strut_spread)
     checks, cannot = model_free_checks(machine, data)
     answers = [_answer(residuals, checks, noise_model, draws, seed) for noise_model in noises]
-    files = tuple(dict.fromkeys(data.file.tolist()))
-    request = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
     beside = _beside_tip(machine, every, effect_files, noise_models(every, noise, strut_spread)[-1], seed)
-    following = [hint("which effect would explain it", request.command("diagnose"))]
     scattering = answers[-1].scattering
+    summary = certain(summary_of(residuals, answers, cannot, beside, seed))
     return Comparison(
-        residuals.predictor,
-        data,
-        noises,
-        residuals.log_model,
-        residuals.values,
-        np.sqrt(scattering.square),
-        scattering.covariance,
-        scattering.places,
-        answers[-1].structure.excess,
-        tuple(residuals.numbers),
-        tuple(residuals.names),
-        load_path_shares(residuals.predictor.base, data),
-        certain(summary_of(residuals, answers, cannot, beside, seed, following)),
-    )
+        residuals.predictor, data, noises, residuals.log_model, residuals.values, np.sqrt(scattering.square),
+        scattering.covariance, scattering.places, answers[-1].structure.excess, tuple(residuals.numbers),
+        tuple(residuals.names), load_path_shares(residuals.predictor.base, data), summary,
+    )  # fmt: skip
 
 
 def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int, seed: int) -> Answer:

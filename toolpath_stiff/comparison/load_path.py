@@ -46,8 +46,7 @@ def load_path_shares(model: StiffnessModel, data: Readings) -> LinkShares:
 
 def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
     """(n, links) m/N along each row's direction."""
-    loaded = exact.under_load(model, measured_path(model, data), data.direction)
-    path, links, f = loaded.path, loaded.links, loaded.forces
+    path, links, _, f = exact.under_load(model, measured_path(model, data), data.direction)
     w = np.concatenate([data.direction, np.zeros((len(data), 3))], axis=1)
     loads = np.concatenate([f, w], axis=1)
     columns = [*(f**2 / path.machine.strut_law.stiffness(path.struts.lengths)).T]

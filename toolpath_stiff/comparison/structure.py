@@ -106,7 +106,7 @@ class FoundPattern:
         t, positive: stiffer than modelled.
     p_adjusted
         Probability of such a largest |t| in scatter alone.
-    coefficient, standard_error
+    coefficient
         Of the column, beside the patterns found before it.
     alike
         Other patterns that cannot be told from it in these data.
@@ -116,7 +116,6 @@ class FoundPattern:
     statistic: float
     p_adjusted: float
     coefficient: float
-    standard_error: float
     alike: tuple[Pattern, ...]
 
 
@@ -387,13 +386,13 @@ def find_structure(
         alike = np.abs(x.T @ x) > ALIKE
         np.fill_diagonal(alike, val=False)
         answers = [
-            FoundPattern(pattern, float(t[i]), float(p[i]), float(t[i] / sizes[i]), float(1.0 / sizes[i]),
+            FoundPattern(pattern, float(t[i]), float(p[i]), float(t[i] / sizes[i]),
                          tuple(patterns[j] for j in np.flatnonzero(alike[i])))
             for i, pattern in enumerate(patterns)
         ]  # fmt: skip
         if step == 0:
             excess = left
-            tests = tuple(test for test in answers if test.standard_error > 0.0)
+            tests = tuple(test for test, size in zip(answers, sizes, strict=True) if np.isfinite(size))
         best = int(np.argmax(np.abs(t) >= (1.0 - TIED) * np.abs(t).max()))
         if p[best] >= SIGNIFICANT or step == MOST_PATTERNS:
             break

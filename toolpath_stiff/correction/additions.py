@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,38 +10,15 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, Component, candidates_of
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.contract import Effect, Parameter
+from toolpath_stiff.stiffness.contract import Parameter
 
 AXES = {"X": 1, "Y": 2, "Z": 3}
 
 
-@dataclass(frozen=True)
-class Addition:
-    """An effect to be added.
+def parse_addition(text: str, data: Readings, effect_files: Sequence[str | Path] = ()) -> list[Candidate]:
+    """What may be fitted of `weak_strut`, `weak_strut:strut=3`, `gauge_scale:direction=Z,setup=riser`.
 
-    Attributes
-    ----------
-    effect
-        The effect.
-    choice
-        Values of discrete parameters that the user chose; what is not in it is searched.
-    """
-
-    effect: Effect
-    choice: Mapping[str, Any]
-
-    def candidates(self, data: Readings) -> list[Candidate]:
-        """What may be fitted: one candidate a choice that is left open."""
-        discrete = [p for p in self.effect.parameters if p.discrete]
-        if not self.choice:
-            return candidates_of(self.effect, data)
-        values = {p.name: self.choice.get(p.name, "" if p.kind == "text" else 0) for p in discrete}
-        real = tuple(Component.of(p) for p in self.effect.parameters if not p.discrete)
-        return [Candidate(self.effect, tuple(values.items()), real)]
-
-
-def parse_addition(text: str, data: Readings, effect_files: Sequence[str | Path] = ()) -> Addition:
-    """`weak_strut`, `weak_strut:strut=3`, `gauge_scale:direction=Z,setup=riser`.
+    One candidate of the choices that are named, or one for each choice where none is.
 
     Raises
     ------
@@ -51,14 +27,9 @@ def parse_addition(text: str, data: Readings, effect_files: Sequence[str | Path]
     """
     name, _, rest = text.partition(":")
     effect = find_effect(name.strip(), effect_files)
-    lacking = data.cannot_test([effect]).get(effect.name)
-    if lacking:
-        raise InputError(
-            f"these data cannot test {effect.name}: column {', '.join(lacking)} is missing",
-            hint="measure with it, or add another effect",
-        )
-    if not any(not p.discrete for p in effect.parameters):
-        raise InputError(f"effect {effect.name} has no parameter that could be fitted")
+    if lacking := data.cannot_test([effect]).get(effect.name):
+        fault = f"these data cannot test {effect.name}: column {', '.join(lacking)} is missing"
+        raise InputError(fault, hint="measure with it, or add another effect")
     choices = {p.name: p for p in effect.parameters if p.discrete}
     choice = {}
     for part in filter(None, (piece.strip() for piece in rest.split(","))):
@@ -67,7 +38,12 @@ def parse_addition(text: str, data: Readings, effect_files: Sequence[str | Path]
             known = ", ".join(f"{key}=..." for key in choices) or f"nothing after {effect.name}: it has no choices"
             raise InputError(f"--add {text}: {part!r}", expected=known)
         choice[key] = _chosen(choices[key], value, text, data)
-    return Addition(effect, choice)
+    values = {name: choice.get(name, "" if p.kind == "text" else 0) for name, p in choices.items()}
+    real = tuple(Component.of(p) for p in effect.parameters if not p.discrete)
+    candidates = [Candidate(effect, tuple(values.items()), real)] if choice else candidates_of(effect, data)
+    if not candidates or not real:
+        raise InputError(f"--add {text}: nothing of it could be fitted to these data")
+    return candidates
 
 
 def _chosen(parameter: Parameter, value: str, text: str, data: Readings) -> Any:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from toolpath_stiff.column_files import csv_text
@@ -19,10 +17,10 @@ from toolpath_stiff.machine.model import Uncertainty
 from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
 
 
-def document_of(update: UpdateOutcome) -> dict[str, Any]:
+def document_of(update: UpdateOutcome) -> Document:
     """Everything that `update.json` holds."""
     steps = [rounded_step(update, k) for k in range(len(update.steps))]
-    document: dict[str, Any] = {
+    document: Document = {
         "verdict": update.verdict,
         "text": text(update),
         "question": update.question,

@@ -25,26 +25,14 @@ UNKNOWNS = (
     "upper frame joints, radius",
     "upper frame joints, height",
 )
-
-
 # Plausible sizes of a machine with struts of 2.5 to 3.2 m, in m: the box that the starts are scattered in and that
 # bounds the fit (beyond it the strut law vanishes).
 SCATTER = np.array([[0.15, 0.6], [0.1, 0.6], [1.5, 3.0], [2.4, 3.6], [1.5, 3.0], [2.4, 3.6]])
-
-
 HEXAGON_DEG = np.array([30.0, 90.0, 150.0, 210.0, 270.0, 330.0])
-
-
 VERTEX_DEG = np.array([60.0, 60.0, 180.0, 180.0, 300.0, 300.0])
-
-
 SAME_OPTIMUM = 1e-4  # m: starts that end this close have found the same geometry
-
-
 # A value printed to 1 N/mm is off by a uniform error: its standard deviation in N/mm.
 ROUNDING_SD = 1.0 / np.sqrt(12.0)
-
-
 PAPER_CENTRE_LENGTHS = (2.5616, 3.2132)  # m, printed in the paper, never fitted
 
 

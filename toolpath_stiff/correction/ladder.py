@@ -31,6 +31,7 @@ from toolpath_stiff.correction.words import NEEDED
 from toolpath_stiff.diagnosis.diagnose import FEWEST
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, testable_effects
+from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
@@ -40,7 +41,6 @@ from toolpath_stiff.inference.hypotheses import score_families, signatures, tabl
 from toolpath_stiff.inference.left_out import error_falls, gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.stiffness.contract import Effect
 
 TRIED = 4  # candidates a step of `--auto`, the most likely first
@@ -55,18 +55,17 @@ def build_ladder(task: UpdateTask) -> Update:
     InputError
         Too few readings, an effect unknown, named twice or present already, or nothing to do.
     """
-    additions = [parse_addition(text, task.data, task.effect_files) for text in task.add]
-    _check(task, [addition.effect.name for addition in additions])
+    wanted = [parse_addition(text, task.data, task.effect_files) for text in task.add]
+    _check(task, [candidates[0].name for candidates in wanted])
     noise, problem = task.problem()
     work = _Work(task, problem, noise)
     as_given, law_refitted = baseline(problem)
     steps, refitted = [work.step(AS_GIVEN, as_given)], work.step(LAW_REFITTED, law_refitted)
     if work.law_free:
         steps.append(refitted)
-    wanted = {addition.effect.name: addition.candidates(task.data) for addition in additions}
-    steps += work.ladder(steps[-1], list(wanted.values()))
-    full = steps[-1].fit
-    supports = tuple(work.support(work.without(full, j), full, j, wanted[name]) for j, name in enumerate(full.names))
+    steps += work.ladder(steps[-1], wanted)
+    full, by_name = steps[-1].fit, {candidates[0].name: candidates for candidates in wanted}
+    supports = tuple(work.support(work.without(full, j), full, j, by_name[name]) for j, name in enumerate(full.names))
     turned_down: tuple[Support, ...] = ()
     while task.auto and len(steps[-1].fit.candidates) < MOST_EFFECTS:
         better, tried = work.next_effect(steps[-1])

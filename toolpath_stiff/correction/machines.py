@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import resources
 from typing import Any
 
 import numpy as np
 
+from toolpath_stiff.documents import Document
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.prediction import scaled_law
@@ -23,19 +24,15 @@ from toolpath_stiff.workbooks import split_name
 def data_hash(files: Sequence[str]) -> str:
     """SHA-256 of the measurement files' bytes, one after the other."""
     digest = hashlib.sha256()
+    packaged = resources.files("toolpath_stiff") / "data" / "nist_table1.csv"
     for file in files:
-        digest.update(_bytes(file))
+        paper = file == NIST_TABLE_1
+        digest.update(packaged.read_bytes() if paper else read_bytes(split_name(file)[0], "measurements"))
     return digest.hexdigest()
 
 
-def _bytes(file: str) -> bytes:
-    if file == NIST_TABLE_1:
-        return (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_bytes()
-    return read_bytes(split_name(file)[0], "measurements")
-
-
 def fitted_machine(
-    machine: Hexapod, fit: Fit, provenance: Mapping[str, Any], widened: float = 1.0, setups: Iterable[str] = ()
+    machine: Hexapod, fit: Fit, provenance: Document, widened: float = 1.0, setups: Iterable[str] = ()
 ) -> Hexapod:
     """The machine with a fit's strut law and effects, their joint uncertainty, and where they come from.
 
@@ -54,8 +51,12 @@ def fitted_machine(
     """
     effects, instruments = list(machine.effects), list(machine.instruments)
     for candidate, active in zip(fit.candidates, fit.effects, strict=True):
-        values = {p.key: _in_file(p, active.values[p.name]) for p in candidate.effect.parameters}
-        entry = EffectEntry(candidate.name, values, dict(provenance))
+        values = dict(active.values)
+        values |= {
+            p.name: _certain(float(values[p.name]) / p.si) for p in candidate.effect.parameters if not p.discrete
+        }
+        in_file = {p.key: values[p.name] for p in candidate.effect.parameters}
+        entry = EffectEntry(candidate.name, in_file, dict(provenance))
         (instruments if candidate.effect.is_instrument else effects).append(entry)
     changes: dict[str, Any] = {"effects": tuple(effects), "instruments": tuple(instruments)}
     if fit.law_free:
@@ -69,10 +70,6 @@ def fitted_machine(
         known = sorted({*setups} - {"", *machine.setups})
         changes["setups"] = (*machine.setups, *known)
     return machine.with_changes(**changes, uncertainty=_uncertainty(machine, fit, widened))
-
-
-def _in_file(parameter: Any, value: Any) -> Any:
-    return value if parameter.discrete else _certain(float(value) / parameter.si)
 
 
 def _certain(value: float) -> float:
@@ -113,12 +110,5 @@ def _uncertainty(machine: Hexapod, fit: Fit, widened: float) -> Uncertainty | No
         sd=np.array([_certain(float(sd)) for sd in uncertainty.sd]),
         correlation=np.round(uncertainty.correlation, 9),
     )
-    return _beside(machine.uncertainty, certain)
-
-
-def _beside(old: Uncertainty | None, new: Uncertainty) -> Uncertainty:
-    """Both; what is fitted again replaces what was known of it."""
-    if old is None:
-        return new
-    kept = old.without(new.names)
-    return kept.beside(new) if kept.names else new
+    kept = None if machine.uncertainty is None else machine.uncertainty.without(names)
+    return kept.beside(certain) if kept and kept.names else certain

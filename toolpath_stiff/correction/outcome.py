@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from toolpath_stiff.correction.machines import fitted_machine
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.strut_law import BarCurve, StrutLawSearch
 from toolpath_stiff.correction.task import LIKELIHOOD, UpdateTask
+from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.noise import Noise
@@ -63,7 +63,7 @@ class UpdateOutcome:
     drawn: Drawn | None = None
     search: StrutLawSearch | None = None
     bars: BarCurve | None = None
-    provenance: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Document = field(default_factory=dict)
     next: Sequence[str] = ()
 
     @property
@@ -121,7 +121,7 @@ class UpdateOutcome:
         """The machine with the last model; None where nothing is to be written."""
         return self.fitted(self.provenance) if self.accepted else None
 
-    def fitted(self, provenance: Mapping[str, Any]) -> Hexapod:
+    def fitted(self, provenance: Document) -> Hexapod:
         """The machine with the last model, which comes from there."""
         return fitted_machine(
             self.task.machine, self.last.fit, provenance, self.widening, self.task.data.setup.tolist()

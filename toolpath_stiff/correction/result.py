@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from toolpath_stiff.correction import words
 from toolpath_stiff.correction.document import document_of, rounded_step
 from toolpath_stiff.correction.outcome import UpdateOutcome
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.machine.model import Hexapod
@@ -75,7 +76,7 @@ class Update(UpdateOutcome, FolderResult):
         return self.corrected
 
     @cached_property
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Document:
         """The content of update.json."""
         return document_of(self)
 

@@ -23,20 +23,10 @@ from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import n_per_um_from_n_per_m
 
 STARTS = 6
-
-
 START_SPREAD = 0.2  # sd of the starts' logarithms: a law wrong by 20 %
-
-
 FIRST_STEPS = 0.05 * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-
-
 FINE, ROUGH = (1e-7, 1e-10), (1e-5, 1e-7)  # law and mean error; a resampled search scatters a thousand times as much
-
-
 SAME = 1e-5  # of the mean error: two ends that close are one minimum
-
-
 # N/m; the paper's Figure 3 spans platforms far softer than any real one up to rigid ones.
 FIGURE_3_BARS = tuple(float(k) for k in np.geomspace(1e8, 1e13, 26))
 
@@ -223,14 +213,7 @@ def bar_curve(
         N/m; a rigid platform is added.
     seed, starts
         As in `minimise_mean_error`.
-
-    Raises
-    ------
-    InputError
-        A bar stiffness of 0 or less, or the machine carries `platform_flexibility` as an effect.
     """
-    if any(not k > 0.0 for k in bars):
-        raise InputError(f"platform bars of {min(bars):g} N/m", expected="more than 0")
     stiffnesses = np.unique([*bars, np.inf])
     errors, refitted, laws = [], [], []
     for k in stiffnesses:

@@ -43,7 +43,7 @@ class UpdateTask:
         Names of the measurement files, whose bytes are hashed for the record; empty: those that `data` names.
     machine_file
         Name that the new machine file is to have, for the record and the commands that use it.
-    asked
+    request
         What the commands that go on from here carry.
     """
 
@@ -61,7 +61,7 @@ class UpdateTask:
     seed: int = 0
     files: Sequence[str] = ()
     machine_file: str = "machine.toml"
-    asked: Asked | None = None
+    request: Asked | None = None
     progress: Callable[[str], None] = lambda text: None
 
     def problem(self) -> tuple[Noise, Problem]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -19,13 +18,14 @@ from toolpath_stiff.correction.strut_law import (
     resampled_covariance,
 )
 from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.fits import baseline
 from toolpath_stiff.inference.left_out import HeldOut
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
@@ -49,7 +49,7 @@ def update(task: UpdateTask) -> Update:
     """
     task = replace(task, files=tuple(task.files) or tuple(dict.fromkeys(task.data.file.tolist())))
     effect_files = tuple(map(str, task.effect_files))
-    request = task.asked or Asked(tuple(task.files), task.machine.name, effect_files, task.noise, task.strut_spread)
+    request = task.request or Asked(tuple(task.files), task.machine.name, effect_files, task.noise, task.strut_spread)
     if task.objective == MEAN_ERROR:
         if task.add or task.auto or not task.strut_law:
             raise InputError(
@@ -91,7 +91,7 @@ def update_by_mean_error(task: UpdateTask) -> Update:
     return Update(task, noise, problem, steps, refitted, question=question(predictor), search=search)
 
 
-def _provenance(update: Update, command: str) -> dict[str, Any]:
+def _provenance(update: Update, command: str) -> Document:
     """Where the fitted values come from. No date: the same data and command give the same bytes."""
     described = {} if update.described is None else {"described": f"not confirmed: {update.described.reason}"}
     return {

@@ -21,9 +21,9 @@ from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.inference import slips
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.confounding import confounding
-from toolpath_stiff.inference.detectable import detectable_sizes
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import baseline, refine
+from toolpath_stiff.inference.hidden_sizes import detectable_sizes
 from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
 from toolpath_stiff.inference.left_out import held_out, of_readings
 from toolpath_stiff.inference.noise import noise_models
@@ -193,7 +193,7 @@ def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portra
         problem = Problem.of(Predictor(diagnosis.machine, diagnosis.data, diagnosis.predictor.effect_files), noise)
         base = problem.score_base()
     progress("describing what is missing")
-    portrait = draw_portrait(problem, base, noise, diagnosis.seed, main.base_gate.worst)
+    portrait = draw_portrait(problem, base, noise, diagnosis.seed)
     return portrait if portrait.terms or verdict == "unexplained" else None
 
 

@@ -11,9 +11,8 @@ from toolpath_stiff.diagnosis.rows import HypothesisRow, HypothesisRows, percent
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why, would_tell
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.inference.confounding import CONFOUNDED
-from toolpath_stiff.inference.detectable import Detectable
+from toolpath_stiff.inference.hidden_sizes import Detectable, Unexcluded
 from toolpath_stiff.inference.judgement import Judgement
-from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.portrait.document import alike_entry, portrait_entry
 from toolpath_stiff.units import certain, json_number, mm_from_m, n_per_um_from_n_per_m
 
@@ -160,7 +159,6 @@ def _not_excluded(hidden: Unexcluded) -> Document:
         "choice": dict(hidden.candidate.choice),
         "up_to": json_number(hidden.value / hidden.parameter.si, 2),
         "rms_percent": percent_of(hidden.rms, 2),
-        "left_percent": percent_of(hidden.left, 2),
         "probability": json_number(hidden.probability, 2),
         "would_tell": would_tell(hidden),
     }

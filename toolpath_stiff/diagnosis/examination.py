@@ -10,15 +10,14 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.loop_readings import BesideTip
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.confounding import Confounding
-from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.hidden_sizes import Detectable, Unexcluded
 from toolpath_stiff.inference.judgement import Judgement
 from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.slips import SuspectEntry
-from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait

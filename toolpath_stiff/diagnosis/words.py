@@ -15,14 +15,13 @@ from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR
+from toolpath_stiff.inference.hidden_sizes import MATTERS, Unexcluded
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
 from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
-from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.planning.plan import INDICATORS
 from toolpath_stiff.portrait.words import alike_text
 from toolpath_stiff.stiffness.sizes import joined
-from toolpath_stiff.units import mm_from_m
 
 
 def verdict_text(diagnosis: Examination) -> str:
@@ -181,11 +180,6 @@ def _confounded(diagnosis: Examination) -> list[str]:
                     f"{second} and {first} have the same signature on these poses, loads and directions: correlation "
                     f"{value:.3f}"
                 )
-            elif value > 0.5:
-                reasons.append(
-                    f"{second} and {first} resemble each other here (correlation {value:.2f}): the effect is too small "
-                    "for the rest to show"
-                )
     return [*reasons, "chance alone is not excluded either"] if NONE in diagnosis.plausible else reasons
 
 
@@ -247,9 +241,6 @@ def assumptions(diagnosis: Examination) -> list[str]:
     """What was assumed, in sentences."""
     noise = diagnosis.noise
     sentences = [
-        f"noise: {noise.origin}",
-        f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
-        f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
         f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: "
         + ("assumed" if noise.outliers == OUTLIERS else "as the repeats have it"),
         f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import inverse_root
@@ -65,7 +64,8 @@ def confounding(problem: Problem, families: Sequence[Family]) -> Confounding:
                 (float(np.linalg.norm(a @ b.T, 2)) for a, _ in bases[first] for _, b in bases[second]), default=0.0
             )
     matrix = np.clip(matrix, 0.0, 1.0)
-    sets = _linked(matrix > CONFOUNDED)
+    linked = np.linalg.matrix_power((matrix > CONFOUNDED) * 1.0, max(len(names), 1)) > 0.0  # however long the way
+    sets = sorted({tuple(np.flatnonzero(row).tolist()) for row in linked})
     # Sets first, each as a block; then the rest, every one next to what it resembles most.
     order = [i for group in sorted(sets, key=lambda group: (-len(group), group)) for i in group]
     return Confounding(
@@ -73,16 +73,3 @@ def confounding(problem: Problem, families: Sequence[Family]) -> Confounding:
         matrix[np.ix_(order, order)],
         tuple(tuple(names[i] for i in group) for group in sets if len(group) > 1),
     )
-
-
-def _linked(close: NDArray[np.bool_]) -> list[list[int]]:
-    """Connected components of a symmetric relation."""
-    left, groups = set(range(len(close))), []
-    while left:
-        group, edge = set(), {min(left)}
-        while edge:
-            group |= edge
-            edge = {j for i in edge for j in np.flatnonzero(close[i]).tolist()} - group
-        groups.append(sorted(group))
-        left -= group
-    return groups

@@ -107,11 +107,6 @@ class Covariance:
         """(n,) variance of each reading."""
         return np.asarray(self.own_variance + self.common + (self.shared**2).sum(axis=0))
 
-    def dense(self) -> FloatArray:
-        """(n, n), for a few readings only."""
-        same = self.groups.of[:, None] == self.groups.of[None, :]
-        return np.asarray(np.diag(self.own_variance) + self.common * same + self.shared.T @ self.shared)
-
     def squares(self, rows: FloatArray) -> FloatArray:
         """(...,) x V x^T of rows (..., n): variances of these combinations of readings."""
         unshared = (rows**2 * self.own_variance).sum(axis=-1) + self.common * (self.groups.sums(rows) ** 2).sum(axis=-1)
@@ -122,10 +117,6 @@ class Covariance:
         own_variance = self.own_variance.copy()
         own_variance[rows] += variance
         return replace(self, own_variance=own_variance)
-
-    def select(self, kept: NDArray[np.bool_] | Rows) -> Covariance:
-        """Of some of the readings."""
-        return Covariance(self.own_variance[kept], Groups.by(self.groups.of[kept]), self.common, self.shared[:, kept])
 
     def draw(self, rng: np.random.Generator, draws: int) -> FloatArray:
         """(draws, n) normal scatter that readings have in common, without that of each reading on its own."""

@@ -1,4 +1,4 @@
-"""A stated noise held against what the readings leave: that it is too large or too small, and by how much."""
+"""Doubts about the data: whether they are of this machine at all, and whether a stated noise fits what they leave."""
 
 from __future__ import annotations
 
@@ -7,9 +7,59 @@ from dataclasses import replace
 import numpy as np
 
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
-from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Problem
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.size_priors import EXPECTED
+
+FACTOR = float(np.exp(4.0 * LAW_PRIOR))  # of the median reading to the model: four standard deviations of the strut law
+
+
+# Correlation of ln measured with ln modelled below which the readings do not follow the model. Hidden effects that
+# change the stiffness by 30 % leave 0.8 and more, readings of other machines or in another order 0.3 and less.
+FOLLOWS = 0.5
+
+
+NOTHING = 1e-6  # of the model's own variation: less is rounding
+
+
+TELLS = EXPECTED[1]  # sd of ln modelled over the readings from which it is asked: as large as the largest effect
+
+
+FEWEST_FOLLOWING = 6  # readings that differ in what mechanics sees
+
+
+def question(predictor: Predictor) -> str:
+    """Whether these are readings of this machine, with the reason to ask; "" where there is none."""
+    reason = _unlike(predictor)
+    return f"Are these readings of this machine? {reason}." if reason else ""
+
+
+def _unlike(predictor: Predictor) -> str:
+    """In what the readings are unlike the model's, a sentence without its full stop; "" where they may be its own."""
+    tip = predictor.data.tip
+    model, which = predictor.log_stiffness()[tip], np.unique(predictor.distinct[tip], return_inverse=True)[1]
+    residual = np.log(predictor.data.stiffness[tip]) - model
+    if not np.isfinite(residual).all():
+        return ""
+    ratio = float(np.exp(np.median(residual)))
+    if not 1.0 / FACTOR < ratio < FACTOR:
+        times = f"{ratio:.2g} times" if ratio > 1.0 else f"1 / {1.0 / ratio:.2g} of"
+        return f"The median reading is {times} what the model says"
+    count = np.bincount(which)
+    modelled, off = (np.bincount(which, weights=values) / count for values in (model, residual))
+    if len(count) < FEWEST_FOLLOWING or float(modelled.std()) < TELLS:
+        return ""
+    alike = float((modelled + off).std()) <= NOTHING * float(modelled.std())
+    correlation = 0.0 if alike else float(np.corrcoef(modelled, modelled + off)[0, 1])
+    if correlation >= FOLLOWS:
+        return ""
+    return (
+        f"They do not follow the model from pose to pose and direction to direction: the correlation of "
+        f"their logarithms is {correlation:.2f}, of this machine it would be {FOLLOWS:g} or more"
+    )
+
 
 TOO_QUIET = 0.005  # share of simulated campaigns that scatter as little or less
 

@@ -78,16 +78,15 @@ class Drawn:
     @property
     def reason(self) -> str:
         """Why it is confirmed or not, a sentence without its full stop."""
-        form, readings = f"the form of {joined(self.names)} was read off", self.seen + self.new
+        form = f"the form of {joined(self.names)} was read off"
         if not self.new:
             return f"{form} these very readings, and that it fits them says nothing of others"
-        form += f" {self.seen} of these {readings} readings"
+        form += f" {self.seen} of these {self.seen + self.new} readings"
         if np.isnan(self.gain):
             return f"{form}, and the {self.new} others are of fewer than {FEWEST_POINTS} points: too few to confirm it"
-        confirm = "confirm" if self.confirmed else "do not confirm"
         return (
-            f"{form}; the {self.new} others {confirm} it: their log probability, foretold, is {self.gain:.1f} above "
-            f"{self.rival} (more than {CONFIRMS:g} confirms it)"
+            f"{form}; the {self.new} others {'confirm' if self.confirmed else 'do not confirm'} it: their log "
+            f"probability, foretold, is {self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms it)"
         )
 
 

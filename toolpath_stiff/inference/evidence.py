@@ -365,11 +365,8 @@ class Problem:
 
 def split(tables: Sequence[CandidateTable], sizes: FloatArray) -> Iterator[tuple[CandidateTable, FloatArray]]:
     """Each table with its own of the sizes (p,)."""
-    start = 0
-    for table in tables:
-        end = start + len(table.candidate.components)
-        yield table, sizes[start:end]
-        start = end
+    ends = np.cumsum([len(table.candidate.components) for table in tables])
+    return zip(tables, np.split(sizes, ends[:-1]), strict=True)
 
 
 def _just_beyond(component: Component, size: float) -> bool:

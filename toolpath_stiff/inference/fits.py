@@ -176,9 +176,12 @@ STARTS = (0.03, 0.5)
 ROUNDS = 5  # searches for wild readings
 
 
+BEHIND = 30.0  # of log posterior: further behind, no reading taken for wild makes up for it
+
+
 def base_fit(problem: Problem, law_free: bool) -> Fit:
     """The model without any further effect."""
-    return _settled(problem, fit_effects(problem, (), (), (), np.zeros(2), problem.scatter, law_free))[0]
+    return _settled(problem, fit_effects(problem, (), (), (), np.zeros(2), problem.scatter, law_free))
 
 
 def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], law_free: bool) -> Fit:
@@ -196,12 +199,13 @@ def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], l
         Whether the strut law is fitted along.
     """
     tried = [fit for candidate in candidates for fit in _from_starts(problem, before, candidate, law_free)]
-    best, settled = max(tried, key=lambda pair: pair[0].log_posterior)
-    return _without_zeros(best if settled else _settled(problem, best)[0])
+    least = max(fit.log_posterior for fit in tried) - BEHIND
+    settled = [_settled(problem, fit) for fit in tried if fit.log_posterior >= least]
+    return _without_zeros(max(settled, key=lambda fit: fit.log_posterior))
 
 
-def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: bool) -> Iterator[tuple[Fit, bool]]:
-    """The fits that a candidate comes to from its starts, and whether each is settled already."""
+def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: bool) -> Iterator[Fit]:
+    """The fits that a candidate comes to from its starts."""
     together = (*before.candidates, candidate)
     free = tuple(range(sum(len(c.components) for c in together)))
     seen: list[FloatArray] = []
@@ -209,15 +213,11 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
         start = np.array([_start(component, share) for component in candidate.components])
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
         x = np.concatenate([fit.law, *fit.sizes])
-        scale = _last_equations(fit).scale
+        scale = normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter.precision, prior_of(law_free)).scale
         # Two starts mostly end in one place, and go on from there alike.
         if not any((np.abs(x - other) < TOLERANCE * (1.0 / scale)).all() for other in seen):
-            yield _settled(problem, fit, nearly=True)
+            yield fit
         seen.append(x)
-
-
-def _last_equations(fit: Fit) -> NormalEquations:
-    return normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter.precision, prior_of(fit.law_free))
 
 
 def _start(component: Component, share: float) -> float:
@@ -227,34 +227,16 @@ def _start(component: Component, share: float) -> float:
     return sign * min(share * (known if np.isfinite(known) else 1.0), reach)
 
 
-def _settled(problem: Problem, fit: Fit, nearly: bool = False) -> tuple[Fit, bool]:
-    """The fit with the readings taken for wild that it finds wild itself, continued where it was still moving; True.
-
-    `nearly`: or False, and the fit from which it has one step to go that would not show. That step moves a likelihood
-    by less than 1e-6: only the likeliest of several fits needs to make it.
-    """
+def _settled(problem: Problem, fit: Fit) -> Fit:
+    """The fit with the readings taken for wild that it finds wild itself, continued where it was still moving."""
     for _ in range(ROUNDS):
         scatter = problem.scatter.with_wild(fit.residual, known=fit.scatter)
-        if nearly and scatter is fit.scatter and _gain_to_come(problem, fit) < TOLERANCE**2:
-            return fit, False
         again = fit_effects(problem, fit.candidates, fit.sizes, fit.free, fit.law, scatter, fit.law_free)
         done = set(scatter.wild) == set(fit.scatter.wild) and again.log_posterior < fit.log_posterior + 1e-4
         fit = again
         if done:
             break
-    return fit, True
-
-
-def _gain_to_come(problem: Problem, fit: Fit) -> float:
-    """Twice what one more step adds to the log posterior; sizes that it pulls beyond their bounds stay there."""
-    last = _last_equations(fit)
-    model, x, gradient = (
-        _Model(problem, fit.candidates, fit.law_free),
-        np.concatenate([fit.law, *fit.sizes]),
-        last.gradient,
-    )
-    kept = ~((x <= model.low) & (gradient <= 0.0) | (x >= model.high) & (gradient >= 0.0))
-    return float(gradient[kept] @ scaled_inverse(last.information[np.ix_(kept, kept)]) @ gradient[kept])
+    return fit
 
 
 def _without_zeros(fit: Fit) -> Fit:

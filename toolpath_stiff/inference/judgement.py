@@ -34,16 +34,15 @@ from math import comb
 import numpy as np
 
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
-from toolpath_stiff.inference.doubts import noise_doubt
+from toolpath_stiff.inference.doubts import noise_doubt, question
 from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
+from toolpath_stiff.inference.hidden_sizes import Unexcluded, not_excluded
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.inference.several import Combination, search_pairs, search_triples
-from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
 from toolpath_stiff.stiffness.contract import Effect
 
 NONE = "none"
@@ -161,10 +160,6 @@ class Judgement:
             if name == NONE or name in self.fits:
                 return self.fits.get(name, self.base)
         return max(self.fits.values(), key=lambda fit: fit.log_posterior, default=self.base)
-
-    def family(self, name: str) -> Family:
-        """The family of an effect."""
-        return next(family for family in self.families if family.name == name)
 
 
 def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) -> Judgement:

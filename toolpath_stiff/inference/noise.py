@@ -169,14 +169,14 @@ def _noise_of_tip(
 ) -> tuple[Noise, ...]:
     n, copies = len(data), copied(data)
     repeats = None if copies else from_repeats(data)
+    wild = OUTLIERS if repeats is None else repeats.wild
 
     def model(
         name: str, repeat: float | FloatArray, clamping: float, freedom: float, origin: str, remark: str = ""
     ) -> Noise:
-        wild, every = OUTLIERS if repeats is None else repeats.wild, np.full(n, repeat)
-        if every.min() < LEAST:
+        every = np.maximum(np.full(n, repeat), LEAST)
+        if np.min(repeat) < LEAST:
             origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
-        every = np.maximum(every, LEAST)
         return Noise(name, every, clamping, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark)
 
     remark = ""
@@ -206,16 +206,15 @@ def _noise_of_tip(
         stating, clamping = _parts(relative[rows])
         repeat = np.full(n, np.sqrt(np.mean(stating**2)))
         repeat[rows] = stating
-        origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of "
-        origin += f"which {100 * clamping:.2g} % is assumed to be clamping"
+        origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of which {100 * clamping:.2g} % is "
+        origin += "assumed to be clamping"
         if not rows.all():
             origin += f"; {n - int(rows.sum())} readings do not state it and are assumed to scatter as the others do"
         return (model("stated", repeat, clamping, STATED_FREEDOM, origin),)
     why = "the repeats agree exactly, as copies do" if copies else "the data hold neither repeats nor sd_N_per_mm"
-    shared = {name: _shared(guess) for name, guess in GUESSES.items()}
     return tuple(
-        model(name, *both, GUESSED_FREEDOM, f"a {name} guess, {_percent(*both)}: {why}")
-        for name, both in shared.items()
+        model(name, *_shared(guess), GUESSED_FREEDOM, f"a {name} guess, {_percent(*_shared(guess))}: {why}")
+        for name, guess in GUESSES.items()
     )
 
 
@@ -257,7 +256,7 @@ def _percent(repeat: float, clamping: float) -> str:
 def covariance(noise: Noise, predictor: Predictor) -> Covariance:
     """Of ln readings."""
     struts = noise.strut_spread * predictor.strut_columns()
-    shifted = noise.joint_error * predictor.joint_columns()
+    shifted = noise.joint_error * predictor.joint_columns
     shared = np.ascontiguousarray(np.concatenate([struts, shifted], axis=1).T)
     return Covariance(noise.repeat**2, Groups.by(predictor.data.clamp), noise.clamping**2, shared)
 
@@ -344,5 +343,4 @@ class Scatter:
 
     def log_likelihood(self, residual: FloatArray) -> FloatArray:
         """(...,) of residuals (..., n), the price of wild readings included, without the constant n ln(2 pi) / 2."""
-        squared = self.precision.squares(residual)
-        return np.asarray(-0.5 * (squared + self.covariance.log_determinant) - len(self.wild) * self.price)
+        return np.asarray(-0.5 * self.precision.squares(residual) + self.log_price)

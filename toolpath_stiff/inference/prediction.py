@@ -99,9 +99,6 @@ class Predictor:
         self.tables: dict[tuple[Any, ...], Any] = {}
         self._answers: dict[tuple[Any, ...], FloatArray] = {}
 
-    def __len__(self) -> int:
-        return len(self.data)
-
     @property
     def distinct(self) -> NDArray[np.int64]:
         """(n,) number of what mechanics sees of each reading: repeats share it."""
@@ -135,7 +132,7 @@ class Predictor:
         try:
             stiffness = self._mechanics(model, prepared)[prepared.which]
         except InputError:  # no pose, or no stiffness left: a fit walks away from there
-            return np.full(len(self), np.nan)
+            return np.full(len(self.data), np.nan)
         if model.instruments:
             path = replace(self.full_path, machine=model.machine)
             for active in model.instruments:
@@ -225,15 +222,12 @@ class Predictor:
         """(6, m) squared strut forces per unit load; of loops beside the tip, products of real and virtual ones."""
         return np.ascontiguousarray(self._timeless.products.T)
 
+    @cached_property
     def joint_columns(self) -> FloatArray:
         """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
 
-        The platform stands where struts of the commanded lengths put the true joints. Worked out once.
+        The platform stands where struts of the commanded lengths put the true joints.
         """
-        return self._joint_columns
-
-    @cached_property
-    def _joint_columns(self) -> FloatArray:
         columns, prepared, given = [], self._timeless, self.base.machine
         for name in ("frame_joints", "platform_joints"):
             for strut, axis in np.ndindex(6, 3):

@@ -51,6 +51,10 @@ STRAIGHT = 0.999  # correlation of what an effect adds at two sizes above which 
 BLOCK = 4000  # sets that are searched side by side
 
 
+# Of the linear search: indices of tables, sizes (one array a table), log evidence above that of no effect, about.
+TableSet = tuple[tuple[int, ...], tuple[FloatArray, ...], float]
+
+
 @dataclass(frozen=True)
 class Combination:
     """Two or three effects together."""
@@ -63,25 +67,6 @@ class Combination:
     def name(self) -> str:
         """The effects: "a + b"."""
         return " + ".join(self.names)
-
-
-@dataclass(frozen=True)
-class TableSet:
-    """Tables that go together in the linear search.
-
-    Attributes
-    ----------
-    tables
-        Their indices.
-    sizes
-        One array a table.
-    score
-        Approximate log evidence above that of no effect.
-    """
-
-    tables: tuple[int, ...]
-    sizes: tuple[FloatArray, ...]
-    score: float
 
 
 def search_pairs(problem: Problem, families: Sequence[Family], base: Fit) -> tuple[list[Combination], LinearSearch]:
@@ -98,15 +83,15 @@ def search_triples(search: LinearSearch, only_better: bool = False) -> list[Comb
 
     `only_better`: those that the linear search finds likelier than every pair; a pair explains the readings already.
     """
-    least = search.ranked[0].score if only_better and search.ranked else -np.inf
+    least = search.ranked[0][2] if only_better and search.ranked else -np.inf
     triples = {
-        tuple(sorted((*pair.tables, k)))
-        for pair in search.ranked[:SEEDS]
+        tuple(sorted((*pair, k)))
+        for pair, *_ in search.ranked[:SEEDS]
         for k in range(len(search.tables))
-        if search.owner[k] not in {search.owner[i] for i in pair.tables}
+        if search.owner[k] not in {search.owner[i] for i in pair}
     }
     search.search(np.array(sorted(triples), dtype=np.int64).reshape(-1, 3))
-    return search.scored([triple for triple in search.ranked if triple.score > least])
+    return search.scored([triple for triple in search.ranked if triple[2] > least])
 
 
 class LinearSearch:
@@ -162,7 +147,7 @@ class LinearSearch:
             solved = scatter.precision.beside(law.T, prior).times(flat)
             self.ranked = self._ranked(sets, solved @ flat.T, solved @ residual)
             left = residual.copy()
-            for table, sizes in zip(self.ranked[0].tables, self.ranked[0].sizes, strict=True):
+            for table, sizes in zip(*self.ranked[0][:2], strict=True):
                 left -= sizes @ self.columns[table, : len(sizes)]
             weighted = scatter.precision.times(law.T)
             left -= law @ np.linalg.solve(weighted @ law + prior, weighted @ left)
@@ -181,11 +166,11 @@ class LinearSearch:
             sizes, scores = self._bounded(rows, information, pull)
             for k in np.argsort(-scores, kind="stable").tolist():
                 names = tuple(sorted(self.owner[t] for t in part[k]))
-                if names not in best or best[names].score < scores[k]:
+                if names not in best or best[names][2] < scores[k]:
                     each = zip(part[k].tolist(), np.split(sizes[k], part.shape[1]), strict=True)
                     cut = tuple(x[: self.tables[t].columns.shape[1]].copy() for t, x in each)
-                    best[names] = TableSet(tuple(part[k].tolist()), cut, float(scores[k]))
-        return sorted(best.values(), key=lambda tables: (-tables.score, tables.tables))
+                    best[names] = tuple(part[k].tolist()), cut, float(scores[k])
+        return sorted(best.values(), key=lambda ranked: (-ranked[2], ranked[0]))
 
     def _bounded(self, rows: IntArray, information: FloatArray, pull: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Sizes (k, q) within their bounds that gain most, and scores (k,), of sets of columns (k, q)."""
@@ -220,22 +205,24 @@ class LinearSearch:
     def scored(self, sets: Sequence[TableSet]) -> list[Combination]:
         """The first of what the search found, fitted on tables; the most likely first."""
         combinations = []
-        for tables in sets[:SCORED]:
-            fit = self._likeliest_subset(*self._side_by_side(tables)) if np.isfinite(tables.score) else None
+        for tables, sizes, score in sets[:SCORED]:
+            fit = self._likeliest_subset(*self._side_by_side(tables, sizes)) if np.isfinite(score) else None
             if fit is None:
                 continue
-            names = tuple(self.owner[t] for t in tables.tables)
+            names = tuple(self.owner[t] for t in tables)
             evidence = fit.log_evidence - sum(np.log(self.choices[name]) for name in names)
             combinations.append(Combination(tuple(sorted(names)), fit, float(evidence)))
         return sorted(combinations, key=lambda combination: (-combination.log_evidence, combination.names))
 
-    def _side_by_side(self, chosen: TableSet) -> tuple[list[CandidateTable], FloatArray]:
+    def _side_by_side(
+        self, chosen: Sequence[int], sizes_of: Sequence[FloatArray]
+    ) -> tuple[list[CandidateTable], FloatArray]:
         """Tables that may be added up, with their sizes: an instrument's acts on what the others before it have added.
 
         Sizes are held to 0.9 of their bounds: at a bound the model may have no answer.
         """
         known: list[tuple[CandidateTable, FloatArray]] = []
-        parts = [(self.tables[t], sizes) for t, sizes in zip(chosen.tables, chosen.sizes, strict=True)]
+        parts = [(self.tables[t], sizes) for t, sizes in zip(chosen, sizes_of, strict=True)]
         for table, sizes in sorted(parts, key=lambda part: part[0].candidate.effect.is_instrument):
             bounds = np.array([component.bounds for component in table.candidate.components])
             beside = [other.candidate.active(held) for other, held in known]

@@ -44,11 +44,8 @@ NEAR = 3.0  # standard deviations within which the mended rows must lie, root me
 STEPS_MM, STEPS_DEG = (10.0,), (1.0, 5.0)
 
 
-LBF_PER_IN = 25.4 / 4.4482216152605  # of 1 N/mm; the inch is 25.4 mm, the pound-force 4.448... N, both exactly
-
-
-# What a stiffness may have been written in -> written over true.
-UNITS = {"lbf/in": LBF_PER_IN, "N/um": 1e-3}
+# What a stiffness may have been written in -> written over true; an inch is 25.4 mm, a pound-force 4.448... N.
+UNITS = {"lbf/in": 25.4 / 4.4482216152605, "N/um": 1e-3}
 
 
 TINY = 1e-9
@@ -60,16 +57,13 @@ SET_ASIDE = 1e2  # variance of ln k of a row that is left out
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
 
-COORDINATES, ANGLES = ("x_mm", "y_mm", "z_mm"), ("a_deg", "b_deg", "c_deg")
-
-
 MENDED = ("position", "angles", "direction")  # columns of the readings that a slip may change
 
 
-# Columns, field of the readings, usual slips, SI value of its unit, and that unit.
+# Columns, field of the readings, usual slips, SI value of their unit.
 POSE_STEPS = (
-    (COORDINATES, "position", STEPS_MM, float(m_from_mm(1.0)), "mm"),
-    (ANGLES, "angles", STEPS_DEG, float(rad_from_deg(1.0)), "deg"),
+    (("x_mm", "y_mm", "z_mm"), "position", STEPS_MM, float(m_from_mm(1.0))),
+    (("a_deg", "b_deg", "c_deg"), "angles", STEPS_DEG, float(rad_from_deg(1.0))),
 )
 
 
@@ -164,16 +158,13 @@ def suspect_entries(
     """Suspects for a document; `left_out`: those that were left out of the judgement, None where there was none."""
     entries = []
     for suspect in suspects:
-        slip, several, out = suspect.slip, len(suspect.rows) > 1, left_out is not None and suspect in left_out
+        slip, words = suspect.slip, suspect.words
+        out = left_out is not None and suspect in left_out
+        if left_out is not None:
+            missing = "kept: it may as well be what is missing from the model that stands out there"
+            kept = missing if suspect.clear else "kept, for it may be chance"
+            words += f"; {'left out of the judgement' if out else kept}"
         rows = [int((data.file[: row + 1] == data.file[row]).sum()) for row in suspect.rows]
-        words = suspect.words
-        if out:
-            words += f"; {'they were' if several else 'it was'} left out of the judgement"
-        elif left_out is not None and not suspect.clear:
-            words += "; kept all the same, for it may be chance"
-        elif left_out is not None:
-            where = "them" if several else "it"
-            words += "; kept all the same: it may as well be what is missing from the model that stands out in " + where
         file, lines = str(data.file[slip.rows[0]]), data.line[slip.rows].tolist()
         entries.append(SuspectEntry(file, rows[0], rows, lines, slip.column, slip.stands, slip.meant, words, out))
     return entries
@@ -216,10 +207,9 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
 def _words(data: Readings, ways: Sequence[Slip]) -> str:
     """Where rows are, and what may be wrong with them."""
     rows = ways[0].rows
-    lines = f"line{'s' if len(rows) > 1 else ''} {', '.join(str(line) for line in data.line[rows])}"
     either = " or ".join(f"{way.column} {way.meant} instead of {way.stands}" for way in ways)
-    looks = f"look{'' if len(rows) > 1 else 's'} mistyped"
-    return f"{lines} of {data.file[rows[0]]} {looks}: {either} would fit all other readings"
+    lines = ", ".join(str(line) for line in data.line[rows])
+    return f"line {lines} of {data.file[rows[0]]} may be mistyped: {either} would fit all other readings"
 
 
 def _tried(data: Readings) -> int:
@@ -279,7 +269,7 @@ def _slips_of_row(data: Readings, row: Rows) -> Iterator[Slip]:
 
 def _slips_of_pose(data: Readings, rows: Rows) -> Iterator[Slip]:
     """A coordinate or an angle with the wrong sign, or off by a usual slip; the same in all rows."""
-    for names, field, steps, si, _ in POSE_STEPS:
+    for names, field, steps, si in POSE_STEPS:
         values = getattr(data, field)[rows]
         for k, name in enumerate(names):
             if float(np.ptp(values[:, k])) > TINY:

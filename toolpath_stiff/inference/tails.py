@@ -1,6 +1,6 @@
-"""Tails of the normal and of the chi-square distribution.
+"""The tail of the chi-square distribution.
 
-SciPy has both, but loading it takes longer than all the tests of a diagnosis.
+SciPy has it, but loading it takes longer than all the tests of a diagnosis.
 """
 
 from __future__ import annotations
@@ -21,11 +21,6 @@ TOGETHER = 8  # terms between two looks at who needs more
 
 
 LEAST = 1e-300
-
-
-def normal_below(x: float) -> float:
-    """P(X < x) of a standard normal variable."""
-    return 0.5 * math.erfc(-x / math.sqrt(2.0))
 
 
 def surprise(value: FloatArray, freedom: FloatArray) -> FloatArray:

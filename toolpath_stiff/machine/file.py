@@ -16,6 +16,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, MachineFileError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
@@ -150,7 +151,7 @@ def _check_neutral_pose(toml: MachineToml, machine: Hexapod) -> None:
         raise toml.fault("limits.joint_angle", "neutral_pose_mm_deg", mistake, expected, hint)
 
 
-def _joints(toml: MachineToml, section: str, values: dict[str, Any]) -> FloatArray:
+def _joints(toml: MachineToml, section: str, values: Document) -> FloatArray:
     """(6, 3) m from whichever of the two forms is given."""
     cartesian, cylindrical = (values.get(key) for key in ("mm", "cylindrical_mm_deg"))
     if (cartesian is None) == (cylindrical is None):
@@ -163,7 +164,7 @@ def _joints(toml: MachineToml, section: str, values: dict[str, Any]) -> FloatArr
     return m_from_mm(np.asarray(cartesian))
 
 
-def _strut_law(toml: MachineToml, values: dict[str, Any], travel: dict[str, Any]) -> StrutLaw:
+def _strut_law(toml: MachineToml, values: Document, travel: Document) -> StrutLaw:
     """Linear by two lengths, a table by more, constant by one stiffness without a length."""
 
     def fault(key: str, mistake: str, expected: str) -> InputError:
@@ -182,17 +183,13 @@ def _strut_law(toml: MachineToml, values: dict[str, Any], travel: dict[str, Any]
         mistake = f": {len(stiffnesses)} stiffnesses, but {len(lengths)} lengths"
         raise fault("stiffness_N_per_um", mistake, f"{len(lengths)} numbers, one for each length")
     lengths = m_from_mm(lengths)
+    steps = np.diff(lengths) if len(lengths) > 2 else np.abs(np.diff(lengths))
+    if (steps < CLOSEST_LENGTHS).any():
+        before, after = mm_from_m(lengths[int(np.argmin(steps)) :][:2]).tolist()
+        expected = "lengths 0.001 mm apart or more, those of a table rising"
+        raise fault("length_mm", f": {after:g} comes after {before:g}", expected)
     if len(lengths) > 2:
-        bad = np.flatnonzero(np.diff(lengths) < CLOSEST_LENGTHS)
-        if len(bad):
-            before, after = (float(mm_from_m(v)) for v in lengths[bad[0] : bad[0] + 2])
-            mistake = f": {after:g} comes after {before:g} (number {bad[0] + 2})"
-            raise fault("length_mm", mistake, "lengths of a table rising, 0.001 mm apart or more")
         return StrutLaw.table(lengths, stiffnesses)
-    if lengths[0] == lengths[1]:
-        raise fault("length_mm", ": both lengths are equal", "two lengths apart")
-    if abs(lengths[1] - lengths[0]) < CLOSEST_LENGTHS:
-        raise fault("length_mm", ": the lengths are all but equal", "two lengths 0.001 mm apart")
     return StrutLaw(float(lengths[0]), float(stiffnesses[0]), float(lengths[1]), float(stiffnesses[1]))
 
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
 
@@ -199,8 +200,8 @@ class EffectEntry:
     """
 
     name: str
-    parameters: Mapping[str, Any]
-    provenance: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Document
+    provenance: Document = field(default_factory=dict)
     file: str = field(default="", compare=False)
     lines: Mapping[str, int] = field(default_factory=dict, compare=False)
 

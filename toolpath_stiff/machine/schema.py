@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, MachineFileError
 from toolpath_stiff.machine.model import ORIGINS
 from toolpath_stiff.toml_reader import TomlReader, is_number, is_text, shortened
@@ -103,12 +104,13 @@ SECTIONS: dict[str, dict[str, Key]] = {
 OPTIONAL_SECTIONS = ("limits.joint_angle", "limits.workspace", "limits.singularity", "platform", "setup")
 BESIDE = ("effect", "instrument", "uncertainty")  # sections that others read
 
-Sections = dict[str, dict[str, Any]]  # section -> key -> value in the units of the file; lists as arrays
+Sections = dict[str, Document]  # section -> key -> value in the units of the file; lists as arrays
 
 
 def read_sections(toml: MachineToml) -> Sections:
     """The sections of the schema, each key checked; unknown and missing ones are errors."""
-    sections: Sections = {"": {}}
+    top: dict[str, object] = {}
+    sections: Sections = {"": top}
     for name, content in toml.data.items():
         nested = name == "limits" and isinstance(content, dict)
         for full, part in ((f"limits.{key}", part) for key, part in content.items()) if nested else [(name, content)]:
@@ -121,11 +123,10 @@ def read_sections(toml: MachineToml) -> Sections:
             elif nested or isinstance(part, dict):
                 known = ", ".join(f"[{section}]" for section in SECTIONS if section)
                 expected = f"one of {known}, [[effect]], [[instrument]], [uncertainty]"
-                raise MachineFileError(
-                    f"unknown section [{full}]", expected=expected, file=toml.file, line=toml.line_at(full)
-                )
+                line = toml.line_at(full)
+                raise MachineFileError(f"unknown section [{full}]", expected=expected, file=toml.file, line=line)
             else:
-                sections[""][full] = part
+                top[full] = part
     for name in SECTIONS:
         if name not in sections and name not in OPTIONAL_SECTIONS:
             hint = "`tps machine new template.toml` writes a template with every section"
@@ -133,7 +134,7 @@ def read_sections(toml: MachineToml) -> Sections:
     return {name: _section(toml, name, content) for name, content in sections.items()}
 
 
-def _section(toml: MachineToml, name: str, content: dict[str, Any]) -> dict[str, Any]:
+def _section(toml: MachineToml, name: str, content: Document) -> Document:
     keys = SECTIONS[name]
     allowed = [*keys, *(("origin", "remark") if name else ())]
     for key in content:

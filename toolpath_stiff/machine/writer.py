@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m, pose_in_mm
 
@@ -46,7 +47,7 @@ def machine_toml(machine: Hexapod, preamble: str = "") -> str:
     lengths = [mm_from_m(length) for length, _ in law.points]
     shortest, longest = mm_from_m(np.array(limits.strut_length))
     conditions = {"name": machine.setup, "names": machine.setups or None, "temperature_C": machine.temperature}
-    sections: dict[str, dict[str, Any]] = {
+    sections: dict[str, Document] = {
         "frame_joints": {"mm": mm_from_m(machine.frame_joints)},
         "platform_joints": {"mm": mm_from_m(machine.platform_joints)},
         "reference_tool": {"length_mm": mm_from_m(machine.reference_tool_length)},
@@ -89,7 +90,7 @@ def machine_toml(machine: Hexapod, preamble: str = "") -> str:
     return "\n".join([*lines, ""])
 
 
-def _rows(values: Mapping[str, Any]) -> list[str]:
+def _rows(values: Document) -> list[str]:
     return [f"{key} = {value_text(value)}" for key, value in values.items()]
 
 

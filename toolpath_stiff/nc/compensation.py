@@ -19,6 +19,7 @@ import math
 from dataclasses import dataclass, field
 
 from toolpath_stiff.nc.geometry import ArcError, Point2
+from toolpath_stiff.nc.moves import Move
 
 CORNER = 0.05  # rad; less than this is no corner (LinuxCNC's TOLERANCE_CONCAVE_CORNER)
 SHORTENED = 1e-3  # rad by which a shortened arc may seem longer than before
@@ -53,14 +54,13 @@ class OffsetArc:
 class Pending:
     """A move of the tool centre whose end the next corner may still move back.
 
-    `end`: program coordinates (6); `direction` as programmed, in the plane; `row`: its place in the recorder's lists,
-    -1 if it has none.
+    `end`: program coordinates (6); `direction` as programmed, in the plane; `move`: recorded, None if it goes nowhere.
     """
 
     end: list[float]
     direction: Point2
     arc: OffsetArc | None
-    row: int
+    move: Move | None
 
 
 @dataclass

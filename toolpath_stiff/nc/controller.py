@@ -14,26 +14,19 @@ belong to one). LinuxCNC's own parameter file (.var) and tool table (.tbl) are r
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.kinematics import PostedKinematics, read_kinematics
 from toolpath_stiff.nc.tables import (
-    HOMES,
-    LARGEST_MM,
     LARGEST_WORD,
-    WORK_OFFSETS,
     Offsets,
     ToolEntry,
-    additional_offset,
-    is_offset,
+    offsets_of,
     read_offsets,
     read_tool_table,
-    set_offset,
+    tools_of,
 )
 from toolpath_stiff.toml_reader import TomlReader, is_text
 
@@ -154,7 +147,6 @@ def dialect_named(name: str) -> Dialect:
 
 
 ALL_SWITCHES = frozenset(range(1, 10))
-TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "material", "remark")
 KEYS = (
     "dialect",
     "block_delete",
@@ -167,7 +159,6 @@ KEYS = (
     "feed_mm_per_min",
     "subprograms",
 )
-G70_UNITS, G20_UNITS = "G70 G71", "G20 G21"
 
 
 @dataclass(frozen=True)
@@ -277,55 +268,35 @@ def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
 
 def _controller(toml: TomlReader, dialect: str | None) -> Controller:
     toml.only("", toml.data, KEYS)
+    given = toml.data
+
+    def choice(key: str, *choices: str) -> str:
+        return toml.choice(key, given.get(key, choices[0]), choices, " or ".join(choices))
+
+    name = choice("dialect", *DIALECTS)
+    base = dialect_named(dialect or name)
+    absolute = choice("arc_centers", "incremental", "absolute") == "absolute"
+    by_g70 = choice("inch_metric", "G20 G21", "G70 G71") == "G70 G71"
+    setup, feed, folder = given.get("setup"), given.get("feed_mm_per_min"), given.get("subprograms")
+    if setup is not None and not is_text(setup):
+        raise toml.error(f"setup = {setup!r}", "the name of a set-up", where="setup")
+    if feed is not None and not toml.number("feed_mm_per_min", feed, LARGEST_WORD) > 0.0:
+        raise toml.error(f"feed_mm_per_min = {feed:g}", "more than 0", where="feed_mm_per_min")
+    if folder is not None:
+        beside = Path(toml.file).parent / folder if is_text(folder) else None
+        if beside is None or not beside.is_dir():
+            raise toml.error(f"subprograms = {folder!r}", "a folder beside this file", where="subprograms")
+        folder = str(beside)
     return Controller(
-        _dialect(toml, dialect),
+        replace(base, arc_absolute=base.arc_absolute or absolute, inch_metric=base.inch_metric or by_g70),
         _switches(toml),
-        _offsets(toml),
-        _tools(toml),
+        offsets_of(toml),
+        tools_of(toml),
         read_kinematics(toml),
-        _setup(toml),
-        _feed(toml),
-        _subprograms(toml),
+        setup,
+        feed,
+        folder,
     )
-
-
-def _dialect(toml: TomlReader, override: str | None) -> Dialect:
-    name = _choice(toml, "dialect", tuple(DIALECTS), "generic")
-    dialect = dialect_named(override or name)
-    absolute = _choice(toml, "arc_centers", ("incremental", "absolute"), "incremental") == "absolute"
-    by_g70 = _choice(toml, "inch_metric", (G70_UNITS, G20_UNITS), G20_UNITS) == G70_UNITS
-    return replace(dialect, arc_absolute=dialect.arc_absolute or absolute, inch_metric=dialect.inch_metric or by_g70)
-
-
-def _choice(toml: TomlReader, key: str, choices: tuple[str, ...], otherwise: str) -> str:
-    return toml.choice(key, toml.data.get(key, otherwise), choices, " or ".join(choices))
-
-
-def _setup(toml: TomlReader) -> str | None:
-    value = toml.data.get("setup")
-    if value is not None and not is_text(value):
-        raise toml.error(f"setup = {value!r}", "the name of a set-up", where="setup")
-    return value
-
-
-def _feed(toml: TomlReader) -> float | None:
-    if "feed_mm_per_min" not in toml.data:
-        return None
-    value = toml.number("feed_mm_per_min", toml.data["feed_mm_per_min"], LARGEST_WORD)
-    if value <= 0.0:
-        raise toml.error(f"feed_mm_per_min = {value:g}", "more than 0", where="feed_mm_per_min")
-    return value
-
-
-def _subprograms(toml: TomlReader) -> str | None:
-    """The folder, as a path beside the controller file."""
-    value = toml.data.get("subprograms")
-    if value is None:
-        return None
-    folder = Path(toml.file).parent / value if is_text(value) else None
-    if folder is None or not folder.is_dir():
-        raise toml.error(f"subprograms = {value!r}", "a folder beside this file", where="subprograms")
-    return str(folder)
 
 
 def _switches(toml: TomlReader) -> frozenset[int]:
@@ -336,62 +307,3 @@ def _switches(toml: TomlReader) -> frozenset[int]:
         return frozenset(value)
     expected = "true, false, or a list of switches 1 to 9"
     raise toml.error(f"block_delete = {value!r}", expected, where="block_delete")
-
-
-def _offsets(toml: TomlReader) -> Offsets | None:
-    given = toml.data.get("offsets")
-    if given is None:
-        return None
-    if isinstance(given, str):
-        return read_offsets(Path(toml.file).parent / given)
-    table = toml.table("offsets", given, "a table G54 = [x, y, z, a, b, c, r], or the name of a file")
-    offsets = Offsets()
-    for name, values in table.items():
-        where, most = f"offsets.{name}", 6 if name in HOMES else 7
-        if additional_offset(name) in offsets.additional:
-            problem = f"offsets.{name!r} is there twice: G54.1 and G154 name the same offsets"
-            raise toml.error(problem, where=where)
-        if not is_offset(name):
-            expected = f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)'
-            raise toml.error(f"{where} is not an offset", expected, where=where)
-        if not isinstance(values, list) or not 1 <= len(values) <= most:
-            raise toml.error(f"{where} = {values!r}", f"1 to {most} numbers: x, y, z, a, b, c, r", where=where)
-        set_offset(offsets, name, [toml.number(where, value, LARGEST_MM) for value in values])
-    return offsets
-
-
-def _tools(toml: TomlReader) -> dict[int, ToolEntry] | None:
-    given = toml.data.get("tools")
-    if given is None:
-        return None
-    if isinstance(given, str):
-        return read_tool_table(Path(toml.file).parent / given)
-    if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
-        expected = "[[tools]] with number, length_mm, ..., or the name of a file"
-        raise toml.error("tools is not a list of tables", expected, where="tools")
-    tools: dict[int, ToolEntry] = {}
-    for place, tool in enumerate(given, 1):
-        entry = _tool(toml, f"tools[{place}]", tool)
-        if entry.number in tools:
-            problem = f"tools[{place}]: tool {entry.number} appears twice"
-            raise toml.error(problem, where=f"tools[{place}].number")
-        tools[entry.number] = entry
-    return tools
-
-
-def _tool(toml: TomlReader, where: str, tool: Mapping[str, Any]) -> ToolEntry:
-    toml.only(where, tool, TOOL_KEYS)
-    number = tool.get("number")
-    if type(number) is not int or number < 0:
-        raise toml.error(f"{where}.number = {number!r}", "a whole number", where=f"{where}.number")
-    lengths = [
-        toml.number(f"{where}.{key}", tool[key], LARGEST_MM) if key in tool else math.nan
-        for key in ("length_mm", "diameter_mm", "stick_out_mm")
-    ]
-    for key, value in zip(("diameter_mm", "stick_out_mm"), lengths[1:], strict=True):
-        if value <= 0.0:
-            raise toml.error(f"{where}.{key} = {value:g}", "more than 0", where=f"{where}.{key}")
-    texts = [tool.get(key, "") for key in ("remark", "material")]
-    if not all(isinstance(text, str) for text in texts):
-        raise toml.error(f"{where}: remark and material are texts", where=where)
-    return ToolEntry(number, lengths[0], lengths[1], texts[0], lengths[2], texts[1])

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes.registry import would_change
 from toolpath_stiff.nc.moves import ReadProgram, Unsupported
 from toolpath_stiff.nc.state import START
 
@@ -90,18 +89,15 @@ def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def finding_of(error: InputError) -> Finding:
-    """What could not be read, and what it would change."""
+    """What could not be read."""
     text = error.found + (f"; expected {error.expected}" if error.expected else "")
-    changes = would_change(error.found)
-    text += f"; it would change {changes}" if changes else ""
     text += f". {error.hint[0].upper()}{error.hint[1:]}" if error.hint else ""
     return Finding(error.line or 0, error.column or 0, "not read", text, ERROR)
 
 
 def finding_of_unsupported(word: Unsupported) -> Finding:
-    """What was read and not acted upon, and what it would change."""
-    text = f"{word.reason}; it would change {would_change(word.word, listed=True) or NO_CHANGE}"
-    return Finding(word.line, word.column, word.word, text, NOTE)
+    """What was read and not acted upon."""
+    return Finding(word.line, word.column, word.word, word.reason, NOTE)
 
 
 def line_in(text: str) -> int:

@@ -20,10 +20,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-
 Numbers = TypeVar("Numbers", float, "NDArray[np.float64]")
-
-
+STILL = 1e-12  # of a coordinate, or of 1 mm if that is more: what frames' sums leave of an axis that stands
 Rotation = tuple[float, float, float]  # of G68: centre X, Y in program coordinates, angle in degrees
 
 
@@ -108,10 +106,6 @@ class Frames:
         """`to_program` of one axis of many points at once, where nothing is rotated."""
         return shifted_back(control, self.g92[axis], self.offsets.at(self.active).axes[axis])
 
-    def axis_to_setup(self, axis: int, control: Numbers) -> Numbers:
-        """`to_setup` of one axis of many points at once."""
-        return control - self.fix_reference()[axis] if axis < 3 else control
-
     @property
     def rotated(self) -> bool:
         """Whether a work offset or G68 turns the program's X and Y."""
@@ -151,6 +145,11 @@ class Frames:
         reference = self.fix_reference()
         return [*(c - r for c, r in zip(control[:3], reference, strict=True)), *control[3:]]
 
+    def from_setup(self, setup: list[float]) -> list[float]:
+        """Control coordinates of a point in set-up coordinates."""
+        reference = self.fix_reference()
+        return [*(s + r for s, r in zip(setup[:3], reference, strict=True)), *setup[3:]]
+
     def machine_position(self) -> list[float]:
         """The spindle's place in machine coordinates, as a control shows it: without the tool length in force."""
         point = self.to_setup(self.position)
@@ -161,17 +160,22 @@ class Frames:
 
     def control_of_machine(self, machine: list[float]) -> list[float]:
         """Control coordinates of a point in machine coordinates."""
-        origin, reference = self.origin, self.fix_reference()
-        shifted = [m - o for m, o in zip(machine[:3], origin[:3], strict=True)]
-        matrix = _matrix(origin)
-        back = _rotate([[matrix[j][i] for j in range(3)] for i in range(3)], shifted)
-        x, y, z = (b + r for b, r in zip(back, reference, strict=True))
-        return [x, y, z - self.tool, *machine[3:]]
+        origin = self.origin
+        moved = [m - o for m, o in zip(machine[:3], origin[:3], strict=True)]
+        transposed = [list(column) for column in zip(*_matrix(origin), strict=True)]
+        control = self.from_setup([*_rotate(transposed, moved), *machine[3:]])
+        control[2] -= self.tool
+        return control
 
     def set_tool(self, length: float) -> None:
         """Another tool length: the machine stands still, the controlled point's numbers change."""
         self.position[2] += self.tool - length
         self.tool = length
+
+
+def standing(start: list[float], end: list[float]) -> list[float]:
+    """The end, with the numbers of the start where an axis stands but for rounding."""
+    return [s if abs(e - s) < STILL * max(1.0, abs(s)) else e for s, e in zip(start, end, strict=True)]
 
 
 def shifted(program: Numbers, shift: float, offset: float) -> Numbers:

@@ -1,19 +1,13 @@
-"""Geometry of moves: arcs from their words, tool axes, strokes of drilling cycles; lengths and points along all moves.
-
-Arcs of G2 and G3 have LinuxCNC's tolerances. Canned drilling cycles are expanded to their moves as LinuxCNC does
-(manual, "Canned cycles"; interp_cycles.cc). Words are in mm and degrees, `Moves` in SI units.
-"""
+"""Geometry of words: planes, arcs of G2 and G3 within LinuxCNC's tolerances, corners, tool axes. mm, rad."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.nc.moves import Arc, Moves
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -34,12 +28,9 @@ PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}  # first, second
 CENTER_WORDS = ("I", "J", "K")
 CENTER_LETTERS = "IJKR"  # words that an arc alone has
 
-FEEDS_OUT = ("G89", "G84", "G74")
-PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
 LEAST_SWEEP = 1e-10  # rad; an arc of less is a whole turn
 CORNER_ANGLE = 1e-6  # rad; a corner of less is none
-SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
-MOST_STROKES = 100_000  # of one block; beyond, the depth of a peck or the number of repeats is a slip
+SAME_HEIGHT_MM = 1e-9
 
 
 def normal_of(plane: str) -> Vector:
@@ -145,6 +136,14 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
     return sweep + math.copysign(math.tau * (turns - 1), sweep)
 
 
+def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, inch: bool, turns: int = 1) -> float:
+    """Signed angle of an arc in rad. Raises `ArcError` unless start and end lie on one circle about the centre."""
+    check_radii(start, end, center, inch)
+    sweep = arc_sweep(start, end, center, clockwise, turns)
+    check_bulge(math.dist(start, center), sweep)
+    return sweep
+
+
 def turn_between(first: float, last: float, clockwise: bool) -> float:
     """Signed turn in rad from one polar angle to another, above 0 and up to a whole one in size."""
     sweep = (first - last if clockwise else last - first) % math.tau
@@ -238,159 +237,3 @@ def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
     across = math.hypot(i, k)
     pitch = math.degrees(math.atan2(i, k)) if across else 0.0
     return math.degrees(math.atan2(-j, across)), pitch
-
-
-def move_lengths(moves: Moves) -> FloatArray:
-    r"""(n,) m, length of the tip's path in each move.
-
-    An arc's is sqrt((r sweep)^2 + climb^2); where start and end radius differ (a control's tolerance, or a spiral)
-    r is their mean, which is exact to second order in the difference.
-
-    Examples
-    --------
-    >>> from toolpath_stiff.nc.reader import parse_program
-    >>> moves = parse_program("G21 G90 F600\nG1 X30 Y40\nG2 X50 Y40 I10 J0\nM30\n").moves
-    >>> (move_lengths(moves) * 1e3).round(3).tolist()  # mm
-    [50.0, 31.416]
-    """
-    chord = np.linalg.norm(moves.end[:, :3] - moves.start[:, :3], axis=1)
-    arc = moves.arc_sweep != 0.0
-    if arc.any():
-        frame = arc_frame(moves, np.flatnonzero(arc))
-        radius = 0.5 * (frame.radius_start + frame.radius_end)
-        sweep = moves.arc_sweep[arc]
-        chord[arc] = np.sqrt((radius * sweep) ** 2 + frame.climb**2 + (frame.radius_end - frame.radius_start) ** 2)
-    return np.asarray(chord)
-
-
-class ArcFrame:
-    """Plane, radii and climb of some arcs: position(u) = c + r(u) (cos e1 + sin e2) + (lift + u climb) n."""
-
-    def __init__(self, center: FloatArray, normal: FloatArray, start: FloatArray, end: FloatArray) -> None:
-        from_center, to_end = start - center, end - center
-        self.normal, self.center = normal, center
-        lift = np.einsum("ni,ni->n", from_center, normal)
-        self.climb = np.einsum("ni,ni->n", to_end, normal) - lift
-        in_plane = from_center - lift[:, None] * normal
-        self.radius_start = np.linalg.norm(in_plane, axis=1)
-        end_in_plane = to_end - (lift + self.climb)[:, None] * normal
-        self.radius_end = np.linalg.norm(end_in_plane, axis=1)
-        self.e1 = in_plane / self.radius_start[:, None]
-        self.e2 = np.cross(normal, self.e1)
-        self.lift = lift
-
-
-def arc_frame(moves: Moves, rows: IntArray) -> ArcFrame:
-    """The frames of the arcs in `rows` of moves."""
-    return ArcFrame(moves.arc_center[rows], moves.arc_normal[rows], moves.start[rows, :3], moves.end[rows, :3])
-
-
-def frame_of(arc: Arc, start: Sequence[float], end: Sequence[float]) -> ArcFrame:
-    """The frame of one arc in mm."""
-    return ArcFrame(*(np.array([point[:3]], dtype=float) for point in (arc.center, arc.normal, start, end)))
-
-
-def point_on_arc(arc: Arc, start: Sequence[float], end: Sequence[float], share: float) -> Vector:
-    """The point at a share of an arc's sweep, as it is sampled; mm."""
-    frame, row = frame_of(arc, start, end), np.zeros(1, dtype=np.int64)
-    return _vector(_along_arcs(frame, np.array([arc.sweep]), row, np.array([share]))[0][0])
-
-
-def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Positions (n, 3) and unit tangents (n, 3) at shares u of moves; ends are met exactly."""
-    start, end = moves.start[:, :3], moves.end[:, :3]
-    chord = end - start
-    length = np.linalg.norm(chord, axis=1)
-    direction = chord / np.where(length > 0.0, length, 1.0)[:, None]
-    tangent = direction.take(move, axis=0)
-    position = start.take(move, axis=0)  # of most samples in a program of short moves: they are ends
-    last = np.flatnonzero(u == 1.0)
-    position[last] = end[move[last]]
-    inner = np.flatnonzero((u != 0.0) & (u != 1.0))
-    of = move[inner]
-    position[inner] += u[inner, None] * chord[of]
-    arcs = np.flatnonzero(moves.arc_sweep != 0.0)
-    if len(arcs):
-        frame = arc_frame(moves, arcs)
-        which = np.full(len(moves), -1)
-        which[arcs] = np.arange(len(arcs))
-        rows = np.flatnonzero(moves.arc_sweep[move] != 0.0)
-        along, tangent[rows] = _along_arcs(frame, moves.arc_sweep[arcs], which[move[rows]], u[rows])
-        between = (u[rows] != 0.0) & (u[rows] != 1.0)
-        position[rows[between]] = along[between]
-    return position, tangent
-
-
-def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    angle = (u * sweep[arc])[:, None]
-    growth = (frame.radius_end - frame.radius_start)[arc][:, None]
-    radius = frame.radius_start[arc][:, None] + u[:, None] * growth
-    e1, e2, normal = frame.e1[arc], frame.e2[arc], frame.normal[arc]
-    outward = np.cos(angle) * e1 + np.sin(angle) * e2
-    around = -np.sin(angle) * e1 + np.cos(angle) * e2
-    height = (frame.lift[arc] + u * frame.climb[arc])[:, None]
-    position = frame.center[arc] + radius * outward + height * normal
-    velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
-    return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
-
-
-@dataclass(frozen=True)
-class Drilling:
-    """One hole along the plane's normal: heights in mm, `dwell` in s."""
-
-    code: str
-    bottom: float
-    retract: float  # the R plane
-    clear: float  # where the cycle ends: the R plane (G99) or where it began (G98)
-    peck: float
-    dwell: float
-    first: float = 0.0  # of the pecks that get shallower (Haas' I, J, K): the first, its reduction, the least
-    less: float = 0.0
-    least: float = 0.0
-    out_at_r: bool = False  # a tap feeds out to R, and from there at rapid (Fanuc, Haas); else to `clear`
-
-
-@dataclass(frozen=True)
-class Stroke:
-    """One move along the normal: to which height, at feed or rapid, how long to wait there in s."""
-
-    height: float
-    feed: bool
-    dwell: float = 0.0
-
-
-def strokes(hole: Drilling) -> Iterator[Stroke]:
-    """Moves of one hole, from the R plane.
-
-    Examples
-    --------
-    >>> hole = Drilling("G83", bottom=-5.0, retract=2.0, clear=10.0, peck=4.0, dwell=0.0)
-    >>> [(stroke.height, "feed" if stroke.feed else "rapid") for stroke in strokes(hole)]
-    [(-2.0, 'feed'), (2.0, 'rapid'), (-1.746, 'rapid'), (-5.0, 'feed'), (10.0, 'rapid')]
-    """
-    if hole.code in ("G73", "G83"):
-        yield from _pecks(hole)
-    yield Stroke(hole.bottom, feed=True, dwell=0.0 if hole.code in ("G81", "G73", "G83", "G85") else hole.dwell)
-    if hole.code == "G85" or hole.out_at_r:  # out to the R plane at feed, from there at rapid
-        yield Stroke(hole.retract, feed=True)
-    yield Stroke(hole.clear, feed=hole.code in FEEDS_OUT and not hole.out_at_r)
-
-
-def _pecks(hole: Drilling) -> Iterator[Stroke]:
-    """The pecks above the bottom. G73 breaks the chip at depth, G83 clears it at the R plane."""
-    for depth in _depths(hole):
-        yield Stroke(depth, feed=True)
-        if hole.code == "G83":
-            yield Stroke(hole.retract, feed=False)
-        yield Stroke(depth + PECK_CLEARANCE_MM, feed=False)
-
-
-def _depths(hole: Drilling) -> Iterator[float]:
-    count, depth = 1, hole.retract - (hole.first or hole.peck)
-    while depth > hole.bottom + SAME_HEIGHT_MM:
-        yield depth
-        if hole.first:
-            depth -= max(hole.first - count * hole.less, hole.least)
-        else:
-            depth = hole.retract - (count + 1) * hole.peck
-        count += 1

@@ -9,10 +9,13 @@ from __future__ import annotations
 from toolpath_stiff.nc.codes.code import Code, code_name
 from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
+from toolpath_stiff.nc.codes.increments import read_numbers
 from toolpath_stiff.nc.codes.motion import homes_standing
-from toolpath_stiff.nc.codes.points import read_numbers
-from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_parameters
-from toolpath_stiff.nc.codes.tools import HOLDS_TIP, list_numbers
+from toolpath_stiff.nc.codes.passive import m_parameters
+from toolpath_stiff.nc.codes.refused import REFUSED
+from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC
+from toolpath_stiff.nc.codes.tool_length import HOLDS_TIP
+from toolpath_stiff.nc.codes.tools import list_numbers
 from toolpath_stiff.nc.groups import LAST_MODE
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Flow, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD

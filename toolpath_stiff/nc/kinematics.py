@@ -18,9 +18,7 @@ and She, written with rotations about lines.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -144,59 +142,49 @@ def read_kinematics(toml: TomlReader) -> PostedKinematics | None:
     toml.only("kinematics", table, known, f" in the type {kind!r}")
     expected = "true (X Y Z are the tool tip on the part) or false (of the machine's axes)"
     tcp = toml.flag("kinematics.tcp", toml.needed("kinematics", table, "tcp", expected))
-    axes = tuple(_axis(toml, table, key, turns, tcp) for key, turns in parts)
+    axes = tuple(
+        _axis(toml, f"kinematics.{key}", toml.needed("kinematics", table, key, f"[kinematics.{key}]"), turns, tcp)
+        for key, turns in parts
+    )
     _check_pair(toml, axes, parts)
-    return PostedKinematics(kind, axes, tcp, _points(toml, table, axes), _tolerance(toml, table))
-
-
-def _points(toml: TomlReader, table: Mapping[str, Any], axes: tuple[RotaryAxis, ...]) -> str:
-    placed = any(axis.turns == TABLE and axis.point is not None for axis in axes)
     expected = '"program" (coordinates of G54) or "machine": what point_mm is'
+    placed = any(axis.turns == TABLE and axis.point is not None for axis in axes)
     points = toml.needed("kinematics", table, "points", expected) if placed else table.get("points", PROGRAM)
-    return toml.choice("kinematics.points", points, (PROGRAM, MACHINE), expected)
-
-
-def _tolerance(toml: TomlReader, table: Mapping[str, Any]) -> float:
+    toml.choice("kinematics.points", points, (PROGRAM, MACHINE), expected)
     where = "kinematics.tolerance_mm"
-    value = toml.number(where, table.get("tolerance_mm", TOLERANCE_MM), LARGEST_MM)
-    if not LEAST_TOLERANCE_MM <= value <= LARGEST_TOLERANCE_MM:
-        expected = f"{LEAST_TOLERANCE_MM:g} to {LARGEST_TOLERANCE_MM:g}"
-        raise toml.error(f"{where} = {value:g}", expected, where=where)
-    return m_from_mm(value)
+    tolerance = toml.number(where, table.get("tolerance_mm", TOLERANCE_MM), LARGEST_MM)
+    if not LEAST_TOLERANCE_MM <= tolerance <= LARGEST_TOLERANCE_MM:
+        bounds = f"{LEAST_TOLERANCE_MM:g} to {LARGEST_TOLERANCE_MM:g}"
+        raise toml.error(f"{where} = {tolerance:g}", bounds, where=where)
+    return PostedKinematics(kind, axes, tcp, points, m_from_mm(tolerance))
 
 
-def _axis(toml: TomlReader, table: Mapping[str, Any], key: str, turns: str, tcp: bool) -> RotaryAxis:
-    where, place = f"kinematics.{key}", PLACE_KEYS[turns]
-    given = toml.needed("kinematics", table, key, f"[{where}] with letter, {place}")
+def _axis(toml: TomlReader, where: str, given: object, turns: str, tcp: bool) -> RotaryAxis:
+    place = PLACE_KEYS[turns]
     known = ("letter", "axis", "reversed", "rollover", place)
     part = toml.table(where, given, f"a table [{where}] with {', '.join(known)}")
     toml.only(where, part, known)
-    letter = part.get("letter")
-    if not letter:
-        raise toml.error(f"{where}.letter is missing", "A, B or C", where=where)
-    letter = toml.choice(f"{where}.letter", letter, tuple(LETTERS), "A, B or C")
-    if place not in part and not tcp:
-        what = (
-            "a point of the table's axis"
-            if turns == TABLE
-            else "[x, y, z] from the gauge line to the axis; z: the pivot length"
-        )
-        raise toml.error(f"{where}.{place} is missing, and tcp is false", what, where=where)
+    letter = toml.choice(
+        f"{where}.letter", toml.needed(where, part, "letter", "A, B or C"), tuple(LETTERS), "A, B or C"
+    )
+    point = None
+    if place in part:
+        x, y, z = _vector(toml, f"{where}.{place}", part[place])
+        point = (m_from_mm(x), m_from_mm(y), m_from_mm(z))
+    elif not tcp:
+        points = {
+            TABLE: "a point of the table's axis",
+            HEAD: "[x, y, z] from the gauge line to the axis (pivot length)",
+        }
+        raise toml.error(f"{where}.{place} is missing, and tcp is false", points[turns], where=where)
     sign = -1.0 if toml.flag(f"{where}.reversed", part.get("reversed", False)) else 1.0
     x, y, z = _direction(toml, f"{where}.axis", part.get("axis", "xyz"[LETTERS.index(letter)]))
-    point = _vector(toml, f"{where}.{place}", part[place]) if place in part else None
-    metres = None if point is None else (m_from_mm(point[0]), m_from_mm(point[1]), m_from_mm(point[2]))
     direction = (sign * x + 0.0, sign * y + 0.0, sign * z + 0.0)
-    rollover = toml.flag(f"{where}.rollover", part.get("rollover", False))
-    return RotaryAxis(letter, turns, direction, metres, rollover)
+    return RotaryAxis(letter, turns, direction, point, toml.flag(f"{where}.rollover", part.get("rollover", False)))
 
 
 def _direction(toml: TomlReader, where: str, value: object) -> Vector:
-    if isinstance(value, str) and value in DIRECTIONS:
-        return DIRECTIONS[value]
-    if not isinstance(value, list):
-        raise toml.error(f"{where} = {value!r}", '"x", "y", "z" or a vector [i, j, k]', where=where)
-    i, j, k = _vector(toml, where, value)
+    i, j, k = DIRECTIONS[value] if isinstance(value, str) and value in DIRECTIONS else _vector(toml, where, value)
     length = math.hypot(i, j, k)
     if length < PARALLEL:
         raise toml.error(f"{where} = {value!r} has no direction", "a vector [i, j, k]", where=where)
@@ -205,7 +193,9 @@ def _direction(toml: TomlReader, where: str, value: object) -> Vector:
 
 def _vector(toml: TomlReader, where: str, value: object) -> Vector:
     if not isinstance(value, list) or len(value) != 3:
-        raise toml.error(f"{where} = {value!r}", "three numbers [x, y, z]", where=where)
+        raise toml.error(
+            f"{where} = {value!r}", 'three numbers [x, y, z]; of a direction "x", "y", "z" too', where=where
+        )
     x, y, z = (toml.number(where, v, LARGEST_MM) for v in value)
     return (x, y, z)
 

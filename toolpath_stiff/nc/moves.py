@@ -6,14 +6,13 @@ This is what the reader hands on: geometry with its line, feed and tool; no mach
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
 from toolpath_stiff.units import (
     Pose,
     deg_from_rad,
@@ -31,7 +30,7 @@ MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
 
 
 @dataclass(frozen=True, repr=False)
-class Moves:
+class Moves(ArrayColumns):
     r"""Columns over n moves, in the set-up frame (program zero of G54 at the origin) unless placed.
 
     A move of zero length in all six axes is not a move and has no row. `start[i]` is `end[i - 1]`,
@@ -96,10 +95,6 @@ class Moves:
     def __repr__(self) -> str:
         lines = f" of the lines {self.line.min()} to {self.line.max()}" if len(self) else ""
         return f"<Moves: {len(self)} moves{lines}>"
-
-    def take(self, index: IntArray | BoolArray | slice) -> Moves:
-        """The moves at `index` (integers, a mask or a slice)."""
-        return Moves(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
 
 def move_columns(moves: Moves) -> dict[str, NDArray[Any]]:
@@ -226,166 +221,134 @@ class Arc:
     sweep: float
 
 
-@dataclass(frozen=True)
-class Arcs:
-    """Columns over m arcs of some moves: their rows, ascending; the rest as of `Arc`."""
-
-    rows: IntArray
-    center: FloatArray
-    normal: FloatArray
-    sweep: FloatArray
-
-    @staticmethod
-    def of(arcs: Mapping[int, Arc]) -> Arcs:
-        """Columns of arcs that are given by their rows."""
-        columns = (
-            zip(*((arc.center, arc.normal, arc.sweep) for arc in arcs.values()), strict=True) if arcs else ((),) * 3
-        )
-        center, normal, sweep = (np.array(column, dtype=float) for column in columns)
-        return Arcs(np.array(list(arcs), dtype=np.int64), center.reshape(-1, 3), normal.reshape(-1, 3), sweep)
-
-    def by_row(self) -> dict[int, Arc]:
-        """One by one."""
-        columns = (self.rows.tolist(), self.center.tolist(), self.normal.tolist(), self.sweep.tolist())
-        return {
-            row: Arc((x, y, z), (i, j, k), sweep) for row, (x, y, z), (i, j, k), sweep in zip(*columns, strict=True)
-        }
+NO_ARC = Arc((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 
 
-@dataclass(frozen=True)
-class MovesInMm:
-    """Columns over n moves, as in `Moves` but in mm, degrees, mm/min (deg/min of the rotary axes alone)."""
+@dataclass
+class Move:
+    """A move as it is recorded, as in `Moves` but in mm, degrees, mm/min (deg/min of the rotary axes alone)."""
 
-    line: IntArray
-    motion: IntArray
-    start: FloatArray
-    end: FloatArray
-    feed: FloatArray
-    dwell: FloatArray
-    tool: IntArray
-    tool_length: FloatArray
-    from_machine: BoolArray
-    arcs: Arcs
-
-    def __len__(self) -> int:
-        return len(self.line)
-
-
-# Columns that the recorder collects: kind, and shape of one of them.
-COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
-    **dict.fromkeys(("line", "motion", "tool"), ("i8", ())),
-    **dict.fromkeys(("start", "end"), ("f8", (6,))),
-    **dict.fromkeys(("feed", "dwell", "tool_length"), ("f8", ())),
-    "from_machine": ("?", (2,)),
-}
+    line: int
+    motion: int
+    start: list[float]
+    end: list[float]
+    feed: float
+    tool: int
+    tool_length: float
+    from_machine: tuple[bool, bool]
+    arc: Arc | None = None
+    dwell: float = 0.0
 
 
 @dataclass
 class Recorder:
-    """Collects moves; a move of no length in any axis is none. The lists hold those since the last of `parts`."""
+    """Collects moves; a move of no length in any axis is none. `recent`: those since the last of `parts`, in SI."""
 
-    line: list[int] = field(default_factory=list)
-    motion: list[int] = field(default_factory=list)
-    start: list[list[float]] = field(default_factory=list)
-    end: list[list[float]] = field(default_factory=list)
-    arc: list[Arc | None] = field(default_factory=list)
-    feed: list[float] = field(default_factory=list)
-    dwell: list[float] = field(default_factory=list)
-    tool: list[int] = field(default_factory=list)
-    tool_length: list[float] = field(default_factory=list)
-    from_machine: list[tuple[bool, bool]] = field(default_factory=list)
-    parts: list[MovesInMm] = field(default_factory=list)
+    recent: list[Move] = field(default_factory=list)
+    parts: list[Moves] = field(default_factory=list)
     cuts: bool = False  # whether any move is a cutting one
 
     def __len__(self) -> int:
-        return len(self.line) + sum(len(part) for part in self.parts)
+        return len(self.recent) + sum(len(part) for part in self.parts)
 
-    def add(
-        self,
-        line: int,
-        motion: int,
-        start: list[float],
-        end: list[float],
-        feed: float,
-        tool: int,
-        tool_length: float,
-        from_machine: tuple[bool, bool],
-        arc: Arc | None = None,
-    ) -> bool:
-        """Add a move (mm, degrees; feed in mm/min or deg/min). Returns whether it was one."""
-        if start == end and arc is None:
+    def add(self, move: Move) -> bool:
+        """Add a move. Returns whether it was one."""
+        if move.start == move.end and move.arc is None:
             return False
-        self.line.append(line)
-        self.motion.append(motion)
-        self.start.append(start)
-        self.end.append(end)
-        self.arc.append(arc)
-        self.feed.append(math.nan if motion == RAPID else feed)
-        self.dwell.append(0.0)
-        self.tool.append(tool)
-        self.tool_length.append(tool_length)
-        self.from_machine.append(from_machine)
-        self.cuts = self.cuts or motion != RAPID
+        if move.motion == RAPID:
+            move.feed = math.nan
+        else:
+            self.cuts = True
+        self.recent.append(move)
         return True
 
     def drop(self, row: int) -> None:
-        """Take a move out of the lists, that of its place there; its pause goes to the one before it."""
-        pause = self.dwell[row]
-        for column in self._lists.values():
-            del column[row]
+        """Take one of the recent moves out; its pause goes to the one before it."""
+        pause = self.recent.pop(row).dwell
         if row:
-            self.dwell[row - 1] += pause
+            self.recent[row - 1].dwell += pause
         elif self.parts:
             self.parts[-1].dwell[-1] += pause
 
-    @property
-    def _lists(self) -> dict[str, list[Any]]:
-        return {name: getattr(self, name) for name in (*COLUMNS, "arc")}
-
-    def add_many(self, moves: MovesInMm) -> None:
-        """Add moves at once, each of some length."""
+    def add_many(self, moves: Moves) -> None:
+        """Add moves at once, each of some length; units as of `Move`."""
         if not len(moves):
             return
         self.pack()
-        self.parts.append(moves)
+        self.parts.append(in_si(moves))
         self.cuts = self.cuts or bool((moves.motion != RAPID).any())
 
     def pack(self) -> None:
-        """The lists to arrays, which take a fifth of their memory."""
-        if self.line:
-            self.parts.append(self._close())
+        """The recent moves to arrays, which take a fifth of their memory."""
+        if self.recent:
+            self.parts.append(self._recent_in_si())
+            self.recent = []
 
     def add_dwell(self, seconds: float) -> None:
         """A pause after the last move; before the first move nothing waits."""
-        if self.dwell:
-            self.dwell[-1] += seconds
+        if self.recent:
+            self.recent[-1].dwell += seconds
         elif self.parts:
             self.parts[-1].dwell[-1] += seconds
 
     def moves(self) -> Moves:
         """The moves as arrays, SI; the recorder is empty afterwards."""
-        self.parts.append(self._close())
-        parts, self.parts = self.parts[::-1], []
+        parts = [*self.parts, self._recent_in_si()]
+        self.recent, self.parts = [], []
         return _joined(parts)
 
-    def _close(self) -> MovesInMm:
-        """The lists as a part; they are empty afterwards."""
-        arcs, n = {row: arc for row, arc in enumerate(self.arc) if arc is not None}, len(self.line)
-        arrays = {name: np.array(getattr(self, name), kind).reshape(n, *wide) for name, (kind, wide) in COLUMNS.items()}
-        for column in self._lists.values():
-            column.clear()
-        return MovesInMm(**arrays, arcs=Arcs.of(arcs))
+    def _recent_in_si(self) -> Moves:
+        def column(name: str, kind: type = float, *wide: int) -> NDArray[Any]:
+            return np.array([getattr(move, name) for move in self.recent], kind).reshape(-1, *wide)
+
+        arcs = [move.arc or NO_ARC for move in self.recent]
+        moves = Moves(
+            line=column("line", np.int64),
+            motion=column("motion", np.int64),
+            start=column("start", float, 6),
+            end=column("end", float, 6),
+            arc_sweep=np.array([arc.sweep for arc in arcs], dtype=float),
+            arc_center=np.array([arc.center for arc in arcs], dtype=float).reshape(-1, 3),
+            arc_normal=np.array([arc.normal for arc in arcs], dtype=float).reshape(-1, 3),
+            feed=column("feed"),
+            dwell=column("dwell"),
+            tool=column("tool", np.int64),
+            tool_length=column("tool_length"),
+            from_machine=column("from_machine", np.bool_, 2),
+        )
+        return in_si(moves)
 
 
-def _joined(parts: list[MovesInMm]) -> Moves:
-    """All parts, the last one first, in SI; each is let go once it is copied, so that no move is held twice."""
-    n, first = sum(len(part) for part in parts), 0
-    # Pages of zeros that nobody writes to take no memory.
-    zeros: dict[str, NDArray[Any]] = {name: np.zeros((n, *wide), kind) for name, (kind, wide) in COLUMNS.items()}
-    moves = Moves(**zeros, arc_sweep=np.zeros(n), arc_center=np.zeros((n, 3)), arc_normal=np.zeros((n, 3)))
+def in_si(moves: Moves) -> Moves:
+    """Moves in SI, whose columns have the units of `Move`."""
+    start, end = (
+        np.concatenate([m_from_mm(ends[:, :3]), rad_from_deg(ends[:, 3:])], axis=1) for ends in (moves.start, moves.end)
+    )
+    # The feed of a move of the rotary axes alone is in degrees per minute.
+    rotary = np.logical_and.reduce([start[:, axis] == end[:, axis] for axis in range(3)]) & (moves.arc_sweep == 0.0)
+    return replace(
+        moves,
+        start=start,
+        end=end,
+        arc_center=m_from_mm(moves.arc_center),
+        feed=np.where(rotary, rad_per_s_from_deg_per_min(moves.feed), m_per_s_from_mm_per_min(moves.feed)),
+        tool_length=m_from_mm(moves.tool_length),
+    )
+
+
+def _joined(parts: list[Moves]) -> Moves:
+    """All parts; each is let go once it is copied, so that no move is held twice."""
+    n, first = sum(map(len, parts)), 0
+    names = [column.name for column in fields(Moves)]
+    like = {name: getattr(parts[0], name) for name in names}
+    moves = Moves(**{name: np.zeros((n, *values.shape[1:]), values.dtype) for name, values in like.items()})
+    parts.reverse()
     while parts:
         part = parts.pop()
-        _copy(part, moves.take(slice(first, first + len(part))))
+        for name in names:
+            values = getattr(part, name)
+            if values.any():  # pages of zeros that nobody writes to take no memory
+                getattr(moves, name)[first : first + len(part)] = values
         first += len(part)
     return replace(moves, tool=held_once(moves.tool), tool_length=held_once(moves.tool_length))
 
@@ -394,25 +357,3 @@ def held_once(column: NDArray[Any]) -> NDArray[Any]:
     """A column (n,); of one value, nan counts as one, a read-only view of that: most programs have one tool."""
     alike = len(column) > 0 and np.array_equal(column, np.broadcast_to(column[0], column.shape), equal_nan=True)
     return np.broadcast_to(column[0], column.shape) if alike else column
-
-
-def _copy(part: MovesInMm, into: Moves) -> None:
-    """Copy a part into rows of moves, to SI."""
-    for mm, si in ((part.start, into.start), (part.end, into.end)):
-        si[:, :3] = m_from_mm(mm[:, :3])
-        si[:, 3:] = rad_from_deg(mm[:, 3:])
-    rows = part.arcs.rows
-    into.arc_sweep[rows] = part.arcs.sweep
-    into.arc_center[rows] = m_from_mm(part.arcs.center)
-    into.arc_normal[rows] = part.arcs.normal
-    # The feed of a move of the rotary axes alone is in degrees per minute.
-    rotary = np.logical_and.reduce([into.start[:, axis] == into.end[:, axis] for axis in range(3)])
-    rotary[rows] = False
-    into.feed[:] = m_per_s_from_mm_per_min(part.feed)
-    into.feed[rotary] = rad_per_s_from_deg_per_min(part.feed[rotary])
-    into.feed[part.motion == RAPID] = math.nan
-    into.line[:], into.motion[:] = part.line, part.motion
-    into.tool[:], into.tool_length[:] = part.tool, m_from_mm(part.tool_length)
-    for given, zeros in ((part.dwell, into.dwell), (part.from_machine, into.from_machine)):
-        if given.any():
-            zeros[:] = given

@@ -1,4 +1,4 @@
-"""Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, S, an N word, comments.
+"""Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, S, an N word.
 
 Most of a big program is such lines. `plain_words` reads them many times faster than `words.read_block` reads blocks; a
 line that it does not take as a whole is not plain and is left to `read_block`, with every error.
@@ -13,83 +13,54 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from toolpath_stiff.nc.codes.drilling import CYCLES
-from toolpath_stiff.nc.codes.points import assume_increments, warn_of_points, watches_points
-from toolpath_stiff.nc.plain_holes import drill, rows_of_hole, suits
-from toolpath_stiff.nc.plain_moves import MODES, Lines
-from toolpath_stiff.nc.plain_words import (
-    LENGTH_LETTERS,
-    NO_CODE,
-    PlainLines,
-    PlainWords,
-    first_bare,
-    has_pointed,
-    is_bare,
-)
+from toolpath_stiff.nc.codes.increments import notice_lengths
+from toolpath_stiff.nc.plain_moves import Lines
+from toolpath_stiff.nc.plain_words import BARE, POINTED, PlainWords, lex
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.words import read_block
 
 FEWEST = 8  # lines; below, one by one is as fast
+CHUNK = 8192  # lines: their words fit into a processor's cache
 
 
 class PlainRun:
     """Executes runs of plain lines of a program on the state of a control."""
 
     def __init__(self, state: State, lines: Sequence[str], name: str) -> None:
-        self.state, self.name = state, name
-        self.lines = PlainLines(lines, state.dialect.semicolon)
+        self.state, self.lines, self.name = state, lines, name
         self._pause = 0  # the line before which another run is not worth trying
+        self._start, self._words = -CHUNK, lex([""])[0]  # the chunk
+        self._others = [0]  # its lines that are not plain, and its end, in falling order
 
     def execute(self, first: int) -> PlainWords | None:
         """Execute plain lines from `first` (from 0); returns the words of those that were, None if there are none."""
-        count = self.lines.run(first)
-        if count < FEWEST or first < self._pause or not _suits(self.state):
+        if not self._start <= first < self._start + CHUNK:
+            words, others = lex(self.lines[first : first + CHUNK])
+            self._start, self._words = first, words
+            self._others = [first + len(words.code), *(first + others[::-1]).tolist()]
+        while self._others[-1] < first:
+            self._others.pop()
+        end = self._others[-1]
+        if end - first < FEWEST or first < self._pause or not _suits(self.state):
             return None
-        words = self.lines.words(first, count)
-        if self.state.motion not in MODES and words.code[0] == NO_CODE and words.count[0]:
-            done = self._holes(first, words)
-        else:
-            lines = Lines(self.state, words)
-            done = lines.execute(first)
-            if done < FEWEST:
-                self._pause = first + done + 4 * FEWEST
-            self._watch_points(first, words, done)
-        return words.part(0, done) if done else None
+        words = self._words.part(first - self._start, end - self._start)
+        done = Lines(self.state, words).execute(first)
+        if done < FEWEST:
+            self._pause = first + done + 4 * FEWEST
+        if not done:
+            return None
+        self._notice_lengths(first, words, done)
+        return words.part(0, done)
 
-    def _holes(self, first: int, words: PlainWords) -> int:
-        """Drill holes like that of the line before; returns how many lines were executed."""
+    def _notice_lengths(self, first: int, words: PlainWords, done: int) -> None:
+        """As `increments.read_numbers`, of all lines executed: the first of each form decides."""
         state = self.state
-        if state.motion not in CYCLES or not self.lines.has(first - 1) or not suits(state):
-            return 0
-        hole = rows_of_hole(state.recorder, first)
-        others = np.flatnonzero(~words.are_places())
-        count = int(others[0]) if len(others) else len(words)
-        if hole is None or not self.lines.words(first - 1, 1).are_places().all() or not count:
-            return 0
-        lines = Lines(state, words.part(0, count))
-        places = lines.places()
-        if not len(places):
-            return 0
-        drill(state, hole, first + 1, places)
-        if state.dialect.increments and lines.counted[: len(places)].any():
-            assume_increments(state)
-        self._watch_points(first, words, len(places))
-        return len(places)
-
-    def _watch_points(self, first: int, plain: PlainWords, done: int) -> None:
-        """As `points.read_numbers`, of all lines executed."""
-        state = self.state
-        if not watches_points(state):
+        if state.dialect.increments:
             return
-        state.pointed = state.pointed or has_pointed(plain, done)
-        row = first_bare(plain, done) if state.bare is None else None
-        if row is not None:
-            words = read_block(self.lines.lines[first + row], first + row + 1, self.name, state.dialect.semicolon).words
-            word = next(w for w in words if w.letter in LENGTH_LETTERS and is_bare("".join(w.text[1:].split())))
-            state.bare = (first + row + 1, word)
-        warn_of_points(state)
+        wanted = [form for form, known in ((BARE, state.bare), (POINTED, state.pointed)) if not known]
+        firsts = ([int(rows.argmax()) for rows in words.lengths(form, done) if rows.any()] for form in wanted)
+        for row in sorted({min(rows) + first for rows in firsts if rows}):
+            notice_lengths(state, row + 1, read_block(self.lines[row], row + 1, self.name).words)
 
 
 def _suits(state: State) -> bool:
@@ -105,4 +76,5 @@ def _suits(state: State) -> bool:
         and not state.height_lost
         and not state.arc_absolute
         and not frames.bound
+        and not frames.rotated
     )

@@ -7,33 +7,27 @@ word holds until the next one. mm, degrees, mm/min inside.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.modes import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
-from toolpath_stiff.nc.codes.motion import ARCS, STILL, note_tool, sweep_about
-from toolpath_stiff.nc.codes.points import ANGLES, LINEAR, assume_increments, coordinate, increment
+from toolpath_stiff.nc.codes.feeds import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
+from toolpath_stiff.nc.codes.increments import ANGLES, assume_increments, increment
+from toolpath_stiff.nc.codes.motion import note_tool
+from toolpath_stiff.nc.codes.points import LINEAR
 from toolpath_stiff.nc.codes.registry import CODES
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arcs, MovesInMm
-from toolpath_stiff.nc.plain_holes import LEAST
+from toolpath_stiff.nc.frames import STILL
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Moves
 from toolpath_stiff.nc.plain_words import BARE, FIRST_F, LAST_F, LETTERS, NO_CODE, NONE, PlainWords
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES
 
 MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_lines` reads
-
-
 MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}
-
-
 NO_MODE = -1
-
-
-CLOCKWISE = MODES[ARCS[0]]
+CLOCKWISE = MODES["G2"]
 
 
 class Lines:
@@ -41,7 +35,7 @@ class Lines:
 
     def __init__(self, state: State, words: PlainWords) -> None:
         self.state, self.words = state, words
-        self.n = self.end = len(words)
+        self.n = self.end = len(words.code)
         self.values = {letter: words.values[letter] for letter in LETTERS if letter in words.values}
         self.given = {letter: words.forms[letter] != NONE for letter in self.values}
         self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
@@ -78,38 +72,40 @@ class Lines:
         self._stop(self._no_feed())
         if not moving[: self.end].any():
             return self._leave(None)
-        control = self._turned(moving) if self.state.frames.rotated else self._control()
+        control = self._control()
         start, end = self._set_up(control)
-        arcs = self._arcs(np.flatnonzero(arc[: self.end]), control)
+        center, sweep = self._arcs(np.flatnonzero(arc[: self.end]), control)
         done = slice(self.end)
-        self._record(first, start[done], end[done], arcs, moving[done], arc[done])
+        self._record(first, (start[done], end[done]), (center[done], sweep[done]), moving[done])
         return self._leave(control if moving[done].any() else None)
 
     def _record(
-        self, first: int, start: FloatArray, end: FloatArray, arcs: Arcs, moving: BoolArray, arc: BoolArray
+        self, first: int, ends: tuple[FloatArray, FloatArray], arc: tuple[FloatArray, FloatArray], moving: BoolArray
     ) -> None:
         """Hand over the moves of the lines that are done, those that go anywhere."""
-        state = self.state
-        kept = moving & (np.logical_or.reduce([start[:, axis] != end[:, axis] for axis in range(6)]) | arc)
-        feed = self._feeds(start, end, arcs, moving)
-        rows = np.flatnonzero(kept)
-        motion = np.where(arc, ARC, np.where(self.mode[: self.end] == MODES["G1"], FEED, RAPID))[rows]
-        place = np.cumsum(kept) - 1
+        state, (start, end), (center, sweep) = self.state, ends, arc
+        goes = np.logical_or.reduce([start[:, axis] != end[:, axis] for axis in range(6)])
+        rows = np.flatnonzero(moving & (goes | (sweep != 0.0)))
+        motion = np.where(sweep != 0.0, ARC, np.where(self.mode[: self.end] == MODES["G1"], FEED, RAPID))[rows]
+        vector = state.frames.turn_direction(geometry.normal_of(state.plane))
+        n = len(rows)
         state.recorder.add_many(
-            MovesInMm(
+            Moves(
                 line=rows + (first + 1),
                 motion=motion,
                 start=start[rows],
                 end=end[rows],
-                arcs=replace(arcs, rows=place[arcs.rows]),
-                feed=np.where(motion == RAPID, math.nan, feed[rows]),
-                dwell=np.zeros(len(rows)),
-                tool=np.full(len(rows), state.tool),
-                tool_length=np.full(len(rows), state.tool_length),
-                from_machine=np.zeros((len(rows), 2), dtype=bool),
+                arc_sweep=sweep[rows],
+                arc_center=center[rows],
+                arc_normal=np.where((motion == ARC)[:, None], vector, 0.0),
+                feed=np.where(motion == RAPID, math.nan, self._feeds(ends, arc)[rows]),
+                dwell=np.zeros(n),
+                tool=np.full(n, state.tool),
+                tool_length=np.full(n, state.tool_length),
+                from_machine=np.zeros((n, 2), dtype=bool),
             )
         )
-        if len(rows):
+        if n:
             note_tool(state)
 
     def _modes(self) -> None:
@@ -163,70 +159,37 @@ class Lines:
             given = self.given[letter]
             if state.absolute:
                 named = frames.axis_to_control(axis, scaled[given])
-                control[0, axis] = here
-                control[1:, axis] = np.concatenate([[here], named])[np.cumsum(given)]
+                control[:, axis] = np.concatenate([[here], named])[np.append(0, np.cumsum(given))]
             else:
                 control[:, axis] = np.cumsum(np.concatenate([[here], np.where(given, scaled, 0.0)]))
         return control
 
-    def places(self) -> FloatArray:
-        """(m, 2) X and Y in control coordinates after each of the first m lines, which all go somewhere else."""
-        control = self._control()[:, :2]
-        way = np.abs(np.diff(control, axis=0)).max(axis=1)
-        self._stop(way < LEAST)
-        return control[1 : self.end + 1]
-
-    def _turned(self, moving: BoolArray) -> FloatArray:
-        """The same where a work offset or G68 turns the program's axes: line by line, as each counts from the last."""
-        state, frames = self.state, self.state.frames
-        control = np.zeros((self.n + 1, 6))
-        position, control[0] = frames.position, frames.position
-        words = [
-            (axis, self.values[letter] * (state.length_scale if letter in LINEAR else 1.0), self.given[letter])
-            for axis, letter in enumerate(AXES)
-            if letter in self.values
-        ]
-        for row in range(min(self.n, self.end)):
-            if moving[row]:
-                point = frames.to_program(position)
-                for axis, values, given in words:
-                    if given[row]:
-                        point[axis] = coordinate(state, point[axis], float(values[row]))
-                position = frames.to_control(point)
-            control[row + 1] = position
-        return control
-
     def _set_up(self, control: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Set-up coordinates of each line's start and end; an axis that stands keeps its number (`motion.record`)."""
-        setup = np.empty_like(control)
-        for axis in range(6):
-            setup[:, axis] = self.state.frames.axis_to_setup(axis, control[:, axis])
+        setup = control - np.array([*self.state.frames.fix_reference(), 0.0, 0.0, 0.0])
         start, end = setup[:-1], setup[1:]
         still = np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start))
         return start, np.where(still, start, end)
 
-    def _arcs(self, rows: IntArray, control: FloatArray) -> Arcs:
-        """The arcs of some lines; the first that is not right ends the run."""
+    def _arcs(self, rows: IntArray, control: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) centres in the set-up frame and (n,) sweeps, 0 but for these lines; the first unfit ends the run."""
+        state, frames = self.state, self.state.frames
+        center, sweep = np.zeros((self.n, 3)), np.zeros(self.n)
         if not len(rows):
-            return Arcs.of({})
-        state = self.state
+            return center, sweep
         first, second, normal = geometry.PLANES[state.plane]
         centers = geometry.CENTER_LETTERS
         letters = (AXES[first], AXES[second], centers[first], centers[second], "R", centers[normal])
         nothing = np.full(self.n, math.nan)
         words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters])
-        points = self._programmed(control[rows])
+        points = np.stack([frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
         middles, sweeps = self._all_arcs(rows, points[:, [first, second]], words)
-        frames, center_points = state.frames, points[: len(sweeps)]
-        center_points[:, [first, second]] = middles
-        if frames.rotated:
-            turned = [frames.to_setup(frames.to_control(point))[:3] for point in center_points.tolist()]
-            middles = np.array(turned).reshape(-1, 3)
-        else:
-            columns = (frames.axis_to_setup(i, frames.axis_to_control(i, center_points[:, i])) for i in range(3))
-            middles = np.stack([*columns], axis=1)
-        vector = frames.turn_direction(geometry.normal_of(state.plane))
-        return Arcs(rows[: len(sweeps)], middles, np.tile(vector, (len(sweeps), 1)), sweeps)
+        done = rows[: len(sweeps)]
+        points = points[: len(sweeps)]
+        points[:, [first, second]] = middles
+        setup = np.stack([frames.axis_to_control(axis, points[:, axis]) for axis in range(3)], axis=1)
+        center[done], sweep[done] = setup - np.array(frames.fix_reference()), sweeps
+        return center, sweep
 
     def _all_arcs(self, rows: IntArray, start: FloatArray, words: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(m, 2) centres and (m,) sweeps of the first m of some lines; what is wrong with the next one ends the run.
@@ -251,30 +214,25 @@ class Lines:
                 if by_radius[row]:
                     center[row] = geometry.center_from_radius((a, b), (c, d), float(radius[row]) * scale, turn)
                 e, f = center[row].tolist()
-                sweep[row] = sweep_about((e, f), (a, b), (c, d), turn, state.inch)
+                sweep[row] = geometry.sweep_about((e, f), (a, b), (c, d), turn, state.inch)
             except geometry.ArcError:
                 self.end = int(rows[row])
                 return center[:row], sweep[:row]
         return center, sweep
 
-    def _programmed(self, control: FloatArray) -> FloatArray:
-        """Program coordinates of points (n, 6)."""
-        frames = self.state.frames
-        if frames.rotated:
-            return np.array([frames.to_program(point) for point in control.tolist()])
-        return np.stack([frames.axis_to_program(axis, control[:, axis]) for axis in range(6)], axis=1)
-
-    def _feeds(self, start: FloatArray, end: FloatArray, arcs: Arcs, moving: BoolArray) -> FloatArray:
-        """Feed of each line's move (`modes.feed_of_move`); rapids are none."""
+    def _feeds(self, ends: tuple[FloatArray, FloatArray], arc: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Feed of each line's move (`feeds.feed_of_move`); rapids are none."""
+        (start, end), (center, sweep) = ends, arc
         feed: FloatArray = self.feed[: self.end].copy()
         if self.state.feed_mode == "G94":
-            standing = np.logical_and.reduce([start[:, axis] == end[:, axis] for axis in range(3)])
-            standing[arcs.rows] = False
+            standing = np.logical_and.reduce([start[:, axis] == end[:, axis] for axis in range(3)]) & (sweep == 0.0)
             feed[standing] = rotary_feed(self.state, feed[standing])
             return feed
-        arc_of_row = arcs.by_row()
-        for row in np.flatnonzero(moving & (self.mode[: self.end] != MODES["G0"])).tolist():
-            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), arc_of_row.get(row))
+        normal = geometry.normal_of(self.state.plane)
+        for row in np.flatnonzero(self.cutting[: self.end]).tolist():
+            x, y, z = center[row].tolist()
+            move = Arc((x, y, z), normal, float(sweep[row])) if sweep[row] else None
+            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), move)
         return feed
 
     def _leave(self, control: FloatArray | None) -> int:

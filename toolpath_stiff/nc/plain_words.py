@@ -3,16 +3,13 @@
 Lines of words alone are most of a program. A character is a digit, a point, a sign, a letter or the end of a line; a
 word reaches from its letter to the next one, and its number is its digits as a whole number over a power of ten. Both
 are exact up to 15 digits, so that their quotient is rounded once, as `float` rounds (Clinger, "How to read floating
-point numbers accurately", 1990). A line with a comment, a longer number or anything else goes to a regular expression;
-what that does not match as a whole is not plain.
+point numbers accurately", 1990). A line with a comment, a longer number or anything else is not plain.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +19,7 @@ from toolpath_stiff.nc.geometry import CENTER_LETTERS
 from toolpath_stiff.nc.words import AXES
 
 ByteArray = NDArray[np.uint8]
-Tokens = tuple[IntArray, IntArray, FloatArray, ByteArray]  # line, rank, value, form of each word
 
-CHUNK = 8192  # lines: their words fit into a processor's cache
-LONGEST_PLAIN = 256  # characters; longer lines are left to `read_block`
 LETTERS = AXES + CENTER_LETTERS
 LENGTH_LETTERS = "XYZIJKR"
 # Keys of the columns of words, in the order in which a plain line has them: that of every CAM system, F in front or
@@ -35,14 +29,6 @@ KEYS = ("N", "G", FIRST_F, *LETTERS, LAST_F, "S")
 NO_CODE = -1  # of a line without a G word
 NONE, BARE, POINTED, BROKEN = range(4)  # form of a number: none, without a point, ending with it, with decimals
 
-_NUMBER = r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)"
-_FEED = r"(?:F((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
-_SPEED = r"(?:S((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
-_WORDS = "".join(f"(?:{letter}({_NUMBER}))?" for letter in LETTERS)
-_COMMENT = r"(?:\([^()\n]*+\))*+"
-_LINE = rf"^{_COMMENT}(?:N[0-9]++)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_SPEED}{_COMMENT}%s$|^(.+)$"
-_BARE_NUMBER = re.compile(r"^[+-]?0*[1-9][0-9]*$")
-
 _POINT, _SIGN, _LETTER, _END, _OTHER = range(1, 6)
 MOST_DIGITS = 15
 _TENS = 10.0 ** np.arange(MOST_DIGITS + 1)  # exact
@@ -51,12 +37,6 @@ _MASKS = np.array([0x0F0F0F0F0F0F0F0F & ~((1 << 8 * (8 - n)) - 1) for n in range
 _SHIFTS = np.arange(0, 72, 8, dtype=np.uint64)  # past n digits
 _PAIRS, _EVEN, _ODD = np.uint64(0x000000FF000000FF), np.uint64(100 + (1000000 << 32)), np.uint64(1 + (10000 << 32))
 _FEED_RANK = KEYS.index(FIRST_F)
-
-
-@cache
-def _pattern(semicolon: bool) -> re.Pattern[str]:
-    """A line, plain or any other; `semicolon`: whether it begins a comment. Each takes milliseconds to compile."""
-    return re.compile(_LINE % (r"(?:;.*)?" if semicolon else ";?"), re.MULTILINE)
 
 
 def _tables() -> tuple[ByteArray, NDArray[np.int8]]:
@@ -87,9 +67,6 @@ class PlainWords:
     values: dict[str, FloatArray]
     forms: dict[str, ByteArray]
 
-    def __len__(self) -> int:
-        return len(self.code)
-
     def part(self, start: int, end: int) -> PlainWords:
         """Some of the lines, with the columns that they have words in."""
         forms = {key: form[start:end] for key, form in self.forms.items()}
@@ -97,87 +74,15 @@ class PlainWords:
         values = {key: self.values[key][start:end] for key in forms}
         return PlainWords(self.code[start:end], self.count[start:end], values, forms)
 
-    def are_places(self) -> BoolArray:
-        """(n,) whether a line names X or Y and nothing else."""
-        named = np.zeros(len(self), dtype=np.int64)
-        for key in "XY":
-            if key in self.forms:
-                named += self.forms[key] != NONE
-        return np.asarray((named > 0) & (named == self.count))
+    def lengths(self, form: int, done: int) -> list[BoolArray]:
+        """For each letter of a length, which of the first lines have one other than 0 that is written so."""
+        columns = [(self.values[key][:done], self.forms[key][:done]) for key in LENGTH_LETTERS if key in self.forms]
+        return [np.asarray((forms == form) & (values != 0.0)) for values, forms in columns]
 
 
-class PlainLines:
-    """The lines of a program, lexed a chunk at a time as they are asked for.
-
-    Parameters
-    ----------
-    lines
-        Of the program.
-    semicolon
-        Whether `;` begins a comment (else it may end a block).
-    """
-
-    def __init__(self, lines: Sequence[str], semicolon: bool) -> None:
-        self.lines = lines
-        self._pattern = _pattern(semicolon)
-        self._start, self._words = -1, _in_columns(1, *_tokens("")[:4])
-        self._others: list[int] = []  # lines of the chunk that are not plain, and its end, in falling order
-
-    def run(self, first: int) -> int:
-        """How many lines from `first` (from 0) are plain; no more than the chunk's rest."""
-        if not self.has(first):
-            self._lex(first)
-        while self._others[-1] < first:
-            self._others.pop()
-        return self._others[-1] - first
-
-    def has(self, row: int) -> bool:
-        """Whether a line is in the present chunk."""
-        return self._start <= row < self._start + len(self._words)
-
-    def words(self, first: int, count: int) -> PlainWords:
-        """The words of lines that `run` has counted."""
-        return self._words.part(first - self._start, first - self._start + count)
-
-    def _lex(self, first: int) -> None:
-        chunk = self.lines[first : first + CHUNK]
-        if max(map(len, chunk)) > LONGEST_PLAIN:
-            chunk = [line if len(line) <= LONGEST_PLAIN else "!" for line in chunk]
-        line, rank, value, form, odd = _tokens("\n".join(chunk))
-        others = np.empty(0, dtype=np.int64)
-        if len(odd):
-            more, others = self._by_pattern([_without_blanks(chunk[row]) for row in odd.tolist()], odd)
-            line, rank = np.append(line, more[0]), np.append(rank, more[1])
-            value, form = np.append(value, more[2]), np.append(form, more[3])
-        self._start, self._words = first, _in_columns(len(chunk), line, rank, value, form)
-        self._others = [first + len(chunk), *(first + others[::-1]).tolist()]
-
-    def _by_pattern(self, lines: list[str], rows: IntArray) -> tuple[Tokens, IntArray]:
-        """Words of lines as `_tokens` has them, and the lines that are not plain."""
-        text = "\n".join(lines)
-        if text.isascii():  # of other scripts some letters become ASCII ones in upper case
-            text = text.upper()
-        tokens: list[tuple[int, int, float, int]] = []
-        others = []
-        for row, texts in zip(rows.tolist(), self._pattern.findall(text), strict=True):
-            if texts[-1]:
-                others.append(row)
-                continue
-            for rank, word in enumerate(texts[:-1], KEYS.index("G")):
-                if word:
-                    form = BARE if "." not in word else POINTED if word.endswith(".") else BROKEN
-                    tokens.append((row, rank, float(word), form))
-        where = np.array([word[:2] for word in tokens], dtype=np.int64).reshape(-1, 2)
-        value, forms = np.array([word[2] for word in tokens]), np.array([word[3] for word in tokens], dtype=np.uint8)
-        return (where[:, 0], where[:, 1], value, forms), np.array(others, dtype=np.int64)
-
-
-def _without_blanks(line: str) -> str:
-    return line.replace(" ", "").replace("\t", "")
-
-
-def _tokens(text: str) -> tuple[IntArray, IntArray, FloatArray, ByteArray, IntArray]:
-    """Line, rank, value and form of each word of the lines of words alone; the other lines."""
+def lex(lines: Sequence[str]) -> tuple[PlainWords, IntArray]:
+    """The words of lines, and the lines (from 0) that are not plain."""
+    text = "\n".join(lines).replace(";\n", "\n")  # the end of a block, or an empty comment
     characters = text.encode("ascii", "replace").translate(None, b" \t")
     buffer = b"%b\n%b\n" % (_BEFORE, characters)
     codes = np.frombuffer(buffer, dtype=np.uint8)
@@ -204,11 +109,11 @@ def _tokens(text: str) -> tuple[IntArray, IntArray, FloatArray, ByteArray, IntAr
     value = _values(buffer, point, end, digits, decimals)
     value[codes[sign] == ord("-")] *= -1.0
     bad |= (rank == KEYS.index("G")) & ((digits > 2) | (value > 3.0))
-    odd = np.zeros(int(line[-1]) + 1, dtype=bool)
+    odd = np.zeros(len(lines) + 1, dtype=bool)
     odd[line[bad]] = True
     kept = ~is_end & ~odd[line]
     form = np.where(pointed, np.where(decimals == 0, POINTED, BROKEN), BARE).astype(np.uint8)
-    return line[kept], rank[kept], value[kept], form[kept], np.flatnonzero(odd)
+    return _in_columns(len(lines), line[kept], rank[kept], value[kept], form[kept]), np.flatnonzero(odd)
 
 
 def _ranks(begins: ByteArray, kind: ByteArray) -> IntArray:
@@ -261,23 +166,3 @@ def _in_columns(n: int, line: IntArray, rank: IntArray, value: FloatArray, form:
             values[key], forms[key] = np.full(n, np.nan), np.full(n, NONE, dtype=np.uint8)
             values[key][into], forms[key][into] = value[words], form[words]
     return PlainWords(code, np.bincount(line[rank > 0], minlength=n), values, forms)
-
-
-def is_bare(text: str) -> bool:
-    """Whether a number other than 0 stands without a decimal point."""
-    return _BARE_NUMBER.match(text) is not None
-
-
-def has_pointed(words: PlainWords, done: int) -> bool:
-    """Whether a length of the first lines, other than 0, ends with its decimal point."""
-    return any(rows.any() for rows in _lengths(words, POINTED, done))
-
-
-def first_bare(words: PlainWords, done: int) -> int | None:
-    """The first of these lines in which a length other than 0 has no decimal point."""
-    return min((int(np.argmax(rows)) for rows in _lengths(words, BARE, done) if rows.any()), default=None)
-
-
-def _lengths(words: PlainWords, form: int, done: int) -> list[BoolArray]:
-    columns = [(words.values[key][:done], words.forms[key][:done]) for key in LENGTH_LETTERS if key in words.forms]
-    return [np.asarray((forms == form) & (values != 0.0)) for values, forms in columns]

@@ -153,7 +153,7 @@ class ProgramRun:
                 if words is not None:
                     self._tally_plain(row, words)
                     percent = percent or bool(words.count.any())
-                    row += len(words)
+                    row += len(words.code)
                     continue
             following: int | None = row + 1
             steered = self._tried(self._steered, row, following)

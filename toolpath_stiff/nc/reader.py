@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.codes.points import increments_hint
+from toolpath_stiff.nc.codes.increments import increments_hint
 from toolpath_stiff.nc.controller import Controller, Switches, check_plain, plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.languages import foreign_program, refused_program

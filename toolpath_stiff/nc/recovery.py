@@ -13,7 +13,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
+from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.kinematics import HEAD, LETTERS, PostedKinematics, line_point, roll_pitch, tool_poses, turned
 from toolpath_stiff.nc.moves import FEED, RAPID, Moves
 from toolpath_stiff.nc.place import Place

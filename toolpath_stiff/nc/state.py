@@ -149,19 +149,13 @@ class Segment(NamedTuple):
 
 
 class SavedModes(NamedTuple):
-    """What M70 and M73 save; the tool length and its control must be the same where it is restored."""
+    """What M70 and M73 save: attributes of `State`; length and control of the tool must be the same at the return."""
 
-    inch: bool
+    modes: dict[str, object]
     plane: str
-    absolute: bool
-    arc_absolute: bool
-    feed_mode: str
     feed: float | None
-    speed: float
-    retract: str | None
     offset: int
-    tool: float
-    tip_held: bool
+    tool: tuple[float, bool]
     at_return: bool
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
-from toolpath_stiff.errors import FileError, ProgramError
+from toolpath_stiff.errors import FileError, InputError, ProgramError
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.tables import Columns, parse_table
+from toolpath_stiff.toml_reader import TomlReader, is_number
 from toolpath_stiff.units import m_from_mm
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
@@ -23,6 +26,10 @@ LARGEST_WORD = 1e9  # any other word: the radius of an arc that is nearly straig
 FIRST_OFFSET, OFFSET_STRIDE, ROTATION = 5221, 20, 9
 HOME_G28, HOME_G30 = 5161, 5181
 HOMES = ("G28", "G30")
+TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "remark", "material")
+TOOL_WORD = re.compile(r"([A-Za-z])\s*([^\sA-Za-z]+(?:[eE][+-]?\d+)?)")
+PARAMETER = re.compile(r"[0-9]{1,9}")
+OFFSET_KEY = re.compile(r"^[ \t]*([Gg][\d.]+(?: ?[Pp]\d+)?)\s*=", re.MULTILINE)  # G54.1 P1 in TOML has quotes
 ADDITIONAL = re.compile(r"(G54\.1|G154) ?P([1-9]\d{0,2})")
 
 
@@ -87,13 +94,16 @@ class Offsets:
         return self.table[index] if index < standard else self.additional[index - standard + 1]
 
 
-def _lines(path: str | Path, what: str) -> list[str]:
+def _text(path: str | Path, what: str) -> str:
     try:
-        return read_bytes(path, what, LARGEST_BYTES).decode("utf-8-sig").splitlines()
+        text = read_bytes(path, what, LARGEST_BYTES).decode("utf-8-sig")
     except FileError as error:
         raise ProgramError(error.found, hint=error.hint) from None
     except UnicodeDecodeError:
         raise ProgramError(f"{what} is not a text file", file=str(path)) from None
+    if not text.strip():
+        raise ProgramError(f"the {what} is empty", file=str(path))
+    return text
 
 
 def _number(text: str, what: str, place: Place) -> float:
@@ -101,7 +111,7 @@ def _number(text: str, what: str, place: Place) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value) or abs(value) > LARGEST_MM:
+    if not abs(value) <= LARGEST_MM:
         raise place.fail(f"{what} = {text[:40]!r}", f"a number within +-{LARGEST_MM:g}")
     return value
 
@@ -122,12 +132,10 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
     >>> tools[1].length, tools[1].diameter, tools[1].remark
     (50.0, 6.0, 'end mill')
     """
-    lines = _lines(path, "tool table")
-    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
-    if not filled:
-        raise ProgramError("the tool table is empty", file=str(path))
-    is_csv = "," in filled[0][1] and not filled[0][1].lstrip().upper().startswith(("T0", "T1", ";"))
-    tools = _csv_tools(path, filled) if is_csv else _linuxcnc_tools(path, filled)
+    text = _text(path, "tool table")
+    first = next(line for line in text.splitlines() if line.strip()).lstrip().upper()
+    is_csv = "," in first and not first.startswith(("T0", "T1", ";"))
+    tools = _csv_tools(text, str(path)) if is_csv else _linuxcnc_tools(text, str(path))
     by_number: dict[int, ToolEntry] = {}
     for line, tool in tools:
         if tool.number in by_number:
@@ -136,61 +144,79 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
     return by_number
 
 
-def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
-    columns = ("tool", "length_mm", "diameter_mm", "remark", "stick_out_mm", "material")
-    heading_place = Place(str(path), lines[0][0])
-    heading = _cells(heading_place, lines[0][1])
-    unknown = [name for name in heading if name not in columns]
-    missing = [name for name in columns[:2] if name not in heading]
+def tools_of(toml: TomlReader) -> dict[int, ToolEntry] | None:
+    """Tool number -> tool, of `tools` of a controller file: a list of tables, or the name of a file."""
+    given = toml.data.get("tools")
+    if given is None:
+        return None
+    if isinstance(given, str):
+        return read_tool_table(Path(toml.file).parent / given)
+    if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
+        expected = "[[tools]] with number, length_mm, ..., or the name of a file"
+        raise toml.error("tools is not a list of tables", expected, where="tools")
+    tools: dict[int, ToolEntry] = {}
+    for place, row in enumerate(given, 1):
+        where = f"tools[{place}]"
+        toml.only(where, row, TOOL_KEYS)
+        wrong = partial(_wrong_key, toml, where)
+        tool = _tool(row, wrong)
+        if tool.number in tools:
+            raise toml.error(f"{where}: tool {tool.number} appears twice", where=f"{where}.number")
+        tools[tool.number] = tool
+    return tools
+
+
+def _wrong_key(toml: TomlReader, where: str, key: str, value: object, expected: str) -> InputError:
+    return toml.error(f"{where}.{key} = {value!r}", expected, where=f"{where}.{key}")
+
+
+def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
+    columns = ("tool", *TOOL_KEYS[1:])
+    table = parse_table(text, file, Columns(columns[:4], columns[4:]))
+    unknown = [name for name in table.heading if name not in columns]
+    missing = [name for name in columns[:2] if name not in table.heading]
     if unknown or missing:
         problem = f"column {unknown[0]!r} is not known" if unknown else f"column {missing[0]!r} is missing"
-        raise heading_place.fail(problem, f"columns {', '.join(columns)}")
-    rows = []
-    for line, text in lines[1:]:
-        place = Place(str(path), line)
-        cells = dict(zip(heading, _cells(place, text), strict=False))
-        number = _number(cells.get("tool", ""), "tool", place)
-        if number != int(number) or number < 0:
-            raise place.fail(f"tool = {cells['tool']!r}", "a whole number")
-        length = _number(cells.get("length_mm", ""), "length_mm", place)
-        diameter, stick_out = (
-            _number(cells[name], name, place) if cells.get(name) else math.nan
-            for name in ("diameter_mm", "stick_out_mm")
-        )
-        tool = ToolEntry(int(number), length, diameter, cells.get("remark", ""), stick_out, cells.get("material", ""))
-        rows.append((line, tool))
-    return rows
+        raise Place(file, table.heading_line).fail(problem, f"columns {', '.join(columns)}")
+    for line, cells in table.rows:
+        place = Place(file, line)
+        row = {key: cell for key, cell in table.record(cells).items() if cell}
+        numbers = {key: _number(row[key], key, place) for key in columns[:4] if key in row}
+        wrong = partial(_wrong_cell, place)
+        yield line, _tool({**row, **numbers, "number": numbers.get("tool")}, wrong)
 
 
-def _cells(place: Place, text: str) -> list[str]:
-    try:
-        return [cell.strip() for cell in next(csv.reader([text]))]
-    except csv.Error as error:  # a cell of more than 131,072 characters
-        raise place.fail(f"a row that cannot be read: {error}") from None
+def _wrong_cell(place: Place, key: str, value: object, expected: str) -> InputError:
+    return place.fail(f"{key} = {value!r}", expected)
 
 
-def _linuxcnc_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
-    rows = []
-    for line, text in lines:
-        place = Place(str(path), line)
-        content, _, remark = text.partition(";")
-        if not content.strip():
+def _tool(row: Mapping[str, object], wrong: Callable[[str, object, str], InputError]) -> ToolEntry:
+    """The tool of `TOOL_KEYS`; `wrong` makes the error of a key, its value and what was expected."""
+    number, lengths = row.get("number"), list[float]()
+    if not is_number(number) or number != int(number) or number < 0:
+        raise wrong("number", number, "a whole number")
+    for key in TOOL_KEYS[1:4]:
+        value = row.get(key, math.nan)
+        if not is_number(value) or abs(value) > LARGEST_MM or (key != "length_mm" and value <= 0.0):
+            raise wrong(key, value, f"a number of mm{', more than 0' if key != 'length_mm' else ''}")
+        lengths.append(float(value))
+    texts = [row.get(key, "") for key in TOOL_KEYS[4:]]
+    if not all(isinstance(text, str) for text in texts):
+        raise wrong("remark and material", texts, "texts")
+    return ToolEntry(int(number), lengths[0], lengths[1], str(texts[0]), lengths[2], str(texts[1]))
+
+
+def _linuxcnc_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
+    for line, row in enumerate(text.splitlines(), 1):
+        place, (content, _, remark) = Place(file, line), row.partition(";")
+        if not content.strip() or row.startswith("#"):
             continue
-        words = dict(re.findall(r"([A-Za-z])\s*([^\sA-Za-z]+(?:[eE][+-]?\d+)?)", content))
-        words = {letter.upper(): value for letter, value in words.items()}
+        words = {key.upper(): value for key, value in TOOL_WORD.findall(content)}
         if re.fullmatch(r"[0-9]{1,9}", words.get("T", "")) is None:
-            raise place.fail(
-                f"{content.strip()[:40]!r} is not a tool", "T<number> P<pocket> Z<length mm> D<diameter mm> ;remark"
-            )
-        length = _number(words["Z"], "Z", place) if "Z" in words else math.nan
-        diameter = _number(words["D"], "D", place) if "D" in words else math.nan
-        rows.append((line, ToolEntry(int(words["T"]), length, diameter, remark.strip())))
-    return rows
-
-
-def is_offset(name: str) -> bool:
-    """Whether a table may set it: a work offset or a reference point."""
-    return name in (*WORK_OFFSETS, *HOMES) or additional_offset(name) is not None
+            expected = "T<number> P<pocket> Z<length mm> D<diameter mm> ;remark"
+            raise place.fail(f"{content.strip()[:40]!r} is not a tool", expected)
+        length, diameter = (_number(words[key], key, place) if key in words else math.nan for key in "ZD")
+        yield line, ToolEntry(int(words["T"]), length, diameter, remark.strip())
 
 
 def additional_offset(name: str) -> int | None:
@@ -224,30 +250,44 @@ def read_offsets(path: str | Path) -> Offsets:
     >>> offsets.at(0).axes
     [100.0, -50.0, 800.0, 0.0, 0.0, 0.0]
     """
-    lines = _lines(path, "offsets file")
-    filled = [(number, line.split("#")[0].strip()) for number, line in enumerate(lines, 1)]
-    filled = [(number, line) for number, line in filled if line]
-    if not filled:
-        raise ProgramError("the offsets file is empty", expected="lines such as G55 = [100, 0, 0]", file=str(path))
+    text, offsets = _text(path, "offsets file"), Offsets()
+    lines = [(number, line.partition("#")[0].split()) for number, line in enumerate(text.splitlines(), 1)]
+    if any(words and PARAMETER.fullmatch(words[0]) for _, words in lines):
+        for number, words in lines:
+            place = Place(str(path), number)
+            if words and (len(words) != 2 or not PARAMETER.fullmatch(words[0])):
+                raise place.fail(f"{' '.join(words)[:40]!r} is not a parameter", "LinuxCNC's `5221 12.5`")
+            if words:
+                _set_parameter(offsets, int(words[0]), _number(words[1], words[0], place))
+        return offsets
+    toml = TomlReader(OFFSET_KEY.sub(r'"\1" =', text), str(path), "the offsets file", ProgramError)
+    return _offsets_in(toml, toml.data, "")
+
+
+def offsets_of(toml: TomlReader) -> Offsets | None:
+    """Work offsets of `offsets` of a controller file: a table, or the name of a file."""
+    given = toml.data.get("offsets")
+    if isinstance(given, str):
+        return read_offsets(Path(toml.file).parent / given)
+    if given is None:
+        return None
+    table = toml.table("offsets", given, "a table G54 = [x, y, z, a, b, c, r], or the name of a file")
+    return _offsets_in(toml, table, "offsets.")
+
+
+def _offsets_in(toml: TomlReader, table: Mapping[str, object], before: str) -> Offsets:
     offsets = Offsets()
-    for line, text in filled:
-        place = Place(str(path), line)
-        parameter = re.fullmatch(r"([0-9]{1,9})\s+(\S+)", text)
-        assignment = re.fullmatch(r'"?([Gg][\d.]+(?: ?[Pp]\d+)?)"?\s*=\s*\[(.*)\]', text)
-        if parameter:
-            _set_parameter(offsets, int(parameter[1]), _number(parameter[2], parameter[1], place))
-        elif assignment and is_offset(assignment[1].upper()):
-            name = assignment[1].upper()
-            values = [_number(v.strip(), name, place) for v in assignment[2].split(",") if v.strip()]
-            most = 6 if name in HOMES else 7
-            if not 1 <= len(values) <= most:
-                raise place.fail(f"{name} has {len(values)} numbers", f"1 to {most}")
-            set_offset(offsets, name, values)
-        else:
-            raise place.fail(
-                f"{text[:40]!r} is not an offset",
-                "G54 = [x, y, z, a, b, c, r] (to G59.3, G28, G30, G54.1 P1), or LinuxCNC's `5221 12.5`",
-            )
+    for key, values in table.items():
+        name, where = key.upper(), f"{before}{key}"
+        if additional_offset(name) in offsets.additional:
+            raise toml.error(f"{where!r} is there twice: G54.1 and G154 name the same offsets", where=where)
+        if name not in (*WORK_OFFSETS, *HOMES) and additional_offset(name) is None:
+            expected = f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)'
+            raise toml.error(f"{where} is not an offset", expected, where=where)
+        most = 6 if name in HOMES else 7
+        if not isinstance(values, list) or not 1 <= len(values) <= most:
+            raise toml.error(f"{where} = {values!r}", f"1 to {most} numbers: x, y, z, a, b, c, r", where=where)
+        set_offset(offsets, name, [toml.number(where, value, LARGEST_MM) for value in values])
     return offsets
 
 

@@ -258,31 +258,28 @@ def conclusions(regions: Sequence[Document]) -> list[Document]:
     for row in regions:
         above.setdefault((row["x_mm"], row["y_mm"], row["rotation_deg"]), []).append(row)
     steps = [pair for rows in above.values() for pair in pairwise(sorted(rows, key=lambda row: row["z_mm"]))]
-    statements: list[Document] = []
+    statements = []
     for figure in ("mean", "range"):
         key = f"{figure}_N_per_mm"
-        words = "; ".join(
+        words = [
             f"region {low['region']} to {high['region']}: {number(low[key])} to {number(high[key])} N/mm"
             for low, high in steps
-        )
-        holds = all(high[key] > low[key] for low, high in steps) if steps else None
-        numbers = words or "no two regions differ in height alone"
-        statements.append({"statement": f"the {figure} rises with z", "holds": holds, "numbers": numbers})
+        ]
+        risen, nothing = [high[key] > low[key] for low, high in steps], "no two regions differ in height alone"
+        statements.append(_statement(f"the {figure} rises with z", risen, words, nothing))
     pairs = _in_plane(regions)
-    words = "; ".join(
+    agree = [_apart(a, b) < MEANS_AGREE and a["range_N_per_mm"] != b["range_N_per_mm"] for a, b in pairs]
+    words = [
         f"regions {a['region']} and {b['region']}: means apart by {100 * _apart(a, b):.2f} %, ranges "
         f"{number(a['range_N_per_mm'])} and {number(b['range_N_per_mm'])} N/mm"
         for a, b in pairs
-    )
-    agree = [_apart(a, b) < MEANS_AGREE and a["range_N_per_mm"] != b["range_N_per_mm"] for a, b in pairs]
-    statements.append(
-        {
-            "statement": "at one height means agree closely and ranges differ a little",
-            "holds": all(agree) if agree else None,
-            "numbers": words or "no two regions are at one height",
-        }
-    )
-    return statements
+    ]
+    alike = "at one height means agree closely and ranges differ a little"
+    return [*statements, _statement(alike, agree, words, "no two regions are at one height")]
+
+
+def _statement(statement: str, held: Sequence[bool], words: Sequence[str], nothing: str) -> Document:
+    return {"statement": statement, "holds": all(held) if held else None, "numbers": "; ".join(words) or nothing}
 
 
 def _in_plane(regions: Sequence[Document]) -> list[tuple[Document, Document]]:

@@ -16,7 +16,8 @@ from toolpath_stiff.analysis.loads import Load, headline_rows
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
-from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
+from toolpath_stiff.path.placing import place, place_orientations
+from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import Pose
 

@@ -18,7 +18,6 @@ from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
-from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
 from toolpath_stiff.placement.paths import work_path
 from toolpath_stiff.placement.result import Placement, Written
 from toolpath_stiff.placement.rows import (
@@ -73,11 +72,9 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
     search.report = progress or search.report
     front = search_placements(search)
-    number, left_out = front.best + 1, front.rapids_left_out
-    record = SearchRecord(task.options(), number, left_out, search.poses, front.searches, front.alone)
-    assert search.now is not None
-    rows = numbered_rows(task.model, path, task.load, front, task.force)
-    return _placed(task, rows, record, number, search.now)
+    number = front.best + 1
+    record = SearchRecord(task.options(), number, search.left_out, search.poses, front.searches, front.alone)
+    return _placed(task, numbered_rows(task.model, path, task.load, front, task.force), record, number)
 
 
 def place_again(
@@ -101,9 +98,7 @@ def place_again(
         )
     if not 1 <= number <= len(front):
         raise InputError(f"--pick {number}", expected=f"1 to {len(front)}, the points of the front in placements.csv")
-    path = work_path(task.program, task.step, task.load, task.present, task.read)
-    present = Evaluator(task.model, path, task.load, task.force, task.rules.keepouts).figures(np.array([task.present]))
-    placed, row = _placed(task, front, search, number, present), front[number - 1]
+    placed, row = _placed(task, front, search, number), front[number - 1]
     changes = [getattr(row, key) - getattr(placed.chosen, key) for key in FIGURES.values()]
     if max(map(abs, changes)) > 1e-6 * abs(row.mean_N_per_mm):
         raise InputError(
@@ -128,9 +123,7 @@ def _earlier_search(
         raise InputError(f"--pick: there is no earlier search of this version{where}", hint=AGAIN) from None
 
 
-def _placed(
-    task: PlacementTask, rows: Sequence[PlacementRow], search: SearchRecord, number: int, present: PlacementFigures
-) -> Placement:
+def _placed(task: PlacementTask, rows: Sequence[PlacementRow], search: SearchRecord, number: int) -> Placement:
     """Analyze, before and at the chosen point."""
     before, reason = _analyzed(task, task.program, task.present)
     origin = rows[number - 1].origin
@@ -145,7 +138,6 @@ def _placed(
         search=search,
         chosen=analyzed_row(best, number, rows[number - 1]),
         present=analyzed_row(before) if before else None,
-        present_figures=present,
         present_reason=reason,
         best=best,
         before=before,

@@ -14,7 +14,6 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
 from toolpath_stiff.placement.task import VARIED, PlacementTask, SearchRecord
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 WORSE = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
 ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
 AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
-OFFSETS = ("linuxcnc", "linuxcnc_reason", "fanuc", "fanuc_reason")  # as placement.json has them
 
 
 @dataclass(frozen=True)
@@ -67,8 +65,8 @@ class Placement(FolderResult):
         The search, as `placement.json` has it.
     chosen, present
         The chosen placement and the present one, which is None where it is out of reach.
-    present_figures, present_reason
-        What the present placement keeps, in SI; why it is out of reach.
+    present_reason
+        Why that is out of reach.
     best, before
         Analyses at the chosen and at the present placement.
     rewritten, written
@@ -89,8 +87,8 @@ class Placement(FolderResult):
     ('', 'G0 X0 Y0 Z5')
     >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
     (1, ['placements.csv', 'placement.json'], 'balanced')
-    >>> found.objective, found.picked, list(found.trade_offs), found.machine_stated["machine"]
-    ('balanced', False, ['mean', 'range', 'weakest'], 'nist')
+    >>> found.picked, list(found.trade_offs), found.machine_stated["machine"]
+    (False, ['mean', 'range', 'weakest'], 'nist')
     >>> found.offsets.linuxcnc[:3]
     'G21'
     >>> type(found.plot()).__name__
@@ -105,7 +103,6 @@ class Placement(FolderResult):
     search: SearchRecord
     chosen: PlacementRow
     present: PlacementRow | None
-    present_figures: PlacementFigures
     present_reason: str
     best: Analysis
     before: Analysis | None
@@ -117,11 +114,6 @@ class Placement(FolderResult):
     def origin_mm_deg(self) -> ShopPose:
         """The chosen placement: what `analyze` takes as `origin_mm_deg`."""
         return self.chosen.origin_mm_deg
-
-    @property
-    def objective(self) -> str:
-        """The objective of the recommended placement."""
-        return self.task.rules.objective
 
     @property
     def picked(self) -> bool:
@@ -157,7 +149,7 @@ class Placement(FolderResult):
             nothing = "the present placement is out of reach, so nothing says what must not get worse"
             warnings.append(f"{nothing}: {self.present_reason}")
         else:
-            warnings += _present_words(self.task.rules.margin, self.present_figures)
+            warnings += self._present_words()
         if self.chosen.extrapolated_share:
             warnings.append(
                 f"the strut law is extrapolated at {100.0 * self.chosen.extrapolated_share:.0f} % of the samples: "
@@ -169,6 +161,21 @@ class Placement(FolderResult):
                 "the program only plunges along the tool axis: mean, range and weakest are those of plunges"
             )
         return list(dict.fromkeys([*warnings, *self.best.warnings]))
+
+    def _present_words(self) -> list[str]:
+        """Rules that the present placement itself does not keep, in sentences."""
+        words, margin, before = [], self.task.rules.margin, self.before
+        assert before is not None
+        least = float(before.at.reach.margin.min())
+        if least < margin:
+            words.append(
+                f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
+                f"{100.0 * margin:g} % asked for with {both_names('--margin')}"
+            )
+        depths = [-float(box.clearances(before.samples.position).min()) for box in self.task.rules.keepouts]
+        if max(depths, default=0.0) > 0.0:
+            words.append(f"the present placement runs {mm_from_m(max(depths)):.1f} mm deep into a keep-out")
+        return words
 
     def _worse_words(self, worse: Worsening) -> str:
         share = 100.0 * worse.worse_by_N_per_mm / max(abs(worse.before_N_per_mm), 1e-12)
@@ -216,7 +223,6 @@ class Placement(FolderResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
-        offsets = self.offsets
         document: dict[str, Any] = to_dict(
             {
                 "warnings": self.warnings,
@@ -225,15 +231,15 @@ class Placement(FolderResult):
                 **self.machine_stated,
                 "load": str(self.best.load),
                 "force_N": self.best.force,
-                "objective": self.objective,
+                "objective": self.task.rules.objective,
                 "chosen": self.chosen,
                 "picked": self.picked,
                 "recommended": self.front[self.search.recommended - 1],
-                "before": None if self.present is None else self.present.figures(),
+                "before": self.present,
                 "before_reason": self.present_reason or None,
                 "trade_offs": self.trade_offs,
                 "front": self.front,
-                "offset_blocks": {name: getattr(offsets, name) or None for name in OFFSETS},
+                "offset_blocks": {name: text or None for name, text in vars(self.offsets).items()},
                 "written": self.written,
                 "search": self.search,
                 "assumptions": self.best.to_dict()["assumptions"],
@@ -258,20 +264,6 @@ def nothing_better_words(search: SearchRecord) -> str:
         f"nothing better than the present placement was found within the bounds, in {search.searches} searches from "
         f"the beginning, {search.pose_evaluations} poses evaluated"
     )
-
-
-def _present_words(margin: float, present: PlacementFigures) -> list[str]:
-    """Rules that the present placement itself does not keep, in sentences."""
-    words, least = [], float(min(present.margin[0], present.rapid_margin[0]))
-    if least < margin:
-        words.append(
-            f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
-            f"{100.0 * margin:g} % asked for with {both_names('--margin')}"
-        )
-    if present.clearance[0] < 0.0:
-        depth = mm_from_m(-float(present.clearance[0]))
-        words.append(f"the present placement runs {depth:.1f} mm deep into a keep-out")
-    return words
 
 
 def bound_warnings(bounds: Bounds, placement: ShopPose, workspace: FloatArray) -> list[str]:

@@ -52,10 +52,6 @@ class PlacementRow:
         """The placement in m and rad."""
         return pose_in_si(self.origin_mm_deg)
 
-    def figures(self) -> dict[str, float | None]:
-        """The row without number and margins, as `placement.json` has the present placement."""
-        return {name: value for name, value in vars(self).items() if name not in ("number", "margin", "rapid_margin")}
-
 
 COLUMNS = tuple(field.name for field in fields(PlacementRow))
 PLACEMENT = COLUMNS[1:7]

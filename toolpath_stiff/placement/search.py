@@ -44,10 +44,6 @@ class PlacementResult:
         Figures of the present placement (one row); None if none was given.
     rules
         What every placement of the front keeps.
-    rapids_left_out
-        Rapids that no placement within the bounds keeps within reach.
-    pose_evaluations
-        Poses that the search evaluated.
     searches
         Searches from the beginning, each with a seed of its own.
     alone
@@ -59,8 +55,6 @@ class PlacementResult:
     best: int
     present: PlacementFigures | None
     rules: PlacementRules
-    rapids_left_out: tuple[int, ...] = ()
-    pose_evaluations: int = 0
     searches: int = 1
     alone: bool = False
 
@@ -79,11 +73,8 @@ def search_placements(search: Search) -> PlacementResult:
         No placement keeps the rules; says which one binds at the least bad placement, at which line, by how much.
     """
     now, start = search.now, search.start
-    rapids_left_out: tuple[int, ...] = ()
     for searches in range(1, SEARCHES + 1):
-        candidates, left_out = _candidates(search, np.random.default_rng(search.wanted.seed + searches - 1))
-        rapids_left_out += left_out
-        result = _result(search, candidates, rapids_left_out)
+        result = _result(search, _candidates(search, np.random.default_rng(search.wanted.seed + searches - 1)))
         gain = result.figures.objectives - (now.objectives if now is not None and len(start) else NO_FLOORS)
         same = len(gain) == 1 and (np.abs(gain) <= SAME * result.figures.mean[0]).all()
         alone = bool(len(search.bounds.free) and same)
@@ -93,12 +84,12 @@ def search_placements(search: Search) -> PlacementResult:
     return replace(result, searches=searches, alone=alone)
 
 
-def _candidates(search: Search, rng: np.random.Generator) -> tuple[FloatArray, tuple[int, ...]]:
-    """Candidates for the front (k, 6), the present placement first where it may be one; rapids that were left out."""
+def _candidates(search: Search, rng: np.random.Generator) -> FloatArray:
+    """Candidates for the front (k, 6), the present placement first where it may be one."""
     bounds = search.bounds
     unit = rng.uniform(size=(max(SCOUTS * len(bounds.free), 1), len(bounds.free)))
     scouts = np.vstack([search.start, bounds.placements(unit)])
-    known, rapids_left_out = let_go(search, scouts)
+    known = let_go(search, scouts)
     search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, known))
     search.report(1, 4)
     archive, figures = _evolved(search, scouts, known, rng)
@@ -110,10 +101,10 @@ def _candidates(search: Search, rng: np.random.Generator) -> tuple[FloatArray, t
         figures = search.evaluators["middle"].figures(archive)
         rows = front_rows(figures, search.rules_for("middle").violation(figures) == 0.0)
         archive = archive[thin(figures.take(rows).objectives, rows, most) if len(rows) else slice(0, most)]
-    return np.vstack([search.start, archive, ends]), rapids_left_out
+    return np.vstack([search.start, archive, ends])
 
 
-def _result(search: Search, candidates: FloatArray, rapids_left_out: tuple[int, ...]) -> PlacementResult:
+def _result(search: Search, candidates: FloatArray) -> PlacementResult:
     """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
     candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]  # of equals the first stands
     figures = search.whole.figures(candidates)
@@ -131,8 +122,6 @@ def _result(search: Search, candidates: FloatArray, rapids_left_out: tuple[int, 
         best=int(np.flatnonzero(rows == best)[0]),
         present=search.now,
         rules=search.rules,
-        rapids_left_out=rapids_left_out,
-        pose_evaluations=search.poses,
     )
 
 

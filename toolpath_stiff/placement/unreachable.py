@@ -11,7 +11,7 @@ from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.path import place_orientations
+from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.paths import placed_path
 from toolpath_stiff.placement.working import Search
@@ -21,10 +21,10 @@ from toolpath_stiff.units import mm_from_m, pose_in_mm
 SCOUTS_AT_A_TIME = 50  # until one keeps an anchored rapid within reach
 
 
-def let_go(search: Search, scouts: FloatArray) -> tuple[PlacementFigures, tuple[int, ...]]:
+def let_go(search: Search, scouts: FloatArray) -> PlacementFigures:
     """Drop anchored rapids that no placement keeps within reach where the cuts are.
 
-    Returns the figures of the scouts on few samples, and the lines of these rapids.
+    Returns the figures of the scouts on few samples.
     """
     few, anchored, margin = search.few, search.path.anchored, search.rules.margin
     groups = [(few.summary(rows), np.minimum(rows.margin - margin, rows.clearance)) for rows in few.groups(scouts)]
@@ -41,11 +41,12 @@ def let_go(search: Search, scouts: FloatArray) -> tuple[PlacementFigures, tuple[
         )
         if not any((np.minimum(rows.margin - margin, rows.clearance).min(axis=1) >= 0.0).any() for rows in parts):
             gone.append(move)
+    if not gone:
+        return figures
     left_out = np.isin(anchored.move, gone)
-    if gone:
-        search.sample(replace(search.path, anchored=anchored.take(~left_out)))
-        figures = search.few.figures(scouts)
-    return figures, tuple(dict.fromkeys(anchored.line[left_out].tolist()))
+    search.left_out += tuple(dict.fromkeys(anchored.line[left_out].tolist()))
+    search.sample(replace(search.path, anchored=anchored.take(~left_out)))
+    return search.few.figures(scouts)
 
 
 def infeasible(search: Search, placement: FloatArray) -> UnreachableError:

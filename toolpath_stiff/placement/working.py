@@ -38,6 +38,8 @@ class Search:
         Called with (stages done, stages in all).
     start, now
         The present placement where it lies within the bounds, (0, 6) or (1, 6); its figures, within them or not.
+    left_out
+        Lines of rapids that no placement within the bounds keeps within reach.
     rules
         Get their largest share of extrapolated samples when the scouts are back.
     """
@@ -56,6 +58,7 @@ class Search:
     evaluators: dict[str, Evaluator] = field(default_factory=dict)
     made: list[Evaluator] = field(default_factory=list)
     heeded: IntArray = field(init=False)
+    left_out: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         self.rules, self.start = PlacementRules(self.wanted.margin), np.zeros((0, 6))

@@ -110,9 +110,7 @@ def joint_columns(model: StiffnessModel, readings: Readings) -> FloatArray:
     As `Predictor.joint_columns`, but every pose is solved once for all its directions, without load-dependent effects:
     plans choose from thousands of readings.
     """
-    keys = np.concatenate([readings.position, readings.angles, readings.tool_extension[:, None]], axis=1)
-    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    which = which.reshape(-1)
+    first, which = readings.poses
     places = readings.select(first)
 
     def log_stiffness(of: StiffnessModel) -> FloatArray:

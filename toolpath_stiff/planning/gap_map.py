@@ -84,8 +84,8 @@ def gap_map(machine: Hexapod, plan: RivalPlan, effect_files: Sequence[str | Path
     poses = np.array([[x, y, z, a, b, 0.0] for a, b in angles for z, y, x in product(levels, side, side)])
     good = np.flatnonzero(reachable(machine, poses, 0.0, margin=0.0))
     varied = matters(rivals)
-    setups = menu.setups if varied.setup else menu.setups[:1]
-    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads)))) if varied.load else (menu.usual_load,)
+    setups = menu.setups if "setup" in varied else menu.setups[:1]
+    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads)))) if "force_N" in varied else (menu.usual_load,)
     gaps = np.full((len(setups), len(poses)), np.nan)
     if len(good):
         # One visit to each pose in each set-up.

@@ -59,8 +59,8 @@ class NextVisit(Result):
         The plan's.
     taken
         Readings so far.
-    weights
-        Rival -> probability, the likeliest first.
+    probability
+        Explanation -> probability, the likeliest first; figures as they are written.
     visit
         Number of the next visit; None where the question is settled or nothing is left to go to.
     why
@@ -76,22 +76,16 @@ class NextVisit(Result):
     folder: str | Path
     tables: Tables
     taken: Taken
-    weights: dict[str, float]
+    probability: dict[str, float]
     visit: int | None
     why: str
     unlike: bool
     notes: tuple[str, ...]
 
     @property
-    def probability(self) -> dict[str, float]:
-        """Explanation -> probability, the likeliest first; figures as they are written."""
-        weights: dict[str, float] = certain(self.weights)
-        return weights
-
-    @property
     def settled(self) -> bool:
         """True where one of them has 95 %."""
-        return not self.unlike and max(self.weights.values()) >= SETTLED
+        return not self.unlike and max(self.probability.values()) >= SETTLED
 
     @cached_property
     def rows(self) -> list[PlanRow]:
@@ -105,7 +99,7 @@ class NextVisit(Result):
     @property
     def sentences(self) -> list[str]:
         """Sentences on where the plan stands, and what is next."""
-        chances = ", ".join(f"{name} {percent(weight)}" for name, weight in self.weights.items())
+        chances = ", ".join(f"{name} {percent(weight)}" for name, weight in self.probability.items())
         lines = [f"after {len(self.taken.rows)} readings of this plan: {chances}"]
         if self.unlike:
             return [*lines, "too many readings are far off under each of these: ask tps diagnose what else it could be"]
@@ -149,8 +143,7 @@ class NextVisit(Result):
         return "\n".join([*self.sentences, *(f"note: {note}" for note in self.notes)])
 
     def _short(self) -> str:
-        count = len(self.taken.rows)
-        return f"{count} reading{'' if count == 1 else 's'}, {'settled' if self.settled else 'open'}"
+        return f"{len(self.taken.rows)} readings, {'settled' if self.settled else 'open'}"
 
 
 def next_visit(
@@ -196,7 +189,8 @@ def next_visit(
     if len(taken.rows):
         forecasts, far = conditioned(tables, taken)
         notes += [f"{taken.where[k]}: {size:.1f} standard deviations off under every rival" for k, size in far]
-    probability = {rival.name: rival.weight for rival in sorted(forecasts, key=lambda rival: -rival.weight)}
+    likely = sorted(forecasts, key=lambda rival: -rival.weight)
+    probability: dict[str, float] = certain({rival.name: rival.weight for rival in likely})
     unlike = len(far) > max(1.0, WILD_SHARE * len(taken.rows))
     done = unlike or max(probability.values()) >= SETTLED
     visit, why = (None, "") if done else _next(tables, forecasts, taken)

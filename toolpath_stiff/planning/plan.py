@@ -33,7 +33,7 @@ from toolpath_stiff.planning.gaps import GapShares, ReadingNoise, pair_shares, r
 from toolpath_stiff.planning.indicators import loops_between, with_indicators
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.outlook import SETTLED, Expectation, expected_outcome, percent
-from toolpath_stiff.planning.visits import Matters, Visits, possible_visits
+from toolpath_stiff.planning.visits import Visits, possible_visits
 
 MOST_RIVALS = 6  # a plan that separates more would separate none well
 MOST_VISITS, MOST_REPEATS = 200, 64
@@ -334,11 +334,12 @@ def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
     return tuple(replace(rival, weight=rival.weight / total) for rival in order), notes
 
 
-def matters(rivals: Sequence[Rival]) -> Matters:
+def matters(rivals: Sequence[Rival]) -> set[str]:
     """Columns that the rivals' answers hang on."""
     actives = [active for rival in rivals for active in rival.effects]
-    needs = {column for active in actives for column in active.effect.needs}
-    # A set-up that an effect acts on is a text among its values.
-    chosen = {str(active.values[p.name]) for active in actives for p in active.effect.parameters if p.kind == "text"}
-    loaded = any(active.effect.load_dependent for rival in rivals for active in rival.effects)
-    return Matters(load=loaded or "force_N" in needs, setup="setup" in needs or bool(chosen), time="time_min" in needs)
+    columns = {column for active in actives for column in active.effect.needs}
+    if any(active.effect.load_dependent for active in actives):
+        columns.add("force_N")
+    if any(p.kind == "text" for active in actives for p in active.effect.parameters):  # the set-up that it acts on
+        columns.add("setup")
+    return columns

@@ -12,11 +12,11 @@ from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.files import Content
 from toolpath_stiff.inference.candidates import testable_effects
+from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.judgement import Judgement, judge
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.question import question
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.campaign import RISER, TABLE, Campaign, first_campaign
 from toolpath_stiff.planning.menu import Menu

@@ -7,7 +7,7 @@ cheap.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -129,17 +129,8 @@ class Visits:
         return sum(float(self.further_minutes(chosen[:k])[visit]) for k, visit in enumerate(chosen))
 
 
-@dataclass(frozen=True)
-class Matters:
-    """Columns that the rivals' answers hang on; only these are varied."""
-
-    load: bool = False
-    setup: bool = False
-    time: bool = False
-
-
-def possible_visits(machine: Hexapod, menu: Menu, matters: Matters, rng: Generator) -> Visits:
-    """Every visit that a plan may choose from.
+def possible_visits(machine: Hexapod, menu: Menu, matters: Collection[str], rng: Generator) -> Visits:
+    """Every visit that a plan may choose from; of load, set-up and time only those columns vary that matter.
 
     Each place is offered with every choice of directions, loads and rounds. X, Y, Z are always read: what the rivals do
     not think of shows there. Readings are taken round by round, the axes before the diagonals, in random order: a drift
@@ -150,8 +141,8 @@ def possible_visits(machine: Hexapod, menu: Menu, matters: Matters, rng: Generat
     InputError
         The machine reaches none of the menu's poses.
     """
-    tools, setups = menu.tool_extensions, menu.setups if matters.setup else menu.setups[:1]
-    waits = menu.waits if matters.time and menu.timed else menu.waits[:1]
+    tools, setups = menu.tool_extensions, menu.setups if "setup" in matters else menu.setups[:1]
+    waits = menu.waits if "time_min" in matters and menu.timed else menu.waits[:1]
     per_pose = len(tools) * len(setups) * len(waits)
     new = draw_poses(machine, menu, max(MOST_PLACES // per_pose - len(menu.measured), 40), rng)
     poses = np.concatenate([menu.measured, new])
@@ -168,7 +159,7 @@ def possible_visits(machine: Hexapod, menu: Menu, matters: Matters, rng: Generat
             hint="allow other heights, less tilt or a smaller radius",
         )
     which, extension, setup, wait = (np.array(column) for column in zip(*places, strict=True))
-    loads, every_round = menu.loads if matters.load else (menu.usual_load,), range(1, menu.rounds + 1)
+    loads, every_round = menu.loads if "force_N" in matters else (menu.usual_load,), range(1, menu.rounds + 1)
     directions = AXES + DIAGONALS if menu.oblique else AXES
     rounds, names, forces = (np.array(column) for column in zip(*product(every_round, directions, loads), strict=True))
     axes = np.isin(names, AXES)

@@ -16,7 +16,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import candidates_of
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.portrait.choice import ROUGH, Weighed
+from toolpath_stiff.portrait.choice import ROUGH, Leading, fewest, summed
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.selection import Selection
 from toolpath_stiff.stiffness.term_effect import CATALOGUE_LINKS
@@ -31,9 +31,6 @@ ITSELF = 0.99  # correlation from which a term of the same link is the named eff
 
 
 MOST_TOLD, TOLD = 6, 0.03  # terms that are told, and the least share of one
-
-
-HELD = 0.90  # share that the links and variables told add up to
 
 
 @dataclass(frozen=True)
@@ -91,13 +88,11 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
     logs = sizes.posterior[rows] / ROUGH + prior[rows]
     weights = np.exp(logs - logs.max())
     order = np.argsort(-weights, kind="stable")
-    sized = tuple(terms[i].sized(_size(selection, terms[i], float(sizes.size[i, -1]))) for i in rows[order].tolist())
-    weighed = Weighed(sized, weights[order] / weights.sum(), np.ones(len(rows), dtype=bool))
-    return Alike(
-        _told(weighed),
-        _fewest(weighed.summed(lambda term: term.link)),
-        _fewest(weighed.summed(lambda term: term.variable)),
-    )
+    shares = weights[order] / weights.sum()
+    sized = [terms[i].sized(_size(selection, terms[i], float(sizes.size[i, -1]))) for i in rows[order].tolist()]
+    leading = [(term, share, True) for term, share in zip(sized, shares.tolist(), strict=True)]
+    links, variables = (fewest(summed(leading, of)) for of in (lambda term: term.link, lambda term: term.variable))
+    return Alike(_told(leading), links, variables)
 
 
 def _freedom(problem: Problem, named: Fit) -> float:
@@ -126,19 +121,13 @@ def _correlation(first: FloatArray, second: FloatArray) -> float:
     return float(first @ second) / norm if norm > 0.0 else 0.0
 
 
-def _told(weighed: Weighed) -> tuple[tuple[Term, float], ...]:
+def _told(leading: list[Leading]) -> tuple[tuple[Term, float], ...]:
     """The best of each link, direction and variable, with the shares of all of them."""
     best: dict[tuple[str, str, str], Term] = {}
     shares: dict[tuple[str, str, str], float] = {}
-    for term, weight in zip(weighed.terms, weighed.weights.tolist(), strict=True):
+    for term, weight, _ in leading:
         kind = (term.link, term.direction, term.variable)
         best.setdefault(kind, term)
         shares[kind] = shares.get(kind, 0.0) + weight
     ranked = sorted(shares.items(), key=lambda item: -item[1])
     return tuple((best[kind], share) for kind, share in ranked[:MOST_TOLD] if share >= TOLD)
-
-
-def _fewest(summed: list[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
-    """The fewest that hold `HELD`."""
-    count = 1 + int(np.searchsorted(np.cumsum([share for _, share in summed]), HELD - 1e-9))
-    return tuple(summed[:count])

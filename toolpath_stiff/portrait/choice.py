@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.left_out import HeldOut, held_out
@@ -40,31 +39,27 @@ BEGINNINGS = 3  # further links at which the search begins
 ROUGH, SHAPE = 2.5, 0.0015
 
 
+HELD = 0.90  # probability that a set of links or variables adds up to
+
+
 FAINT = 0.02  # share below which a description, or a term as the leading one of it, is left out of the sums
 
 
-@dataclass(frozen=True)
-class Weighed:
-    """Terms that may be the leading one, with their posterior probabilities, the likeliest first.
+Leading = tuple[Term, float, bool]  # may be the leading term; its probability; whether it was tried in the chosen one
 
-    Attributes
-    ----------
-    terms, weights
-        N terms, (N,) probabilities.
-    chosen
-        (N,) whether in the place of the leading term of the description that was chosen.
-    """
 
-    terms: tuple[Term, ...]
-    weights: FloatArray
-    chosen: NDArray[np.bool_]
+def summed(leading: Sequence[Leading], of: Callable[[Term], str]) -> list[tuple[str, float]]:
+    """Name -> probability summed over the terms, the likeliest first."""
+    sums: dict[str, float] = {}
+    for term, weight, _ in leading:
+        sums[of(term)] = sums.get(of(term), 0.0) + weight
+    return sorted(sums.items(), key=lambda item: (-item[1], item[0]))
 
-    def summed(self, of: Callable[[Term], str]) -> list[tuple[str, float]]:
-        """Name -> probability summed over the terms, the likeliest first."""
-        sums: dict[str, float] = {}
-        for term, weight in zip(self.terms, self.weights.tolist(), strict=True):
-            sums[of(term)] = sums.get(of(term), 0.0) + weight
-        return sorted(sums.items(), key=lambda item: (-item[1], item[0]))
+
+def fewest(summed: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
+    """The fewest names that hold `HELD` of the probability."""
+    count = 1 + int(np.searchsorted(np.cumsum([share for _, share in summed]), HELD - 1e-9))
+    return tuple(summed[:count])
 
 
 @dataclass(frozen=True)
@@ -75,17 +70,14 @@ class Chosen:
     ----------
     description
         The terms, the leading one first.
-    chance
-        How often something as strong as the leading term comes up by chance.
-    weighed
-        What else may be the leading term.
+    leading
+        What else may be the leading term, with posterior probabilities, the likeliest first.
     held
         Errors at left-out points.
     """
 
     description: Description
-    chance: float
-    weighed: Weighed
+    leading: list[Leading]
     held: HeldOut
 
 
@@ -105,9 +97,8 @@ def choose(selection: Selection) -> tuple[Chosen | None, float]:
         descriptions += [_completed(selection, other, threshold) for other in others]
     descriptions = _different(sorted(descriptions, key=lambda description: -_worth(description, threshold)))
     descriptions = [_leading_first(selection, description) for description in descriptions]
-    return Chosen(
-        descriptions[0], chance, weigh(selection, descriptions, threshold), _held(selection, descriptions[0])
-    ), chance
+    leading = weigh(selection, descriptions, threshold)
+    return Chosen(descriptions[0], leading, _held(selection, descriptions[0])), chance
 
 
 def _completed(selection: Selection, begun: Description, threshold: float) -> Description:
@@ -215,32 +206,26 @@ def temper(selection: Selection, description: Description, gain: float) -> float
     return ROUGH * max(left, 1.0) + SHAPE * max(gain, 0.0)
 
 
-def weigh(selection: Selection, descriptions: Sequence[Description], threshold: float) -> Weighed:
-    """Posterior probabilities of what may be the leading term, over descriptions, the chosen one first."""
+def weigh(selection: Selection, descriptions: Sequence[Description], threshold: float) -> list[Leading]:
+    """What may be the leading term, over descriptions, the chosen one first; with posterior probabilities."""
     costs = [_costs(selection, description) for description in descriptions]
     flat = temper(selection, descriptions[0], float(costs[0].max()))
-    terms: list[Term] = []
-    logs: list[FloatArray] = []
-    chosen: list[NDArray[np.bool_]] = []
-    worths = np.array(
-        [description.posterior / flat - 0.5 * threshold * _searched(description) for description in descriptions]
-    )
+    worths = np.array([whole.posterior / flat - 0.5 * threshold * _searched(whole) for whole in descriptions])
+    leading: list[tuple[Term, float, bool]] = []
     for number, (description, cost) in enumerate(zip(descriptions, costs, strict=True)):
         leads = np.exp((cost - cost.max()) / flat)
         leads /= leads.sum()
         for k in np.flatnonzero(leads >= FAINT).tolist():
-            if np.exp(worths[number] - worths.max()) * leads[k] < FAINT and (number, k) != (0, 0):
+            chosen = (number, k) == (0, 0)
+            if np.exp(worths[number] - worths.max()) * leads[k] < FAINT and not chosen:
                 continue
-            terms_here, log = _in_place(selection, description, k, flat)
-            terms += terms_here
-            logs.append(log - 0.5 * threshold * (_searched(description) - 1) + np.log(leads[k]))
-            chosen.append(np.full(len(terms_here), (number, k) == (0, 0)))
-    every = np.concatenate(logs)
-    weights = np.exp(every - every.max())
-    order = np.argsort(-weights, kind="stable")
-    return Weighed(
-        tuple(terms[i] for i in order.tolist()), weights[order] / weights.sum(), np.concatenate(chosen)[order]
-    )
+            terms, logs = _in_place(selection, description, k, flat)
+            logs = logs - 0.5 * threshold * (_searched(description) - 1) + np.log(leads[k])
+            leading += [(term, log, chosen) for term, log in zip(terms, logs.tolist(), strict=True)]
+    weights = np.exp(np.array([log for _, log, _ in leading]) - max(log for _, log, _ in leading))
+    weights /= weights.sum()
+    order = np.argsort(-weights, kind="stable").tolist()
+    return [(leading[i][0], float(weights[i]), leading[i][2]) for i in order]
 
 
 def _in_place(selection: Selection, description: Description, k: int, flat: float) -> tuple[list[Term], FloatArray]:

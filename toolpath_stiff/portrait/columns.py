@@ -222,7 +222,7 @@ class Ground:
         if term.action == "joint offset":
             strut, axis = (term.where or 1) - 1, "XYZ".index(term.direction)
             index = 3 * (strut + 6 * (term.column == "platform")) + axis
-            return np.asarray(-self.compliance * self.predictor.joint_columns()[:, index])
+            return np.asarray(-self.compliance * self.predictor.joint_columns[:, index])
         if term.action in ("reading factor", "reading shift"):
             share = reading_share(plain, path)
             return np.asarray(share * (self.compliance if term.action == "reading factor" else 1.0 / self.data.force))

@@ -194,8 +194,7 @@ def dictionary_of(ground: Ground) -> Dictionary:
     blocks: list[FloatArray] = []
     limits: list[float] = []
     signs: list[bool] = []
-    prior = Prior(ground)
-    for local in prior.locals:
+    for local, priors in place_priors(ground):
         plain = local.term("constant", "offset", ())
         share, signed = ground.share(plain), len(plain.signs) > 1
         limit = max(abs(bound) for bound in plain.bounds) * plain.si
@@ -207,7 +206,7 @@ def dictionary_of(ground: Ground) -> Dictionary:
                     continue
                 blocks.append(ground.columns(plain, share, values))
                 kinds = Counter(shape for shape, _ in named)
-                log = prior.place(local, variable) - float(np.log(len(kinds) * len(columns)))
+                log = priors[variable] - float(np.log(len(kinds) * len(columns)))
                 entries += [
                     Entry(local, variable, column, shape, constants, log - float(np.log(kinds[shape])))
                     for shape, constants in named
@@ -233,52 +232,36 @@ def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]
     return ["", "X", "Y", *(SWINGS if joints else ())] if variable == "tilt" else [""]
 
 
-class Prior:
-    """Logarithms of prior weights: even over links, over the variables of each, over places and directions.
+def place_priors(ground: Ground) -> list[tuple[Local, dict[str, float]]]:
+    """Every link with its places and directions, and for each variable its log prior weight, all shapes together.
 
-    Attributes
-    ----------
-    locals
-        Every link with its places and directions.
-    places, variables
-        Link, variable that the readings tell and whether at one place -> how many; link -> how many variables.
+    Even over links, over the variables of each that the readings tell, over places and directions. A link with single
+    places (a joint, a vertex) has half for one of them and half for all of them together.
     """
+    every = locals_of(ground.data.extra)
+    known = {variable for local in every for variable in local.variables if columns_of(variable, ground)}
+    places = Counter((local.link, name, local.single) for local in every for name in local.variables if name in known)
+    variables = Counter(link for link, _ in {key[:2] for key in places})
 
-    def __init__(self, ground: Ground) -> None:
-        self.locals = locals_of(ground.data.extra)
-        every = {variable for local in self.locals for variable in local.variables}
-        known = {variable for variable in every if columns_of(variable, ground)}
-        self.places = Counter(
-            (local.link, variable, local.single)
-            for local in self.locals
-            for variable in local.variables
-            if variable in known
-        )
-        self.variables = Counter(link for link, _ in {key[:2] for key in self.places})
+    def prior(local: Local, name: str) -> float:
+        share = (SIDE if name in local.side else 1.0) / max(places[local.link, name, local.single], 1)
+        share *= 0.5 if places[local.link, name, not local.single] else 1.0
+        return float(np.log(share / variables[local.link] / len(variables)))
 
-    def place(self, local: Local, variable: str) -> float:
-        """Of a link with one place and direction and a variable, all shapes together.
-
-        A link with single places (a joint, a vertex) has half for one of them and half for all of them together.
-        """
-        both = (local.link, variable, not local.single) in self.places
-        share = (SIDE if variable in local.side else 1.0) * (0.5 if both else 1.0)
-        count = max(self.places.get((local.link, variable, local.single), 1), 1)
-        return float(np.log(share / count / self.variables[local.link] / len(self.variables)))
+    return [(local, {name: prior(local, name) for name in (*local.variables, *local.crossed)}) for local in every]
 
 
 def crossed(term: Term, ground: Ground) -> list[Entry]:
     """The same variable and shape, constants included, at every other link, place and direction that may feel it."""
     if term.variable in ONCE:
         return []
-    prior, entries = Prior(ground), []
-    for local in prior.locals:
+    entries: list[Entry] = []
+    for local, priors in place_priors(ground):
         felt = (term,) if term.times is None else (term, term.times)
         swings = any(part.column in SWINGS for part in felt) and local.link != "joints"
-        variables = (*local.variables, *local.crossed)
-        if swings or local.action in ALONE or not all(part.variable in variables for part in felt):
+        if swings or local.action in ALONE or not all(part.variable in priors for part in felt):
             continue
-        signed, log = len(local.term("constant", "offset", ()).signs) > 1, prior.place(local, term.variable)
+        signed, log = len(local.term("constant", "offset", ()).signs) > 1, priors[term.variable]
         entries += [
             Entry(local, term.variable, term.column, shape, constants, log, term.times)
             for shape, constants in _translated(term, signed, ground)

@@ -11,7 +11,7 @@ from toolpath_stiff.portrait.words import alike_text, portrait_text, term_words
 from toolpath_stiff.stiffness.terms import Term
 from toolpath_stiff.units import json_number
 
-SHARES = ("explained", "error", "held_out_rms", "noise_floor", "smooth_rms")  # of a portrait
+SHARES = ("explained", "error", "held_out_rms", "noise_floor")  # of a portrait
 
 
 def portrait_entry(portrait: Portrait) -> Document:

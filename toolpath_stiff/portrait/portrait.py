@@ -19,14 +19,10 @@ from toolpath_stiff.inference.gates import simulate
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.portrait.choice import Chosen, choose
+from toolpath_stiff.portrait.choice import Chosen, choose, fewest, summed
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.selection import Description, Selection
-from toolpath_stiff.portrait.smooth import smooth_rms
 from toolpath_stiff.stiffness.terms import Term
-
-HELD = 0.90  # probability that a set of links or variables adds up to
-
 
 MOST_LINKS, MOST_VARIABLES, MOST_ALIKE = 4, 3, 4
 
@@ -65,9 +61,8 @@ class Portrait:
         Other leading terms that fit as well.
     explained
         Share of the weighted squares above noise that the terms take.
-    error, held_out_rms, noise_floor, smooth_rms
-        Mean error with the terms; rms error at left-out points; what noise alone leaves there; what a smooth
-        description reaches.
+    error, held_out_rms, noise_floor
+        Mean error with the terms; rms error at left-out points; what noise alone leaves there.
     look_elsewhere
         How often the best of the whole dictionary gains as much by chance.
     before, after, signature
@@ -84,7 +79,6 @@ class Portrait:
     error: float = np.nan
     held_out_rms: float = np.nan
     noise_floor: float = np.nan
-    smooth_rms: float = np.nan
     look_elsewhere: float = 1.0
     before: FloatArray | None = None
     after: FloatArray | None = None
@@ -92,7 +86,7 @@ class Portrait:
     values: FloatArray | None = None
 
 
-def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: str = "") -> Portrait:
+def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portrait:
     """Describe what a fit leaves.
 
     Parameters
@@ -103,8 +97,6 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: st
         The fit that leaves something: the model with its strut law refitted, or the best explanation.
     seed
         Of the simulated campaigns.
-    form
-        The form of discrepancy that stands out most, in words, for the yardstick.
     """
     selection = Selection(problem, base, noise, seed)
     start = selection.start
@@ -113,10 +105,9 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: st
     else:
         chosen, chance = choose(selection)
     points = problem.predictor.data.point
-    smooth = smooth_rms(problem, start.fit, form)
     if chosen is None:
         return Portrait(
-            look_elsewhere=chance, smooth_rms=smooth, error=float(start.fit.errors.mean()),
+            look_elsewhere=chance, error=float(start.fit.errors.mean()),
             held_out_rms=held_out(start.fit, points).rms, noise_floor=noise_floor(selection, start),
             before=base.residual, after=start.fit.residual,
         )  # fmt: skip
@@ -125,15 +116,14 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: st
     values = selection.ground.values(leading.variable, leading.column)
     return Portrait(
         terms=tuple(_sized(selection.ground, description, k) for k in range(len(description.terms))),
-        links=_honest(chosen.weighed.summed(lambda term: term.link), MOST_LINKS),
-        variables=_honest(chosen.weighed.summed(lambda term: term.variable), MOST_VARIABLES, cut=True),
+        links=_honest(summed(chosen.leading, lambda term: term.link), MOST_LINKS),
+        variables=_honest(summed(chosen.leading, lambda term: term.variable), MOST_VARIABLES, cut=True),
         alike=_alike(selection, chosen),
         explained=_explained(selection, start, description),
         error=float(description.fit.errors.mean()),
         held_out_rms=chosen.held.rms,
         noise_floor=noise_floor(selection, description),
-        smooth_rms=smooth,
-        look_elsewhere=chosen.chance,
+        look_elsewhere=chance,
         before=start.fit.residual,
         after=description.fit.residual,
         signature=-np.log1p(np.maximum(leading.size * selection.ground.column(leading) / selection.compliance, -0.9)),
@@ -169,15 +159,9 @@ def _sized(ground: Ground, description: Description, k: int, probability: float 
 
 
 def _honest(summed: Sequence[tuple[str, float]], most: int, cut: bool = False) -> tuple[tuple[str, float], ...]:
-    """The fewest that hold `HELD`; where that takes more than `most`, none, or the first ones if `cut`."""
-    fewest: list[tuple[str, float]] = []
-    for name, weight in summed:
-        fewest.append((name, weight))
-        if sum(w for _, w in fewest) >= HELD:
-            break
-    if len(fewest) > most:
-        return tuple(fewest[:most]) if cut else ()
-    return tuple(fewest)
+    """The fewest that hold most of the probability; where these are more than `most`, none, or the first if `cut`."""
+    names = fewest(summed)
+    return names[:most] if cut or len(names) <= most else ()
 
 
 def _alike(selection: Selection, chosen: Chosen) -> tuple[Sized, ...]:
@@ -186,8 +170,7 @@ def _alike(selection: Selection, chosen: Chosen) -> tuple[Sized, ...]:
     others = selection.scattered(selection.without(description, 0), description)
     seen = {_kind(description.terms[0])}
     alike: list[Sized] = []
-    weighed = chosen.weighed
-    for term, weight, here in zip(weighed.terms, weighed.weights.tolist(), weighed.chosen.tolist(), strict=True):
+    for term, weight, here in chosen.leading:
         if weight < SHOWN or len(alike) == MOST_ALIKE:
             break
         if not here or _kind(term) in seen:
@@ -206,7 +189,7 @@ def _kind(term: Term) -> tuple[object, ...]:
 def _explained(selection: Selection, start: Description, description: Description) -> float:
     """Under the scatter of the description, so that wild readings count alike."""
     precision, free = description.fit.scatter.precision, len(selection.compliance) - 2
-    fixed = selection.described((), start.columns, start.scale, start.fit.law, description.fit.scatter)
+    fixed = selection.described((), start.fit.law, description.fit.scatter)
     before, after = (float(precision.squares(fitted.fit.residual)) for fitted in (fixed, description))
     return float(np.clip((before - after) / max(before - free, 1e-9), 0.0, 1.0)) if before > after else 0.0
 

@@ -126,8 +126,7 @@ class Selection:
     @property
     def start(self) -> Description:
         """Nothing but the base fit."""
-        none = np.zeros((0, len(self.compliance)))
-        return self.described((), none, np.zeros(0), self.base.law, self.base.scatter)
+        return self.described((), self.base.law, self.base.scatter)
 
     def fitted(
         self, columns: FloatArray, low: FloatArray, high: FloatArray, law: FloatArray, precision: Precision
@@ -168,10 +167,9 @@ class Selection:
         bounds = np.array([[bound * term.si for bound in term.bounds] for term in terms]).reshape(-1, 2)
         return bounds[:, 0] * scale, bounds[:, 1] * scale
 
-    def described(
-        self, terms: Sequence[Term], columns: FloatArray, scale: FloatArray, law: FloatArray, scatter: Scatter
-    ) -> Description:
+    def described(self, terms: Sequence[Term], law: FloatArray, scatter: Scatter) -> Description:
         """Terms fitted together, with the readings that this fit takes for wild."""
+        columns, scale = self._scaled(terms)
         low, high = self.limits(terms, scale)
         for _ in range(ROUNDS):
             sizes = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
@@ -194,9 +192,7 @@ class Selection:
 
     def only(self, description: Description, rows: Sequence[int]) -> Description:
         """Some terms of a description, in this order, refitted."""
-        rows, fit = list(rows), description.fit
-        terms = [description.terms[k] for k in rows]
-        return self.described(terms, description.columns[rows], description.scale[rows], fit.law, fit.scatter)
+        return self.described([description.terms[k] for k in rows], description.fit.law, description.fit.scatter)
 
     def without(self, description: Description, k: int) -> Description:
         """A description less one of its terms, refitted."""
@@ -246,8 +242,7 @@ class Selection:
 
     def together(self, before: Description, terms: Sequence[Term]) -> Sizes:
         """Each of some terms refitted along with a description."""
-        columns = np.stack([self.ground.column(term) for term in terms]) / self.compliance
-        scale = np.maximum(np.sqrt((columns**2).mean(axis=1)), 1e-300)
+        columns, scale = self._scaled(terms)
 
         def beside(shared: FloatArray, each: FloatArray) -> FloatArray:
             """(G, p + 1, ..) of what all share (p, ..) and of each term (G, ..)."""
@@ -255,7 +250,7 @@ class Selection:
 
         limits = zip(self.limits(before.terms, before.scale), self.limits(terms, scale), strict=True)
         low, high = (beside(shared, each) for shared, each in limits)
-        every = beside(before.columns, columns / scale[:, None])
+        every = beside(before.columns, columns)
         return self.fitted(every, low, high, before.fit.law, before.fit.scatter.precision)
 
     def grown(self, before: Description) -> Description | None:
@@ -287,21 +282,17 @@ class Selection:
 
     def extended(self, before: Description, term: Term) -> Description:
         """A description with a term more, all refitted."""
-        column, scale = self._scaled(term)
-        columns, scales = np.concatenate([before.columns, column[None]]), np.append(before.scale, scale)
-        grown = self.described((*before.terms, term), columns, scales, before.fit.law, before.fit.scatter)
-        if any(sized.action in NOT_LINEAR for sized in grown.terms):
-            for _ in range(AT_SIZE):
-                scaled = [self._scaled(sized) for sized in grown.terms]
-                columns, scales = np.stack([column for column, _ in scaled]), np.array([scale for _, scale in scaled])
-                grown = self.described(grown.terms, columns, scales, grown.fit.law, grown.fit.scatter)
+        grown = self.described((*before.terms, term), before.fit.law, before.fit.scatter)
+        for _ in range(AT_SIZE if any(sized.action in NOT_LINEAR for sized in grown.terms) else 0):
+            grown = self.described(grown.terms, grown.fit.law, grown.fit.scatter)
         return grown
 
-    def _scaled(self, term: Term) -> tuple[FloatArray, float]:
-        """(n,) change of compliance over the base model's for an rms change of 1, and that of an SI unit of size."""
-        column = self.ground.column(term) / self.compliance
-        scale = float(np.sqrt(np.mean(column**2)))
-        return column / scale, scale
+    def _scaled(self, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray]:
+        """(p, n) change of compliance over the base model's for an rms change of 1, (p,) that of an SI unit of size."""
+        columns = np.array([self.ground.column(term) for term in terms]).reshape(-1, len(self.compliance))
+        columns = columns / self.compliance
+        scale = np.maximum(np.sqrt((columns**2).mean(axis=1)), 1e-300)
+        return columns / scale[:, None], scale
 
     def settled(self, before: Description, grown: Description) -> Description:
         """With finer constants of the last term's shape."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.portrait.alike import Alike
@@ -42,10 +42,44 @@ ROCKS = {
 }  # fmt: skip
 
 
+OF_HEAD = {"X": "along the platform's X", "Y": "along the platform's Y", "radial": "across the tool axis"}
+
+
 PINNED = {"radial": "radially", "tangential": "tangentially"}
 
 
 TIPS = {"X": "tips about the platform's Y", "Y": "tips about the platform's X", "radial": "tips"}
+
+
+# Way of acting -> what gives way.
+CAUSES = {
+    "reading factor": "deflections{along} are read too {large} by a share",
+    "reading shift": "deflections{along} are read too {large} by a displacement",
+    "joint offset": "the {column} joint of {strut} stands off its place along {axis}",
+    "coupling": "struts {first:.0f} and {second:.0f} are coupled: force in one stretches the other",
+    "strut factor": "{softer}",
+    "strut": "the joints of {strut} give way",
+    "turning": "the joints{of} resist turning",
+    **dict.fromkeys(PINS, "the {pin} way along a pin that stands {pinned}"),
+    "vertex": "{vertex}",
+    "rocking": "the {link} {rocks}",
+    "tilting": "the {link} {tips} under the load's moment",
+    "give": "the {link} gives way {gives}",
+}
+
+
+# Constant of a shape that is not in those after it, or "signed" of a straight line to both sides -> how it varies.
+COURSES = {
+    "power": "{power}, the size given at {reference})",
+    "signed": " in a straight line with {name}, nothing at {from} and in full at {end}",
+    "reach": ", with the square of {name} from {centre}, in full {reach} from there",
+    "width": " where {name} is about {centre} (to some {width} either side)",
+    "period": " in a wave over {name} with a period of {period}",
+    "within": " until {name} reaches {within}, and no further",
+    "beyond": " as far as {name} is above {beyond}, which friction holds",
+    "edge": " where {name} is {side} {edge}",
+    "end": " where {name} is {side} {from}, in full at {end}",
+}
 
 
 MOST_SAID = 3  # terms in a sentence on what else would look the same; a document has more
@@ -61,47 +95,21 @@ def term_words(term: Term) -> str:
 
 def _cause(term: Term) -> str:
     """Link, place and direction."""
-    if term.action in ("reading factor", "reading shift"):
-        along = f" along {term.direction}" if term.direction in ("X", "Y", "Z") else ""
-        off = "by a share" if term.action == "reading factor" else "by a displacement"
-        return f"deflections{along} are read too {'large' if term.size >= 0.0 else 'small'} {off}"
-    if term.action == "joint offset":
-        return f"the {term.column} joint of strut {term.where} stands off its place along {term.direction}"
-    if term.action == "coupling":
-        pair = f"{term.constants['first']:.0f} and {term.constants['second']:.0f}"
-        return f"struts {pair} are coupled: force in one stretches the other"
-    if term.action in ("strut factor", "strut", "turning", *PINS):
-        return _cause_in_struts(term)
-    return _cause_in_link(term)
-
-
-def _cause_in_struts(term: Term) -> str:
-    """The same of struts and their joints: all, or one."""
-    if term.action == "strut factor":
-        side = "softer" if term.size >= 0.0 else "stiffer"
-        return f"strut {term.where} is {side}" if term.where else f"the struts are {side}"
-    if term.action == "strut":
-        return f"the joints of strut {term.where} give way" if term.where else "the joints of the struts give way"
-    if term.action == "turning":
-        return f"the joints of strut {term.where} resist turning" if term.where else "the joints resist turning"
-    which = f"joint of strut {term.where} gives" if term.where else "joints of the struts give"
-    return f"the {term.action.removesuffix(' pin')} {which} way along a pin that stands {PINNED[term.direction]}"
-
-
-def _cause_in_link(term: Term) -> str:
-    """The same of a link that gives way, or of its vertices."""
-    if term.action == "vertex":
-        which = f"{term.link} vertex {term.where} gives" if term.where else f"the vertices of the {term.link} give"
-        return f"{which} way {GIVES[term.direction]}"
-    if term.action == "rocking":
-        return f"the {term.link} {ROCKS[term.direction]}"
-    if term.action == "tilting":
-        return f"the {term.link} {TIPS[term.direction]} under the load's moment"
-    along = GIVES[term.direction]
-    if term.link in ("tool", "platform"):
-        axes = {"X": "along the platform's X", "Y": "along the platform's Y", "radial": "across the tool axis"}
-        along = axes.get(term.direction, along)
-    return f"the {term.link} gives way {along}"
+    single, link, direction, more = term.where is not None, term.link, term.direction, term.size >= 0.0
+    gives = GIVES.get(direction, "")
+    if link in ("tool", "platform"):
+        gives = {**GIVES, **OF_HEAD}.get(direction, "")
+    vertex = f"{link} vertex {term.where} gives" if single else f"the vertices of the {link} give"
+    strut, joint = (f"strut {term.where}", "joint") if single else ("the struts", "joints")
+    softer = f"{strut} {'is' if single else 'are'} {'softer' if more else 'stiffer'}"
+    words = {
+        "along": f" along {direction}" if direction in ("X", "Y", "Z") else "", "large": "large" if more else "small",
+        "of": f" of {strut}" if single else "", "softer": softer, "strut": strut, "gives": gives,
+        "pin": f"{term.action.removesuffix(' pin')} {joint} of {strut} give{'s' if single else ''}",
+        "vertex": f"{vertex} way {GIVES.get(direction, '')}", "pinned": PINNED.get(direction, ""), "link": link,
+        "rocks": ROCKS.get(direction, ""), "tips": TIPS.get(direction, ""), "column": term.column, "axis": direction,
+    }  # fmt: skip
+    return CAUSES[term.action].format(**words, **term.constants)
 
 
 def _with(term: Term, signed: bool) -> str:
@@ -110,54 +118,22 @@ def _with(term: Term, signed: bool) -> str:
         return ""
     if term.variable == "setup":
         return f" in set-up {term.column}"
-    if term.variable == "force sign":
-        return " in tension" if term.constants["side"] > 0.0 else " in compression"
     constants = term.constants
+    if term.variable == "force sign":
+        return " in tension" if constants["side"] > 0.0 else " in compression"
     name, si, unit = SAID.get(term.variable, (term.variable, 1.0, ""))
     if term.variable == "tilt" and term.column:
         name = f"the swing of the {term.column}s" if term.column in SWINGS else f"the lean towards {term.column}"
-
-    def shown(value: float) -> str:
-        return f"{float(f'{value / si:.3g}'):g} {unit}".rstrip()
-
-    if term.shape == "slope":
-        return _slope_words(term, name, shown, signed)
-    if term.shape == "square":
-        centre, reach = shown(constants["centre"]), shown(constants["reach"])
-        return f", with the square of {name} from {centre}, in full {reach} from there"
-    if term.shape == "bump":
-        centre, width = shown(constants["centre"]), shown(2.0 * constants["width"])
-        return f" where {name} is about {centre} (to some {width} either side)"
-    if term.shape == "periodic":
-        return f" in a wave over {name} with a period of {shown(constants['period'])}"
-    return _threshold_words(term, name, shown)
-
-
-def _slope_words(term: Term, name: str, shown: Callable[[float], str], signed: bool) -> str:
-    """A straight line or a power of a variable, in words."""
-    constants = term.constants
+    begins, scaled = constants.get("from", constants.get("start", 0.0)), {"width": 2.0 * constants.get("width", 0.0)}
+    numbers = constants | scaled | {"from": begins}
+    values = {key: f"{float(f'{value / si:.3g}'):g} {unit}".rstrip() for key, value in numbers.items()}
+    values["side"] = "above" if constants.get("side", constants.get("end", 0.0) - begins) > 0.0 else "below"
     if "power" in constants:
-        fading = "less" if constants["power"] < 0.0 else "more"
-        reference = shown(constants["reference"])
-        return f", {fading} with {name} (power {constants['power']:.2g}, the size given at {reference})"
-    start, end = shown(constants["start"]), shown(constants["end"])
-    if signed:
-        return f" in a straight line with {name}, nothing at {start} and in full at {end}"
-    side = "above" if constants["end"] > constants["start"] else "below"
-    return f" where {name} is {side} {start}, in full at {end}"
-
-
-def _threshold_words(term: Term, name: str, shown: Callable[[float], str]) -> str:
-    """A step, a line from a value on, or what friction holds, in words."""
-    constants = term.constants
-    if "from" in constants:
-        side = "above" if constants["end"] > constants["from"] else "below"
-        return f" where {name} is {side} {shown(constants['from'])}, in full at {shown(constants['end'])}"
-    if "within" in constants:
-        return f" until {name} reaches {shown(constants['within'])}, and no further"
-    if "beyond" in constants:
-        return f" as far as {name} is above {shown(constants['beyond'])}, which friction holds"
-    return f" where {name} is {'above' if constants['side'] > 0.0 else 'below'} {shown(constants['edge'])}"
+        trend = "less" if constants["power"] < 0.0 else "more"
+        values["power"] = f", {trend} with {name} (power {constants['power']:.2g}"
+    straight = signed and term.shape == "slope"
+    kind = next(key for key in COURSES if key in constants or (key == "signed" and straight))
+    return COURSES[kind].format(name=name, **values)
 
 
 def size_words(sized: Sized) -> str:
@@ -183,8 +159,7 @@ def portrait_text(portrait: Portrait) -> str:
         parts.append(f"Beside it: {'; '.join(f'{term_words(sized.term)}, {size_words(sized)}' for sized in others)}.")
     parts.append(
         f"This takes {100.0 * portrait.explained:.0f} % of the misfit; rms error at points left out "
-        f"{100.0 * portrait.held_out_rms:.2f} % (noise alone {100.0 * portrait.noise_floor:.2f} %, a smooth unknown "
-        f"{100.0 * portrait.smooth_rms:.2f} %)."
+        f"{100.0 * portrait.held_out_rms:.2f} % (noise alone {100.0 * portrait.noise_floor:.2f} %)."
     )
     parts.append(_sets(portrait))
     if portrait.alike:

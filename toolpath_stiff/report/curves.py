@@ -7,7 +7,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.path import Samples
+from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 

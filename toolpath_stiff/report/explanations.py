@@ -9,8 +9,8 @@ from toolpath_stiff.diagnosis.rows import SHOWN, FittedSize, HypothesisRow, perc
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, next_steps, verdict_text, why
 from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import parted
-from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.errors import scatter_text
+from toolpath_stiff.inference.hidden_sizes import Detectable
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.portrait.words import portrait_text
 from toolpath_stiff.report.tables import Table

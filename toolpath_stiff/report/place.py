@@ -28,7 +28,9 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
     """The chosen placement in words, each with its label."""
     best, present, blocks = placed.chosen, placed.present, placed.offsets
     which = (
-        f"placement {best.number} of {len(placed.front)}, picked" if placed.picked else f"objective {placed.objective}"
+        f"placement {best.number} of {len(placed.front)}, picked"
+        if placed.picked
+        else f"objective {placed.task.rules.objective}"
     )
     zero = f"X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees ({which})"
     tilt = f"set-up tilted by A{best.a_deg:.3f} B{best.b_deg:.3f} degrees"

@@ -14,7 +14,7 @@ from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import headline_rows, plunging_rows
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.documents import Document
-from toolpath_stiff.path import Samples, sample_moves
+from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.placement.paths import placed_path
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.rows import PlacementRow
@@ -39,7 +39,7 @@ def page_pieces(placed: Placement) -> Iterator[str]:
         "front": [vars(row) for row in placed.front],
         "chosen": (placed.chosen.number or 0) - 1,
         "recommended": placed.search.recommended - 1,
-        "before": present.figures() if present else None,
+        "before": vars(present) if present else None,
         "before_reason": plain(placed.present_reason),
         "force": best.force,
         "keepouts": [
@@ -56,7 +56,7 @@ def page_pieces(placed: Placement) -> Iterator[str]:
         data=data,
         title=f"Placements of {placed.best.program.name}",
         about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
-        objective=placed.objective,
+        objective=placed.task.rules.objective,
         load=str(best.load),
         note=note,
         warnings=placed.warnings,

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.arc import ARCS
 from toolpath_stiff.nc.codes.drilling import CYCLES
-from toolpath_stiff.nc.codes.motion import ARCS
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
 from toolpath_stiff.nc.moves import RAPID
@@ -33,7 +33,7 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     source, out = controls.source, controls.out
     controls.block = block
     controls.trace.clear()
-    first, first_out = len(source.recorder.line), len(out.recorder.line)
+    first, first_out = len(source.recorder.recent), len(out.recorder.recent)
     controls.current = current = begin(source, block)
     letters = {word.letter for word in block.words}
     refused = {
@@ -159,14 +159,14 @@ def _cycle(controls: Controls, plane: str) -> None:
 
 def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
     """The moves, rapids and dwells of a cycle along an axis that is none any more."""
-    source, rows = controls.source, controls.source.recorder
+    source = controls.source
     if controls.linearise is None:
         axis = AXES[geometry.PLANES[source.plane][2]]
         raise controls.refusal(
             f"{source.motion} drills along {axis}, and the placement turns the work out of it", LINEARISE
         )
-    moves = zip(rows.motion[first:], rows.end[first:], rows.dwell[first:], strict=True)
-    return [("G0" if motion == RAPID else "G1", end, dwell) for motion, end, dwell in moves]
+    moves = source.recorder.recent[first:]
+    return [("G0" if move.motion == RAPID else "G1", move.end, move.dwell) for move in moves]
 
 
 def _piece_count(controls: Controls) -> int:

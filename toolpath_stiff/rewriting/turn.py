@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.nc.geometry import frame_of, point_on_arc
+from toolpath_stiff.nc.courses import frame_of, point_on_arc
 from toolpath_stiff.nc.moves import RAPID, Arc, Recorder
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.units import ShopPose
@@ -156,8 +156,8 @@ class CuttingMove(NamedTuple):
 
 def cutting_rows(recorder: Recorder, first: int) -> list[CuttingMove]:
     """Cutting moves recorded from `first` on."""
-    rows = zip(recorder.start[first:], recorder.end[first:], recorder.arc[first:], recorder.motion[first:], strict=True)
-    return [CuttingMove(start, end, arc) for start, end, arc, motion in rows if motion != RAPID]
+    moves = recorder.recent[first:]
+    return [CuttingMove(move.start, move.end, move.arc) for move in moves if move.motion != RAPID]
 
 
 def differences(turn: Turn, wanted: list[CuttingMove], written: list[CuttingMove], unit: float) -> str:

@@ -5,7 +5,6 @@ A `Table` maps column names of measurement files to arrays or lists of one lengt
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ LONG_TOOL = 150.0  # mm longer, at four poses
 RISER_EVERY = 3  # each third pose is taken on a riser
 
 
-def campaign(layout: str, nominal: Nominal, plan: Mapping[str, Any] | None, rng: Generator) -> Table:
+def campaign(layout: str, nominal: Nominal, plan: Table | None, rng: Generator) -> Table:
     """The campaign of a layout. Raises `InputError`."""
     if layout not in LAYOUTS:
         raise InputError(f"layout {layout!r}", expected=", ".join(LAYOUTS))
@@ -45,14 +44,7 @@ def campaign(layout: str, nominal: Nominal, plan: Mapping[str, Any] | None, rng:
         raise InputError("layout campaign and a file of poses go together", expected="both, or neither")
     if plan is not None:
         return dict(plan)
-    if layout == "paper":
-        return paper_campaign()
-    try:
-        return tilted_campaign(nominal, rng)
-    except LookupError as error:
-        raise InputError(
-            f"machine {nominal.name}: {error}", hint="use layout campaign with poses of your own for this machine"
-        ) from None
+    return paper_campaign() if layout == "paper" else tilted_campaign(nominal, rng)
 
 
 def paper_campaign() -> Table:
@@ -109,9 +101,12 @@ def _tilted_poses(nominal: Nominal, rng: Generator) -> FloatArray:
         radius, azimuth = TILTED_RADIUS * np.sqrt(rng.random()), rng.uniform(0.0, 2.0 * np.pi)
         tilt, about = rng.uniform(5.0, 25.0), rng.uniform(0.0, 2.0 * np.pi)
         height = TILTED_HEIGHTS[pose % len(TILTED_HEIGHTS)]
-        across, tilted = ((size * np.cos(at), size * np.sin(at)) for size, at in ((radius, azimuth), (tilt, about)))
+        across, tilted = ((r * np.cos(angle), r * np.sin(angle)) for r, angle in ((radius, azimuth), (tilt, about)))
         trial = np.round([*across, height, *tilted, rng.uniform(-10.0, 10.0)], 1)
         extension = np.array([m_from_mm(_extension(pose))])
         if reachable(nominal, m_from_mm(trial[None, :3]), rad_from_deg(trial[None, 3:]), extension)[0]:
             poses.append(trial)
-    raise LookupError("too few reachable tilted poses within 300 mm of the axis")
+    raise InputError(
+        f"machine {nominal.name}: too few reachable tilted poses within {TILTED_RADIUS:g} mm of the axis",
+        hint="use layout campaign with poses of your own for this machine",
+    )

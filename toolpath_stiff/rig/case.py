@@ -7,8 +7,8 @@ effect alone.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,7 @@ from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
 from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
-from toolpath_stiff.rig.sizes import scale_of
+from toolpath_stiff.rig.sizes import Scale
 from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
@@ -41,7 +41,7 @@ BLIND = {"none": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
 _STREAMS = ("kind", "campaign", "machine", "noise")
 
 
-def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows:
+def rows_of(table: Table, elapsed: FloatArray | None = None) -> Rows:
     """SI rows of a table; absent columns take their defaults: no tilt, 1000 N, the reference tool, time 0, `table`."""
     n = len(table["x_mm"])
 
@@ -67,7 +67,7 @@ def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows
     )
 
 
-def clamp_of(table: Mapping[str, Any]) -> IntArray:
+def clamp_of(table: Table) -> IntArray:
     """(n,) group of each row: its clamp, or without that column its pose and set-up."""
     if "clamp" in table:
         keys = [(int(clamp),) for clamp in table["clamp"]]
@@ -105,6 +105,29 @@ class DrawnCase:
     seed: int = 0
     layout: str = ""
 
+    def measure(self, table: Table, rows: Rows, rng: Generator, stated_sd: bool = False) -> Table:
+        """A table with the column `stiffness_N_per_mm`, and `sd_N_per_mm` if it is to be stated; `rows` in SI."""
+        shown, nuisances = readings(self.nominal, self.machine, rows), self.nuisances
+        bad = np.flatnonzero(~(np.isfinite(shown) & (shown > 0.0)))
+        if len(bad):
+            raise InputError(
+                f"row {bad[0] + 1}: the indicator would run backwards on the hidden machine",
+                hint="use a larger load or zero the indicator later (time_min)",
+            )
+        stiffness = n_per_mm_from_n_per_m(disturb_readings(shown, clamp_of(table), nuisances, rng))
+        measured: Table = {}
+        for name, values in table.items():
+            measured[name] = values
+            if name in ("direction", "dz") and "stiffness_N_per_mm" not in measured:
+                measured["stiffness_N_per_mm"] = stiffness
+                if stated_sd and nuisances.of_reading > 0.0:
+                    measured["sd_N_per_mm"] = np.round(stiffness * nuisances.of_reading)
+        return with_loops(self.nominal, self.machine, measured, rows, nuisances, rng)
+
+    def again(self, plan: Table, rng: Generator, stated_sd: bool = False) -> Table:
+        """The same hidden machine measured at a plan: new clamps, new noise; the campaign's clock stands at its end."""
+        return self.measure(plan, rows_of(plan, elapsed=np.ones(len(plan["x_mm"]))), rng, stated_sd)
+
 
 def effects_of_layout(layout: str) -> tuple[str, ...]:
     """Effects of the catalogue that a layout has the columns for: the paper's has neither `force_N` nor `time_min`."""
@@ -124,7 +147,7 @@ def draw_case(
     hidden: str | Sequence[str] | None = None,
     noise: float | Nuisances = 0.02,
     machine: str | Nominal = defaults.MACHINE,
-    plan: Mapping[str, Any] | None = None,
+    plan: Table | None = None,
     size: float | Sequence[float] | None = None,
 ) -> DrawnCase:
     """A blind campaign on a machine that hides something; the same arguments give the same rows.
@@ -165,7 +188,7 @@ def draw_case(
     rows = rows_of(table)
     true, effects = HiddenMachine(), []
     if names:
-        scale = scale_of(nominal, rows, clamp_of(table), nuisances)
+        scale = Scale(nominal, rows, clamp_of(table), nuisances)
         for name, wanted in zip(names, _sizes(size, len(names)), strict=True):
             # A stream of its own for each effect: sizes of different effects of one seed have nothing in common.
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
@@ -176,60 +199,18 @@ def draw_case(
                 effects[-1]["links"] = sorted(UNKNOWNS[name].links)
                 effects[-1]["variables"] = sorted(UNKNOWNS[name].variables)
     true = disturb_machine(true, nuisances, streams["machine"])
-    measured = measure(nominal, true, table, rows, nuisances, streams["noise"], stated_sd=layout == "paper")
     truth = {
         "hidden": list(names),
         "kind": "outside" if {*names} & {*OUTSIDE} else ("none", "one", "two", "three")[min(len(names), 3)],
         "effects": effects,
     }
-    return DrawnCase(measured, truth, nominal, true, nuisances, seed, layout)
-
-
-def measure(
-    nominal: Nominal,
-    machine: HiddenMachine,
-    table: Mapping[str, Any],
-    rows: Rows,
-    nuisances: Nuisances,
-    rng: Generator,
-    stated_sd: bool = False,
-) -> Table:
-    """The table with the column `stiffness_N_per_mm`, and `sd_N_per_mm` if it is to be stated."""
-    shown = readings(nominal, machine, rows)
-    if not (np.isfinite(shown) & (shown > 0.0)).all():
-        bad = int(np.argmin(np.isfinite(shown) & (shown > 0.0))) + 1
-        raise InputError(
-            f"row {bad}: the indicator would run backwards on the hidden machine",
-            hint="use a larger load or zero the indicator later (time_min)",
-        )
-    stiffness = disturb_readings(shown, clamp_of(table), nuisances, rng)
-    measured: Table = {}
-    for name, values in table.items():
-        measured[name] = values
-        if name in ("direction", "dz") and "stiffness_N_per_mm" not in measured:
-            measured["stiffness_N_per_mm"] = n_per_mm_from_n_per_m(stiffness)
-            if stated_sd and max(nuisances.repeat, nuisances.clamping) > 0.0:
-                one_reading = np.hypot(nuisances.repeat, nuisances.clamping)
-                measured["sd_N_per_mm"] = np.round(n_per_mm_from_n_per_m(stiffness * one_reading))
-    return with_loops(nominal, machine, measured, rows, nuisances, rng) if "loop" in measured else measured
-
-
-def again(
-    nominal: Nominal,
-    machine: HiddenMachine,
-    nuisances: Nuisances,
-    plan: Mapping[str, Any],
-    rng: Generator,
-    stated_sd: bool = False,
-) -> Table:
-    """The same hidden machine measured at a plan: new clamps, new noise; the campaign's clock stands at its end."""
-    rows = rows_of(plan, elapsed=np.ones(len(plan["x_mm"])))
-    return measure(nominal, machine, plan, rows, nuisances, rng, stated_sd)
+    case = DrawnCase(table, truth, nominal, true, nuisances, seed, layout)
+    return replace(case, rows=case.measure(table, rows, streams["noise"], stated_sd=layout == "paper"))
 
 
 def _sizes(size: float | Sequence[float] | None, count: int) -> tuple[float | None, ...]:
     """The size wanted of each of `count` effects."""
-    if size is None or isinstance(size, (int, float)):
+    if not isinstance(size, Sequence):
         return (size,) * count
     if len(size) != count:
         raise InputError(f"{len(size)} sizes for {count} hidden effects", expected="one size, or one for each effect")

@@ -16,7 +16,6 @@ import json
 import math
 import re
 import zlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import Content, read_bytes, read_text, write_atomically
 from toolpath_stiff.results_folder import Rules, write_folder
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
-from toolpath_stiff.rig.case import DrawnCase, again, clamp_of, draw_case, rows_of
+from toolpath_stiff.rig.case import DrawnCase, clamp_of, draw_case, rows_of
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
 from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
@@ -128,7 +127,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
     return "partly" if claimed & truth else "wrong"
 
 
-def csv_text(table: Mapping[str, Any]) -> str:
+def csv_text(table: Table) -> str:
     """The table as CSV; numbers as short as they are exact to ten digits."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
@@ -265,9 +264,7 @@ def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[
     if "clamp" in plan or "clamp" in sealed["columns"]:
         first = sealed["clamps"] + 1000 * int(rng.integers(1, 10**4))
         plan["clamp"] = first + (plan["clamp"] if "clamp" in plan else clamp_of(plan) + 1)
-    stated_sd = "sd_N_per_mm" in sealed["columns"]
-    measured = again(case.nominal, case.machine, case.nuisances, plan, rng, stated_sd)
-    return csv_text(measured), len(plan["x_mm"])
+    return csv_text(case.again(plan, rng, "sd_N_per_mm" in sealed["columns"])), len(plan["x_mm"])
 
 
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:

@@ -28,10 +28,6 @@ PRINTED_N_PER_MM = 1.0  # resolution of what is printed: whole N/mm, as in the p
 AXES = np.eye(3)
 
 
-def _zeros(*shape: int) -> FloatArray:
-    return np.zeros(shape)
-
-
 @dataclass(frozen=True)
 class HiddenMachine:
     """Differences from the nominal machine, SI; the defaults are none.
@@ -70,8 +66,8 @@ class HiddenMachine:
         Something outside the catalogue.
     """
 
-    frame_errors: FloatArray = field(default_factory=lambda: _zeros(6, 3))
-    platform_errors: FloatArray = field(default_factory=lambda: _zeros(6, 3))
+    frame_errors: FloatArray = field(default_factory=lambda: np.zeros((6, 3)))
+    platform_errors: FloatArray = field(default_factory=lambda: np.zeros((6, 3)))
     strut_factors: FloatArray = field(default_factory=lambda: np.ones(6))
     curvature: float = 0.0
     tip_error: float = 0.0
@@ -83,11 +79,11 @@ class HiddenMachine:
     hertz: float = 0.0
     clearance: float = 0.0
     moment: float = 0.0
-    vertices: FloatArray = field(default_factory=lambda: _zeros(6, 2))
-    table: FloatArray = field(default_factory=lambda: _zeros(3))
+    vertices: FloatArray = field(default_factory=lambda: np.zeros((6, 2)))
+    table: FloatArray = field(default_factory=lambda: np.zeros(3))
     rocking: float = 0.0
     setup: str = ""
-    setup_compliance: FloatArray = field(default_factory=lambda: _zeros(3))
+    setup_compliance: FloatArray = field(default_factory=lambda: np.zeros(3))
     gauge_target: str = ""
     gauge_factor: float = 1.0
     drift: float = 0.0
@@ -106,23 +102,8 @@ def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
 
 def true_stiffness(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m, secant stiffness between tool and workpiece along the load."""
-    first, which = _distinct(hidden, rows)
-    distinct = rows.take(first)
-    place, links = assembled(nominal, hidden, distinct)
-    return np.asarray(1.0 / solved(place, links, distinct.direction, distinct.force).compliance)[which]
-
-
-def _distinct(hidden: HiddenMachine, rows: Rows) -> tuple[IntArray, IntArray]:
-    """First row of each mechanical state and the state of each row: repeats are solved once."""
-    states = [rows.position, rows.angles, rows.direction, rows.extension[:, None]]
-    states.append(np.unique(rows.setup, return_inverse=True)[1].reshape(-1, 1).astype(float))
-    if hidden.hertz or hidden.clearance:
-        states.append(rows.force[:, None])
-    if hidden.unknown is not None:
-        varies = OUTSIDE[hidden.unknown.kind].varies
-        states += [np.asarray(getattr(rows, name), dtype=float)[:, None] for name in varies]
-    _, first, which = np.unique(np.concatenate(states, axis=1), axis=0, return_index=True, return_inverse=True)
-    return first, which.ravel()
+    place, links = assembled(nominal, hidden, rows)
+    return np.asarray(1.0 / solved(place, links, rows.direction, rows.force).compliance)
 
 
 def assembled(
@@ -255,6 +236,11 @@ class Nuisances:
     outliers: float = 0.02
     outlier_width: float = 4.0
     rounded: bool = True
+
+    @property
+    def of_reading(self) -> float:
+        """Relative standard deviation of one reading, re-clamping included."""
+        return float(np.hypot(self.repeat, self.clamping))
 
     @classmethod
     def none(cls) -> Nuisances:

@@ -6,7 +6,6 @@ elongation of a strut, so that nothing is derived: the give of a joint, a vertex
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.random import Generator
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.rig.campaigns import Table
 from toolpath_stiff.rig.hidden import assembled
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
@@ -89,11 +89,11 @@ def _vertex(k: int, number: int, way: str, place: Geometry, direction: FloatArra
 def with_loops(
     nominal: Nominal,
     hidden: HiddenMachine,
-    measured: Mapping[str, Any],
+    measured: Table,
     rows: Rows,
     nuisances: Nuisances,
     rng: Generator,
-) -> dict[str, Any]:
+) -> Table:
     """A measured table whose rows of loops beside the tip hold what their indicators read, in um, for a stiffness."""
     loops = list(measured.get("loop", ()))
     beside = np.array([loop not in TIP for loop in loops], dtype=bool)
@@ -105,18 +105,14 @@ def with_loops(
     moved = per_load * rows.force[where]
     if nuisances.repeat > 0.0:
         moved = moved * np.exp(SLANT * rng.standard_normal(len(where))) + INDICATOR * rng.standard_normal(len(where))
-    read = um_from_m(moved)
-    if nuisances.rounded:
-        read = PRINTED * np.round(read / PRINTED)
-    shown = [""] * len(loops)
-    for k, value in zip(where, read.tolist(), strict=True):
-        shown[k] = f"{value + 0.0:.10g}"
-    table: dict[str, Any] = {}
+    shown = np.zeros(len(loops))
+    shown[where] = PRINTED * np.round(um_from_m(moved) / PRINTED) if nuisances.rounded else um_from_m(moved)
+    table: Table = {}
     for name, values in measured.items():
         empty = name in ("stiffness_N_per_mm", "sd_N_per_mm")
         table[name] = _emptied(values, beside) if empty else values
         if name == "stiffness_N_per_mm":
-            table["displacement_um"] = shown
+            table["displacement_um"] = _emptied(shown, ~beside)
     table.setdefault("force_N", np.full(len(loops), defaults.FORCE))
     if "length_mm" in table:
         table["length_mm"] = _emptied(table["length_mm"], np.isnan(lengths))

@@ -246,13 +246,7 @@ def reachable(nominal: Nominal, tips: FloatArray, angles: FloatArray, extension:
     inside = ((lengths >= low) & (lengths <= high)).all(axis=1)
     if nominal.swing is None:
         return np.asarray(inside)
-    rest, moved = (
-        strut_directions(nominal, *pose)
-        for pose in (
-            (nominal.neutral_pose[None, :3], rotations(nominal.neutral_pose[None, 3:]), np.zeros(1)),
-            (tips, turned, extension),
-        )
-    )
+    rest, moved = neutral_directions(nominal), strut_directions(nominal, tips, turned, extension)
     for limit, before, after in zip(nominal.swing, rest, moved, strict=True):
         cosine = np.clip(np.einsum("nki,nki->nk", np.broadcast_to(before, after.shape), after), -1.0, 1.0)
         inside &= (np.arccos(cosine) <= limit).all(axis=1)
@@ -266,3 +260,9 @@ def strut_directions(
     strut = platform_points(nominal.platform_joints, tips, turned, extension) - nominal.frame_joints
     unit = strut / np.linalg.norm(strut, axis=2, keepdims=True)
     return unit, unit @ turned
+
+
+def neutral_directions(nominal: Nominal) -> tuple[FloatArray, FloatArray]:
+    """The same (1, 6, 3) at the neutral pose."""
+    pose = nominal.neutral_pose[None]
+    return strut_directions(nominal, pose[:, :3], rotations(pose[:, 3:]), np.zeros(1))

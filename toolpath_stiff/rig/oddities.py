@@ -86,7 +86,7 @@ def cable_drag(rows: Rows, u: Unknown) -> FloatArray:
     return np.asarray(1.0 + u.size * rows.position[:, 0] / REACH * np.abs(rows.direction[:, 0]))
 
 
-@act_in_time("", "", 1.0, shape=one_strut, varies="elapsed")
+@act_in_time("", "", 1.0, shape=one_strut)
 def warming_leg(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One strut softens in the course of the campaign."""
     factor = np.ones((len(state.rows.force), 6))

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
+from toolpath_stiff.arrays import ArrayColumns, FloatArray, TextArray
 
 ROOM_TEMPERATURE = 20.0  # degrees C, reference temperature of length measurements (ISO 1)
 
 
 @dataclass(frozen=True)
-class Rows:
+class Rows(ArrayColumns):
     """n rows of a campaign, SI.
 
     Attributes
@@ -45,14 +44,6 @@ class Rows:
     elapsed: FloatArray
     setup: TextArray
     temperature: FloatArray | None = None
-
-    def take(self, index: IntArray) -> Rows:
-        """Some of the rows."""
-        columns: dict[str, Any] = {
-            field.name: None if (values := getattr(self, field.name)) is None else values[index]
-            for field in fields(self)
-        }
-        return Rows(**columns)
 
     @property
     def warmth(self) -> FloatArray:

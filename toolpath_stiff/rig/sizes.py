@@ -91,21 +91,6 @@ class Scale:
         return self.covariance.length(change) if np.isfinite(change).all() else math.inf
 
 
-_SCALES: dict[tuple[Any, ...], Scale] = {}
-SCALES_KEPT = 8
-
-
-def scale_of(nominal: Nominal, rows: Rows, clamps: IntArray, nuisances: Nuisances) -> Scale:
-    """The scale of a campaign; those used last are kept, for many cases are drawn on one campaign."""
-    parts = [clamps, *vars(nominal).values(), *vars(rows).values()]
-    key = (nuisances, *((part.dtype.str, part.tobytes()) if isinstance(part, np.ndarray) else part for part in parts))
-    if key not in _SCALES:
-        while len(_SCALES) >= SCALES_KEPT:
-            _SCALES.pop(next(iter(_SCALES)))
-        _SCALES[key] = Scale(nominal, rows, clamps, nuisances)
-    return _SCALES[key]
-
-
 def _rms(change: FloatArray) -> float:
     return float(np.sqrt(np.mean(change**2)))
 

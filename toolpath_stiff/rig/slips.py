@@ -8,9 +8,6 @@ A slip of a pose or of a sign is made where a form has it once: in one row, or i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numpy.random import Generator
 
@@ -21,7 +18,7 @@ from toolpath_stiff.rig.campaigns import POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import Nominal, reachable
-from toolpath_stiff.rig.sizes import scale_of
+from toolpath_stiff.rig.sizes import Scale
 from toolpath_stiff.rig.unknown import Shape
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -38,8 +35,15 @@ SLIPS = {
 }
 N_PER_LBF = 4.4482216152605  # exact: 0.45359237 kg (international pound, 1959) times 9.80665 m/s2 (CGPM 1901)
 WRITTEN_PER_N_PER_MM = {"lbf_per_in": MM_PER_INCH / N_PER_LBF, "N_per_um": 1e-3}
-WRONG_BY = {"pose_10_mm": 10.0, "pose_1_deg": 1.0, "pose_5_deg": 5.0}  # mm or degrees
-SMALLEST_ANGLE, SMALLEST_COORDINATE = 3.0, 30.0  # degrees, mm: a wrong sign of less is hardly a mistake (assumed)
+# Columns of which one is written wrongly; by how much, mm or degrees (0: with the wrong sign); the smallest value that
+# is: a wrong sign of less is hardly a mistake (assumed).
+MISTYPED = {
+    "sign_of_angle": (POSE[3:5], 0.0, 3.0),
+    "sign_of_coordinate": (POSE[:2], 0.0, 30.0),
+    "pose_10_mm": (POSE[:3], 10.0, 0.0),
+    "pose_1_deg": (POSE[3:], 1.0, 0.0),
+    "pose_5_deg": (POSE[3:], 5.0, 0.0),
+}
 TRIES = 200  # draws until the written pose is one that the machine can reach
 # Whitened length of a slip that is found with 80 % power at 5 % among all slips of all rows of a tilted campaign, some
 # 6000: z(1 - 0.05/6000/2) + z(0.8) = 4.46 + 0.84 (normal quantiles, Bonferroni).
@@ -89,18 +93,18 @@ def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = 
         name: values.tolist() if isinstance(table[name], list) else values.astype(np.asarray(table[name]).dtype)
         for name, values in wrong.items()
     }
-    modelled, found = (
-        np.log(readings(case.nominal, HiddenMachine(), rows_of(one))) - np.log(one["stiffness_N_per_mm"])
-        for one in (table, slipped)
+    before, after = (
+        np.log(sheet["stiffness_N_per_mm"]) - np.log(readings(case.nominal, HiddenMachine(), rows_of(sheet)))
+        for sheet in (table, slipped)
     )
-    scale = scale_of(case.nominal, rows_of(table), clamp_of(table), case.nuisances)
+    scale = Scale(case.nominal, rows_of(table), clamp_of(table), case.nuisances)
     return slipped, {
         "kind": kind,
         "rows": [int(row) + 1 for row in rows],
         "columns": changed,
         "written": {name: np.asarray(slipped[name])[rows].tolist() for name in changed},
         "meant": {name: np.asarray(table[name])[rows].tolist() for name in changed},
-        "detectability": scale.covariance.length(modelled - found),
+        "detectability": scale.covariance.length(after - before),
     }
 
 
@@ -121,14 +125,12 @@ def slipped_case(case: DrawnCase, seed: int, kind: str | None = None, count: int
     raise InputError(f"{count} slips of kind {kind or 'any'}", expected="fewer: the table has no room for them")
 
 
-def with_stated_noise(
-    table: Mapping[str, Any], nuisances: Nuisances, factor: float = 1.0
-) -> tuple[Table, dict[str, float]]:
+def with_stated_noise(table: Table, nuisances: Nuisances, factor: float = 1.0) -> tuple[Table, dict[str, float]]:
     """A table that states `sd_N_per_mm`, `factor` times as large as one reading's scatter is.
 
     The truth: `true_percent` and `stated_percent`, repeat noise and clamping together.
     """
-    true = float(np.hypot(nuisances.repeat, nuisances.clamping))
+    true = nuisances.of_reading
     stated: Table = {}
     for name, values in table.items():
         if name != "sd_N_per_mm":
@@ -156,30 +158,20 @@ def _exchange(wrong: Table, rng: Generator) -> IntArray:
 
 def _mistype(wrong: Table, nominal: Nominal, kind: str, rng: Generator) -> IntArray:
     """A coordinate or an angle of one row, or of all rows of a clamping, is written wrongly."""
-    names = [name for name in POSE if name in wrong]
+    columns, wrong_by, smallest = MISTYPED[kind]
     clamps = clamp_of(wrong)
     for _ in range(TRIES):
         row = int(rng.integers(len(clamps)))
         rows = np.flatnonzero(clamps == clamps[row]) if rng.random() < 0.5 else np.array([row])
-        angle = kind in ("sign_of_angle", "pose_1_deg", "pose_5_deg")
-        group = names[3:5] if kind == "sign_of_angle" else names[3:] if angle else names[:2]
-        group = names[:3] if kind == "pose_10_mm" else group
-        name = str(rng.choice(group))
+        name = str(rng.choice([column for column in columns if column in wrong]))
         before = float(wrong[name][row])
-        if kind.startswith("sign"):
-            if abs(before) < (SMALLEST_ANGLE if angle else SMALLEST_COORDINATE):
-                continue
-            after = -before
-        else:
-            after = round(before + float(rng.choice([-1.0, 1.0])) * WRONG_BY[kind], 3)
+        if abs(before) < smallest:
+            continue
+        after = round(before + float(rng.choice([-1.0, 1.0])) * wrong_by, 3) if wrong_by else -before
         trial = dict(wrong) | {name: wrong[name].copy()}
         trial[name][rows] = after
-        if _reached(trial, nominal, rows):
+        slipped = rows_of({column: np.asarray(values)[rows] for column, values in trial.items()})
+        if reachable(nominal, slipped.position, slipped.angles, slipped.extension).all():
             wrong[name] = trial[name]
             return rows
     raise InputError(f"no row for the slip {kind}", expected="poses off the axis, or tilted, that stay reachable")
-
-
-def _reached(table: Mapping[str, Any], nominal: Nominal, rows: IntArray) -> bool:
-    slipped = rows_of({name: np.asarray(values)[rows] for name, values in table.items()})
-    return bool(reachable(nominal, slipped.position, slipped.angles, slipped.extension).all())

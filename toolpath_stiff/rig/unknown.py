@@ -103,8 +103,6 @@ class Kind:
         (6, 3) m by which the frame joints stand elsewhere; None: not at all.
     shape
         Draws what is not size; `sign` in it goes to the size.
-    varies
-        Columns of `Rows` on which the mechanics depends beside pose, direction, tool and set-up.
     columns
         Columns that a measurement file needs to show it.
     """
@@ -116,7 +114,6 @@ class Kind:
     read: Callable[[Rows, Unknown], FloatArray] | None = None
     move: Callable[[Unknown], FloatArray] | None = None
     shape: Callable[[Generator], Shape] = lambda rng: {}
-    varies: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
 
 
@@ -129,8 +126,7 @@ def kind(
     """
 
     def registered(physics: Physics) -> Physics:
-        more.update({name: tuple(filter(None, more.get(name, "").split(","))) for name in ("varies", "columns")})
-        more[role] = physics
+        more.update({role: physics, "columns": tuple(filter(None, more.get("columns", "").split(",")))})
         kinds[physics.__name__] = Kind(frozenset(links.split(",")), frozenset(variables.split(",")), limit, **more)
         return physics
 

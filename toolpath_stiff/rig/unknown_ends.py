@@ -98,14 +98,7 @@ def worn_table_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_ends(links, (lever, u.size))
 
 
-@act(
-    "table",
-    "setup,load",
-    SOFT,
-    shape=lambda rng: {"holds": float(rng.uniform(800.0, 2500.0)), "setup": "riser"},
-    varies="force",
-    columns="force_N,setup",
-)
+@act("table", "setup,load", SOFT, shape=_holds, columns="force_N,setup")
 def fixture_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The fixture of one set-up holds by friction: beyond it the work gives sideways."""
     sideways = state.rows.force * np.linalg.norm(state.rows.direction[:, :2], axis=1)
@@ -113,14 +106,14 @@ def fixture_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_ends(links, (X, give), (Y, give))
 
 
-@act(BASE, "temperature,order", SOFT, varies="temperature", columns="temperature_C")
+@act(BASE, "temperature,order", SOFT, columns="temperature_C")
 def damping_plate(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A polymer plate under the table softens in shear as the shop warms up."""
     give = u.size * np.maximum(state.rows.warmth, 0.0) / SOFTENING
     return with_ends(links, (X, give), (Y, give))
 
 
-@act(BASE, "order", SOFT, shape=uniform("after", 0.3, 0.7), varies="elapsed")
+@act(BASE, "order", SOFT, shape=uniform("after", 0.3, 0.7))
 def clamp_loosened(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A clamp of the table came loose in the middle of the campaign: from then on it gives sideways."""
     give = np.where(state.rows.elapsed > u.shape["after"], u.size, 0.0)
@@ -140,7 +133,7 @@ def frame_twist(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_ends(links, (np.cross(Z, state.place.work_point), u.size))
 
 
-@act("tool", "force sign,direction,tilt", SOFT, shape=side, varies="force")
+@act("tool", "force sign,direction,tilt", SOFT, shape=side)
 def spindle_thrust(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The spindle's bearings lose their preload when the tool is pulled, or pushed: it then gives, radially first."""
     tool = state.place.rotation[:, :, 2]
@@ -160,7 +153,7 @@ def spindle_flange(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_ends(links, (longer[:, None] * across, u.size))
 
 
-@act("tool", "load", SOFT, shape=uniform("opens", 800.0, 2500.0), varies="force", columns="force_N")
+@act("tool", "load", SOFT, shape=uniform("opens", 800.0, 2500.0), columns="force_N")
 def taper_opening(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The tool holder's taper opens beyond a bending moment, with a longer tool sooner; then the tool tilts in it."""
     tool = state.place.rotation[:, :, 2]

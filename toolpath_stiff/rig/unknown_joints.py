@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.nominal import rotations, strut_directions
+from toolpath_stiff.rig.nominal import neutral_directions
 from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import ALL, SOFT, kind, with_joints
 
@@ -24,8 +24,7 @@ SLIP_LOAD = 300.0  # N, load at which a sticking joint carries half of what it d
 
 def _swing(state: CommandedRows) -> FloatArray:
     """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
-    pose = state.nominal.neutral_pose
-    rest = strut_directions(state.nominal, pose[None, :3], rotations(pose[None, 3:]), np.zeros(1))[1]
+    rest = neutral_directions(state.nominal)[1]
     now = state.units @ state.place.rotation
     return np.asarray(1.0 - np.minimum(np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now) ** 2, 1.0))
 
@@ -54,7 +53,7 @@ def joint_binding(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return dataclasses.replace(links, moment=links.moment + u.size * _swing(state) / SWING)
 
 
-@act("joints,struts,platform", "load", 6e6, varies="force", columns="force_N")
+@act("joints,struts,platform", "load", 6e6, columns="force_N")
 def joint_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Sticking joints that slip: rotational secant stiffness m0 F0 / (F0 + F), Masing's element smeared out."""
     held = SLIP_LOAD / (SLIP_LOAD + state.rows.force)

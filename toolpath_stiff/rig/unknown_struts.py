@@ -66,25 +66,25 @@ def _coupled(links: Links, shares: FloatArray, compliance: float) -> Links:
     return dataclasses.replace(links, struts=np.asarray(np.linalg.inv(flexibility), dtype=np.float64))
 
 
-@act(ONE, "strut force,load", 50e-6, shape=one_strut, varies="force", columns="force_N")
+@act(ONE, "strut force,load", 50e-6, shape=one_strut, columns="force_N")
 def strut_backlash(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Lost motion in one strut alone: c = g / |f|."""
     return with_joints(links, lambda f: u.size / np.maximum(np.abs(f), LEAST_FORCE) * _only(u.shape["strut"]))
 
 
-@act(ALL, "strut force,load", SOFT, shape=uniform("preload", 150.0, 500.0), varies="force", columns="force_N")
+@act(ALL, "strut force,load", SOFT, shape=uniform("preload", 150.0, 500.0), columns="force_N")
 def nut_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Double nuts with too little preload: beyond it one of the two lets go and the struts are softer by c0."""
     return with_joints(links, lambda f: u.size * beyond(f, u.shape["preload"]))
 
 
-@act(ONE, "force sign", SOFT, shape=lambda rng: one_strut(rng) | side(rng), varies="force")
+@act(ONE, "force sign", SOFT, shape=lambda rng: one_strut(rng) | side(rng))
 def thrust_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The thrust bearing of one screw is worn on one side: softer in tension, or in compression."""
     return with_joints(links, lambda f: u.size * opened(f * u.shape["side"]) * _only(u.shape["strut"]))
 
 
-@act(ALL, "force sign,strut length", SOFT, varies="force")
+@act(ALL, "force sign,strut length", SOFT)
 def strut_bowing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Struts not quite straight bow under compression: c grows as length^4 (Timoshenko, an initially bent column)."""
     compliance = u.size * (state.lengths / state.nominal.strut_range[1]) ** 4
@@ -120,14 +120,14 @@ def motor_mount(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return _coupled(links, np.broadcast_to(_only(first) + _only(other), state.lengths.shape), u.size)
 
 
-@act(ONE, "time", SOFT, shape=one_strut, varies="time", columns="time_min")
+@act(ONE, "time", SOFT, shape=one_strut, columns="time_min")
 def strut_heating(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The motor of one strut holds it and heats its nut while the readings of a clamping are taken."""
     compliance = u.size * (state.rows.time / 300.0)[:, None] * _only(u.shape["strut"])
     return with_joints(links, lambda forces: compliance)
 
 
-@act(ALL, "order,time,temperature", SOFT, varies="elapsed")
+@act(ALL, "order,time,temperature", SOFT)
 def warm_up_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Joints gain their preload as the machine warms up: c = c0 exp(-t / tau) over the campaign."""
     compliance = u.size * np.exp(-state.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6)
@@ -152,7 +152,7 @@ def frame_oval(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return _coupled(links, np.einsum("nki,nki->nk", state.units, outward) * side, u.size)
 
 
-@act("frame", "force sign,direction", SOFT, shape=_loose, varies="force")
+@act("frame", "force sign,direction", SOFT, shape=_loose)
 def loose_vertex_bolt(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A bolt of one post is loose: pulled down the post gives, a third as much outwards; pressed it sits."""
     vertex = u.shape["vertex"]

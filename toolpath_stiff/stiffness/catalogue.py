@@ -6,19 +6,19 @@ Which effects there are: the packaged ones, installed ones (entry points), and t
 from __future__ import annotations
 
 import difflib
-import importlib.util
+import importlib.metadata
 import pkgutil
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.stiffness import effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect
 from toolpath_stiff.stiffness.declarations import check_declarations
@@ -44,11 +44,9 @@ def packaged_effects() -> dict[str, Effect]:
 @cache
 def installed_effects() -> tuple[dict[str, Effect], dict[str, str]]:
     """Effects that other packages offer as entry points, and name -> reason of those that fail to load."""
-    from importlib.metadata import entry_points
-
     installed: dict[str, Effect] = {}
     broken: dict[str, str] = {}
-    for point in entry_points(group=ENTRY_POINTS):
+    for point in importlib.metadata.entry_points(group=ENTRY_POINTS):
         try:
             loaded = point.load()
             effect = loaded() if isinstance(loaded, type) else loaded
@@ -111,13 +109,6 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
     return _loaded(str(file), path.resolve(), state.st_mtime_ns, state.st_size)
 
 
-class _Source(importlib.machinery.SourceFileLoader):
-    """Runs the text of a file and nothing else: a compiled file beside it may come from anybody and say anything."""
-
-    def get_code(self, fullname: str) -> CodeType:
-        return self.source_to_code(self.get_data(self.path), self.path)
-
-
 @lru_cache(maxsize=MOST_FILES)
 def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]:
     """`path`, `changed` and `size` tell files and their versions apart."""
@@ -125,13 +116,10 @@ def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]
         return effects_of_terms(file)
     if path.suffix != ".py":
         raise EffectError("neither Python nor TOML", expected="a name that ends in .py or .toml", file=file)
-    name = f"toolpath_stiff_user_effects_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path, loader=_Source(name, str(path)))
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
+    module = ModuleType(f"toolpath_stiff_user_effects_{path.stem}")
+    module.__file__, sys.modules[module.__name__] = str(path), module
+    try:  # the text of the file: a compiled one beside it may come from anybody and say anything
+        exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
         effects_there = _effects_in(module, file)
     except InputError:
         raise
@@ -203,10 +191,8 @@ class EffectCatalogue(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row an effect: link of the load path, name, title, equation, source."""
-        import pandas as pd
-
         columns = ["link", "name", "title", "equation", "source", "load_dependent"]
-        return pd.DataFrame(self.to_dict()["effects"])[columns]
+        return frame_of(self.to_dict()["effects"])[columns]
 
     def _short(self) -> str:
         return f"{len(self.effects)} effects"

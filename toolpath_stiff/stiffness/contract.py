@@ -279,7 +279,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     load_dependent: bool = False
     unknown_to_control: bool = False
-    told: str = ""  # what a fit has found, parameters by name: "the tool is {error} mm {error:longer/shorter}"
+    clause: str = ""  # what a fit has found, parameters by name: "the tool is {error} mm {error:longer/shorter}"
     described_from: tuple[str, ...] = ()
     file: str = ""  # that declares it without code
 
@@ -416,8 +416,8 @@ class Effect:
 
         `p`: parameter name -> value in the units of files, choices as they are.
         """
-        if self.told:
-            return self.told.format(**{q.name: p[q.name] if q.discrete else Size(p[q.name]) for q in self.parameters})
+        if self.clause:
+            return self.clause.format(**{q.name: p[q.name] if q.discrete else Size(p[q.name]) for q in self.parameters})
         sizes = []
         for q in self.parameters:
             value = p[q.name] if q.discrete else f"{float(f'{p[q.name]:.3g}'):g} {q.unit}".rstrip()

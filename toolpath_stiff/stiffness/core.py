@@ -201,12 +201,11 @@ def extreme_directions(
     tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
     softest: bool = True,
-    across: FloatArray | None = None,
 ) -> FloatArray:
     """Directions (n, 3) in which the tip gives way most, or least, load-dependent effects included.
 
-    With `across` (n, 3), unit vectors, only directions across these are looked at. Some 300 times the work of one
-    direction: without load-dependent effects the eigenvectors of the compliance say the same.
+    Some 300 times the work of one direction: without load-dependent effects the eigenvectors of the compliance say the
+    same.
     """
     result = np.empty((len(position), 3))
     for rows, path in _paths(model, position, rotation, tool_length, force, max(1, BLOCK // DIRECTIONS)):
@@ -215,7 +214,7 @@ def extreme_directions(
             return exact.compliance_along(model, path.take(poses), directions)
 
         tensor, forces = exact.tip_compliance(model, path), exact.strut_forces(model, path)
-        result[rows] = searched_directions(along, tensor, forces, softest, None if across is None else across[rows])
+        result[rows] = searched_directions(along, tensor, forces, softest)
     return result
 
 
@@ -227,9 +226,7 @@ def half_sphere(count: int) -> FloatArray:
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
 
 
-def searched_directions(
-    along: Along, tensor: FloatArray, forces: FloatArray, softest: bool = True, across: FloatArray | None = None
-) -> FloatArray:
+def searched_directions(along: Along, tensor: FloatArray, forces: FloatArray, softest: bool = True) -> FloatArray:
     """Directions in which the tip gives way most, or least.
 
     Parameters
@@ -243,8 +240,6 @@ def searched_directions(
         planes may hold the stiffest direction, and part the basins of the softest.
     softest
         The softest, else the stiffest direction.
-    across
-        (n, 3) unit vectors; only directions across these are looked at.
 
     Returns
     -------
@@ -262,7 +257,6 @@ def searched_directions(
     tried = np.concatenate([spread, np.swapaxes(np.linalg.eigh(tensor)[1], 1, 2)], axis=1)
     if idle is not None:
         tried = np.concatenate([tried, _in_planes(idle)], axis=1)
-    tried = tried if across is None else _flattened(tried, across)
     values_of_tried = value(tried)
     best = np.argsort(-values_of_tried, axis=1, kind="stable")
     best = (_best_of_each_cell(best, tried, forces) if softest else best)[:, :CLIMBS]
@@ -272,7 +266,6 @@ def searched_directions(
     while (step > LAST_STEP).any():
         around = _around(directions, step)
         around = around if idle is None else np.concatenate([around, _turned_about(directions, idle, step)], axis=2)
-        around = around if across is None else _flattened(around, across)
         values = value(around.reshape(n, -1, 3)).reshape(n, CLIMBS, -1)
         better = values.argmax(axis=-1)
         top = np.take_along_axis(values, better[..., None], axis=-1)[..., 0]
@@ -330,14 +323,6 @@ def _turned_about(directions: FloatArray, axis: FloatArray, step: FloatArray) ->
     before, angle = directions[..., None, :], step[..., None, None]
     along = (axis * before).sum(axis=-1, keepdims=True) * axis
     return _unit(along + (before - along) * np.cos(angle) + np.cross(axis, before) * np.sin(angle))
-
-
-def _flattened(directions: FloatArray, across: FloatArray) -> FloatArray:
-    """Unit vectors (n, ..., 3) turned into the planes across (n, 3); one along the normal becomes any in the plane."""
-    normal = across.reshape(len(across), *[1] * (directions.ndim - 2), 3)
-    flat = directions - (directions * normal).sum(axis=-1, keepdims=True) * normal
-    length = np.linalg.norm(flat, axis=-1, keepdims=True)
-    return np.asarray(np.where(length > 1e-6, flat / np.maximum(length, 1e-6), _beside(normal)))
 
 
 def signed(directions: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ With a stiffness K parallel to the struts the load divides, J^T f + K x = w, and
 
 with x the motion of the platform and y that of the tip. Both are exact, no iteration, no assembly.
 
-Under a load of given size (`SharedLoad`) joints that resist turning take a part of the load, and how large that part
+Under a load of given size joints that resist turning take a part of the load, and how large that part
 is depends on how far each strut gives, which for gaps and contacts depends on its force. With e_i(F_i) = s_i(F_i) F_i
 the stretch of strut i, s_i the secant compliance that the effects state, the forces minimise the complementary energy
 (Crotti-Engesser: the sum of int e_i dF_i, plus that of the parallel stiffness), whose gradient is the incompatibility
@@ -23,14 +23,13 @@ Whole steps of Newton's method settle most poses; where they cycle between the k
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import EffectError, InputError, PoseError
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.errors import EffectError, PoseError
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.stiffness.possible import at_pose, possible, refuse_struts_without_stiffness
@@ -52,82 +51,33 @@ DIFFERENCE = 1e-9  # of the load, for the tangent: well below what settles, or t
 LEAST_TANGENT = 1e-3  # of the secant: a strut whose stretch does not grow with its force would be infinitely stiff
 
 
-@dataclass(frozen=True)
-class SharedLoad:
-    """The problem at n poses.
-
-    Attributes
-    ----------
-    compliance
-        Strut forces (k, 6) N at the poses of an index (k,) to the secant compliances (k, 6) m/N of the struts, and
-        what couples them with each other and with the tip's wrench, [Q_ff, Q_fw] (k, 6, 12).
-    jacobian, parallel
-        (n, 6, 6); (n, 6, 6) stiffness parallel to the struts.
-    wrench
-        (n, 6) N and N m.
-    force
-        (n,) N, size of the load.
-    """
-
-    compliance: Callable[[FloatArray, IntArray], tuple[FloatArray, FloatArray]]
-    jacobian: FloatArray
-    parallel: FloatArray
-    wrench: FloatArray
-    force: FloatArray
-
-    def tangent(self, forces: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(k, 6) de_i/dF_i, and the compliances at these forces."""
-        step = DIFFERENCE * self.force[rows, None]
-        here, form = self.compliance(forces, rows)
-        beyond = np.where(forces < 0.0, forces - step, forces + step)
-        slope = (self.compliance(beyond, rows)[0] * beyond - here * forces) / (beyond - forces)
-        return np.maximum(slope, LEAST_TANGENT * here), here, form
-
-
-def settle(load: SharedLoad, first: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Strut forces that agree with the compliances that they cause.
-
-    Parameters
-    ----------
-    load
-        The problem at n poses.
-    first
-        (n, 6) N to begin with.
-
-    Returns
-    -------
-    forces, settled
-        (n, 6) N, and (n,) whether they stay.
-    """
-    forces = np.array(first)
-    rest = np.arange(len(forces))
-    for share in SHARES:
-        rest = _newton_steps(load, forces, rest, share)
-    settled = np.ones(len(forces), dtype=bool)
-    settled[rest] = False
-    return forces, settled
-
-
-def _newton_steps(load: SharedLoad, forces: FloatArray, rows: IntArray, share: float) -> IntArray:
-    """Newton's method at some poses, in place, by a share of each step; the rows that have not settled.
+def _newton_steps(
+    model: StiffnessModel, path: LoadPath, parallel: FloatArray, wrench: FloatArray, rows: IntArray, share: float
+) -> IntArray:
+    """Newton's method for the strut forces of some poses, in place, by a share of each step; the rows left unsettled.
 
     With e_i = t_i F_i + o_i, t the tangent and o_i = (s_i - t_i) F_i from the last forces, the system is linear. Where
     its forces stay e_i = s_i F_i holds, whatever the tangent was.
     """
-    eye = np.eye(6)
+    forces, load = path.strut_forces, path.force
+    assert forces is not None
     for _ in range(WHOLE_STEPS if share == 1.0 else PART_STEPS):
         if not len(rows):
             break
-        before, jacobian = forces[rows], load.jacobian[rows]
+        before, jacobian, part = forces[rows], path.struts.jacobian[rows], path.take(rows)
         transposed = np.swapaxes(jacobian, 1, 2)
-        tangent, here, form = load.tangent(before, rows)
-        longer = _times(form[..., 6:], load.wrench[rows]) + (here - tangent) * before
-        struts = tangent[..., None] * eye + form[..., :6]
+        here, form = _secant(model, part, before)
+        beyond = before + np.where(before < 0.0, -DIFFERENCE, DIFFERENCE) * load[rows, None]
+        slope = (_secant(model, part, beyond)[0] * beyond - here * before) / (beyond - before)
+        tangent = np.maximum(slope, LEAST_TANGENT * here)
+        longer = _times(form[..., 6:], wrench[rows]) + (here - tangent) * before
+        struts = tangent[..., None] * np.eye(6) + form[..., :6]
         stiffened = np.linalg.solve(struts, np.concatenate([jacobian, longer[..., None]], axis=-1))
-        system = transposed @ stiffened[..., :6] + load.parallel[rows]
-        motion = _solved(system, load.wrench[rows] + _times(transposed, stiffened[..., 6]))
+        system = transposed @ stiffened[..., :6] + parallel[rows]
+        right = wrench[rows] + _times(transposed, stiffened[..., 6])
+        motion = np.asarray(np.linalg.solve(system, right[..., None])[..., 0])
         settled = _times(stiffened[..., :6], motion) - stiffened[..., 6]
-        moved = np.abs(settled - before).max(axis=1) / load.force[rows]
+        moved = np.abs(settled - before).max(axis=1) / load[rows]
         # Between tension and compression of a strut lies its gap, where it is idle.
         crossing = (settled * before < 0.0) & (moved > SETTLED)[:, None]
         forces[rows] = before + share * (np.where(crossing, 0.0, settled) - before)
@@ -135,12 +85,14 @@ def _newton_steps(load: SharedLoad, forces: FloatArray, rows: IntArray, share: f
     return rows
 
 
+def _secant(model: StiffnessModel, path: LoadPath, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, 6) m/N of the struts under forces in them, and (n, 6, 12) what couples these and the wrench, [Q_ff, Q_fw]."""
+    links = assemble_links(model, replace(path, strut_forces=forces))
+    return links.strut, np.zeros((len(path), 6, 12)) if links.loads is None else links.loads[:, :6]
+
+
 def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("nij,nj->ni", matrix, vector))
-
-
-def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
 
 
 @dataclass(frozen=True)
@@ -282,29 +234,19 @@ def _acting(model: StiffnessModel) -> list[Effect]:
     return [active.effect for active in model.effects]
 
 
-@dataclass(frozen=True)
-class Loaded:
-    """The machine under a load along one direction at n poses.
-
-    Attributes
-    ----------
-    path, links
-        With the strut forces of the loaded machine, where effects depend on them.
-    twists, forces
-        (n, 6) m and rad of the tip, (n, 6) forces in the struts, both per newton of load.
-    """
-
-    path: LoadPath
-    links: AssembledLinks
-    twists: FloatArray
-    forces: FloatArray
-
-
-def under_load(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> Loaded:
+def under_load(
+    model: StiffnessModel, path: LoadPath, direction: FloatArray
+) -> tuple[LoadPath, AssembledLinks, FloatArray, FloatArray]:
     """The machine under a load of `path.force` along unit vectors (n, 3), load-dependent effects included.
 
     Those see the strut forces of the loaded machine: the ones of equilibrium or, where a stiffness parallel to the
-    struts shares the load, the ones that agree with the compliances that they cause (`SharedLoad`).
+    struts shares the load, the ones that agree with the compliances that they cause (`_settled`).
+
+    Returns
+    -------
+    path, links, twists, forces
+        With the strut forces of the loaded machine where effects depend on them; what it is made of; (n, 6) m and rad
+        of the tip, (n, 6) forces in the struts, both per newton of load.
 
     Raises
     ------
@@ -321,7 +263,7 @@ def under_load(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> 
             path = _settled(model, path, links.parallel, wrenches[..., 0])
         links = assemble_links(model, path)
         twists, forces = respond(path, links, wrenches)
-    return Loaded(path, links, twists[..., 0], forces[..., 0])
+    return path, links, twists[..., 0], forces[..., 0]
 
 
 def compliance_along(
@@ -335,7 +277,7 @@ def compliance_along(
     """
     along = None if equilibrium is None else _stored_along(model, path, direction, equilibrium)
     if along is None:
-        along = np.einsum("ni,ni->n", under_load(model, path, direction).twists[:, :3], direction)
+        along = np.einsum("ni,ni->n", under_load(model, path, direction)[2][:, :3], direction)
     return possible(_acting(model), path, np.asarray(along)[:, None, None])[:, 0, 0]
 
 
@@ -358,31 +300,17 @@ def _stored_along(
 def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenches: FloatArray) -> LoadPath:
     """The path with strut forces that agree with the compliances that they cause."""
     assert loaded.strut_forces is not None
-    regular = np.isfinite(loaded.strut_forces).all(axis=1)  # nan: a singular pose, which stays nan
-    if not regular.any():
-        return loaded
-    part = loaded.take(np.flatnonzero(regular))
-    assert part.strut_forces is not None
-    wrench = wrenches[regular] * part.force[:, None]
-
-    def compliance(forces: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        links = assemble_links(model, replace(part.take(rows), strut_forces=forces))
-        return links.strut, np.zeros((len(rows), 6, 12)) if links.loads is None else links.loads[:, :6]
-
-    problem = SharedLoad(compliance, part.struts.jacobian, parallel[regular], wrench, part.force)
-    forces, settled = settle(problem, part.strut_forces)
-    if not settled.all():
-        raise _unsettled(model, part, int(np.argmin(settled)))
-    everywhere = np.full((len(loaded), 6), np.nan)
-    everywhere[regular] = forces
-    return replace(loaded, strut_forces=everywhere)
-
-
-def _unsettled(model: StiffnessModel, path: LoadPath, row: int) -> InputError:
-    x, y, z = (mm_from_m(float(v)) for v in path.position[row])
-    names = ", ".join(active.effect.name for active in model.effects if active.effect.load_dependent)
-    return EffectError(
-        f"the strut forces do not settle at X{x:.1f} Y{y:.1f} Z{z:.1f} (mm) under {path.force[row]:g} N with {names}",
-        expected="a stretch of each strut that grows with its force",
-        hint="check the parameters of these effects",
-    )
+    forces = loaded.strut_forces
+    regular = np.flatnonzero(np.isfinite(forces).all(axis=1))  # nan: a singular pose, which stays nan
+    part = loaded.take(regular)
+    rows, wrench = np.arange(len(part)), wrenches[regular] * part.force[:, None]
+    for share in SHARES:
+        rows = _newton_steps(model, part, parallel[regular], wrench, rows, share)
+    if len(rows):
+        names = ", ".join(effect.name for effect in _acting(model) if effect.load_dependent)
+        raise EffectError(
+            f"the strut forces do not settle{at_pose(part, rows[0])} under {part.force[rows[0]]:g} N with {names}",
+            expected="a stretch of each strut that grows with its force",
+        )
+    forces[regular] = part.strut_forces
+    return loaded

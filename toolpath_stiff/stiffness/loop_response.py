@@ -73,9 +73,8 @@ def _one_loop(model: StiffnessModel, path: LoadPath, direction: FloatArray, loop
         real[:, loop.number - 1] = 1.0
         path = replace(path, strut_forces=real[:, :6] * path.force[:, None])
     else:
-        loaded = under_load(model, path, direction)
-        path = loaded.path
-        real[:, :6], real[:, 6:9] = loaded.forces, direction
+        path, _, _, real[:, :6] = under_load(model, path, direction)
+        real[:, 6:9] = direction
     reading = np.zeros(len(path))
     if loop.kind == "frame":
         return reading + _vertex_reading(model, path, real[:, :6], direction, loop)

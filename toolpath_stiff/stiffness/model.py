@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 import shlex
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import FloatArray, TextArray
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
@@ -212,14 +213,12 @@ def load_path(
     rotation: ArrayLike | None = None,
     tool_length: ArrayLike = np.nan,
     force: ArrayLike = defaults.FORCE,
-    setup: TextArray | None = None,
-    time: FloatArray | None = None,
-    temperature: FloatArray | None = None,
-    direction: FloatArray | None = None,
+    **seen: Any,
 ) -> LoadPath:
     """What the effects see at n poses; see `LoadPath` for shapes and units.
 
-    `rotation` None is a vertical spindle; `tool_length` nan the reference tool (m, scalar or (n,)).
+    `rotation` None is a vertical spindle; `tool_length` nan the reference tool (m, scalar or (n,)). `seen` are
+    `setup`, `time`, `temperature`, `direction` where they are known.
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     n = len(tip)
@@ -235,10 +234,7 @@ def load_path(
         struts=struts,
         tool_extension=np.where(np.isnan(length), 0.0, length - model.machine.reference_tool_length),
         force=np.broadcast_to(np.asarray(force, dtype=float), (n,)),
-        direction=direction,
-        setup=setup,
-        time=time,
-        temperature=temperature,
+        **seen,
     )
 
 
@@ -293,22 +289,15 @@ def acting_names(model: StiffnessModel) -> list[str]:
 
 
 def _idle(active: ActiveEffect, model: StiffnessModel) -> Idle | None:
-    waits_for, setup = active.effect.conditions(active.values), setup_of(active)
-    reasons = []
-    for name in waits_for:
-        if name in model.conditions.known:
-            continue
-        if name == SETUP:
-            belongs = f"it belongs to set-up {setup!r}" if setup else "it needs the set-up"
-            option = f"--setup {shlex.quote(setup) if setup else 'NAME'}"
-            reasons.append(f"{belongs}, and nobody says which set-up this is ({option}, or --setup {NO_SETUP})")
-        else:
-            reasons.append(f"it needs {WORDS[name]}")
-    if reasons:
-        return Idle(active.effect.name, "; ".join(reasons), True)
+    name, setup = active.effect.name, setup_of(active)
+    waits_for = active.effect.conditions(active.values)
+    options = f"(--setup {shlex.quote(setup or 'NAME')}, or --setup {NO_SETUP})"
+    words = WORDS | {SETUP: f"the set-up {setup!r}, and nobody says which this is {options}".replace(" ''", "")}
+    if missing := [words[condition] for condition in waits_for if condition not in model.conditions.known]:
+        return Idle(name, f"it needs {'; '.join(missing)}", True)
     if SETUP in waits_for and setup and setup != model.conditions.setup:
         here = f"this is {model.conditions.setup!r}" if model.conditions.setup else "that is not there"
-        return Idle(active.effect.name, f"it belongs to set-up {setup!r}, and {here}", False)
+        return Idle(name, f"it belongs to set-up {setup!r}, and {here}", False)
     return None
 
 
@@ -328,17 +317,13 @@ def condition_warnings(model: StiffnessModel, tool_given: bool = False) -> list[
     warnings += [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
     warnings += [str(idle) for idle in idle_effects(model) if idle.waiting]
     length = mm_from_m(model.machine.reference_tool_length)
-    if not tool_given:
-        warnings += [
-            f"{active.effect.name} acts as with the reference tool ({length:g} mm): nobody gives the tool's length"
-            for active in acting_effects(model)
-            if TOOL in active.effect.needs
-        ]
-    given = model.given
-    named = model.conditions.setup and (given is None or given.setup != model.conditions.setup)
-    if named and not any(SETUP in active.effect.conditions(active.values) for active in model.effects):
-        name = model.machine.name
-        warnings.append(f"set-up {model.conditions.setup!r} changes nothing: no effect of machine {name} depends on it")
+    asking = [active.effect.name for active in acting_effects(model) if TOOL in active.effect.needs and not tool_given]
+    tool = f"acts as with the reference tool ({length:g} mm): nobody gives the tool's length"
+    warnings += [f"{name} {tool}" for name in asking]
+    setup, machine = model.conditions.setup, model.given or model.machine
+    belonging = any(SETUP in active.effect.conditions(active.values) for active in model.effects)
+    if setup and setup != machine.setup and not belonging:
+        warnings.append(f"set-up {setup!r} changes nothing: no effect of machine {machine.name} depends on it")
     return warnings
 
 
@@ -352,7 +337,7 @@ def conditions_stated(model: StiffnessModel) -> list[str]:
     return stated + [str(idle) for idle in idle_effects(model) if not idle.waiting]
 
 
-def effects_stated(model: StiffnessModel) -> dict[str, Any]:
+def effects_stated(model: StiffnessModel) -> Document:
     """The entries of a result's JSON: what acts, what does not and why, under which set-up and temperature."""
     return {
         "effects": acting_names(model),
@@ -362,7 +347,7 @@ def effects_stated(model: StiffnessModel) -> dict[str, Any]:
     }
 
 
-def machine_words(document: Mapping[str, Any]) -> str:
+def machine_words(document: Document) -> str:
     """The machine of a result, what acts on it, the set-up: "nist with setup_compliance, set-up riser"."""
     effects = document.get("effects") or []
     parts = [f"{document.get('machine') or '-'}" + (f" with {', '.join(map(str, effects))}" if effects else "")]
@@ -376,11 +361,10 @@ def idle_on_readings(model: StiffnessModel, missing: Collection[str], setups: Co
     """
     sentences = {}
     for active in (*model.effects, *model.instruments):
-        waits_for, setup = active.effect.conditions(active.values), setup_of(active)
-        lacking = ", ".join(name for name in waits_for if name in missing)
+        waits_for, setup, name = active.effect.conditions(active.values), setup_of(active), active.effect.name
+        lacking = ", ".join(condition for condition in waits_for if condition in missing)
         if lacking or (SETUP in waits_for and setup and setup not in setups):
             why = f"column {lacking} is missing" if lacking else f"none is of set-up {setup!r}"
-            name = active.effect.name
             sentences[name] = f"{name} of the machine file does not act on these readings: {why}"
     return sentences
 

@@ -54,24 +54,21 @@ class TermEffect(Effect):
     def __init__(
         self,
         name: str,
-        terms: Mapping[str, Term],
-        parameters: Sequence[Parameter] = (),
+        entries: Sequence[tuple[Term, Parameter]],
         source: str = ASSUMED,
         described_from: tuple[str, ...] = (),
         file: str = "",
     ) -> None:
-        self.name, self.terms, self.source, self.described_from, self.file = (
-            name, dict(terms), source, described_from, file,
-        )  # fmt: skip
-        self.parameters = tuple(parameters) or tuple(
-            size_parameter(term.action, size, f"size of {term.key}") for size, term in terms.items()
-        )
+        self.name, self.source, self.described_from, self.file = name, source, described_from, file
+        terms = [term for term, _ in entries]
+        self.parameters = tuple(parameter for _, parameter in entries)
+        self.terms = {parameter.name: term for term, parameter in entries}
         self.title = "; ".join(parameter.meaning for parameter in self.parameters)
-        first, *_ = terms.values()
-        self.link = "geometry" if first.action == "joint offset" else CATALOGUE_LINKS.get(first.link, first.link)
-        self.equation = "; ".join(formula(term, size) for size, term in terms.items())
-        self.needs = tuple(dict.fromkeys(need for term in terms.values() for need in _needs(term)))
-        self.load_dependent = any(not set(OF_FORCES).isdisjoint(term.variables) for term in terms.values())
+        link = terms[0].link
+        self.link = "geometry" if terms[0].action == "joint offset" else CATALOGUE_LINKS.get(link, link)
+        self.equation = "; ".join(formula(term, size) for size, term in self.terms.items())
+        self.needs = tuple(dict.fromkeys(need for term in terms for need in _needs(term)))
+        self.load_dependent = any(not set(OF_FORCES).isdisjoint(term.variables) for term in terms)
 
     def _shares(self, path: LoadPath, p: Mapping[str, float], *actions: str) -> Iterator[tuple[Term, float]]:
         """Terms of these actions that the poses say enough for, each with its size."""
@@ -176,7 +173,8 @@ def effect_of(term: Term) -> TermEffect:
     """
     if not term.acts:
         raise ValueError(f"no effect sees the variable {' times '.join(term.variables)!r}")
-    return kind_of(term)(f"term: {term.key}", {"size": term})
+    entry = (term, size_parameter(term.action, "size", f"size of {term.key}"))
+    return kind_of(term)(f"term: {term.key}", [entry])
 
 
 def _needs(term: Term) -> list[str]:

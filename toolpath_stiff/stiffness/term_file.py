@@ -5,10 +5,10 @@ The terms of a file are one effect; those of the geometry and those of readings 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 from toolpath_stiff.stiffness.declarations import NAME, wrong_in
@@ -56,7 +56,7 @@ def constant_key(name: str, variable: str) -> tuple[str, float]:
     return (f"{name}_{unit}", si) if unit and name not in PLAIN else (name, 1.0)
 
 
-def entry_of(term: Term, size: str, meaning: str) -> dict[str, Any]:
+def entry_of(term: Term, size: str, meaning: str) -> Document:
     """A term as an entry of a file, in the order of its keys."""
     parameter = size_parameter(term.action, size, meaning)
     bounds, typical = _range_keys(parameter)
@@ -67,7 +67,7 @@ def entry_of(term: Term, size: str, meaning: str) -> dict[str, Any]:
     return {**entry, **more, "along": term.direction, **_shape_entry(term), **ranges, **times}
 
 
-def _shape_entry(term: Term) -> dict[str, Any]:
+def _shape_entry(term: Term) -> Document:
     of = {"of": term.column} if term.column else {}
     constants = {}
     for name, value in term.at:
@@ -100,24 +100,20 @@ def effects_of_terms(file: str) -> dict[str, Effect]:
     for number, name in enumerate(names):
         if name in names[:number]:
             raise toml.error(f"size {name!r} is there twice", where=f"effect[{number + 1}].size")
-    effects: dict[str, Effect] = {}
     kinds = sorted({kind_of(term) for term, _ in entries}, key=lambda kind: kind.ending)
-    for kind in kinds:
-        terms, parameters = zip(*(entry for entry in entries if kind_of(entry[0]) is kind), strict=True)
-        name = common if len(kinds) == 1 else f"{common}{kind.ending}"
-        by_size = {parameter.name: term for term, parameter in zip(terms, parameters, strict=True)}
-        effects[name] = kind(name, by_size, parameters, source, marks, file)
-    return effects
+    effects = {common if len(kinds) == 1 else f"{common}{kind.ending}": kind for kind in kinds}
+    return {
+        name: kind(name, [entry for entry in entries if kind_of(entry[0]) is kind], source, marks, file)
+        for name, kind in effects.items()
+    }
 
 
-def _entry(toml: TomlReader, where: str, row: Mapping[str, Any]) -> tuple[Term, Parameter]:
+def _entry(toml: TomlReader, where: str, row: Document) -> tuple[Term, Parameter]:
     """One entry, checked."""
-    toml.choice(f"{where}.name", row.get("name"), ("term",), '"term"; other effects are Python files')
-    link = toml.choice(f"{where}.link", row.get("link"), LINKS, f"one of {', '.join(LINKS)}")
-    actions = [action for action, place in ALONG if place == link]
-    action: Any = toml.choice(f"{where}.action", row.get("action"), actions, f"of {link}: {', '.join(actions)}")
-    ways = ALONG[action, link]
-    along = toml.choice(f"{where}.along", row.get("along"), ways, f"of {action}: {', '.join(ways)}")
+    _choice(toml, where, row, "name", ("term",))
+    link = _choice(toml, where, row, "link", LINKS)
+    action = _choice(toml, where, row, "action", [action for action, place in ALONG if place == link])
+    along = _choice(toml, where, row, "along", ALONG[action, link])
     parameter = _parameter(toml, where, row, action)
     toml.only(where, row, (*KEYS, *_range_keys(parameter)))
     variable, shape, constants, column = _shape(toml, where, row, action, action)
@@ -129,7 +125,11 @@ def _entry(toml: TomlReader, where: str, row: Mapping[str, Any]) -> tuple[Term, 
     return term, parameter
 
 
-def _parameter(toml: TomlReader, where: str, row: Mapping[str, Any], action: str) -> Parameter:
+def _choice(toml: TomlReader, where: str, row: Document, key: str, choices: Sequence[str]) -> str:
+    return toml.choice(f"{where}.{key}", row.get(key), choices, f"one of {', '.join(choices)}")
+
+
+def _parameter(toml: TomlReader, where: str, row: Document, action: str) -> Parameter:
     """The size, with what it may be."""
     size, meaning = (_text(toml, f"{where}.{key}", row.get(key)) for key in ("size", "meaning"))
     usual = size_parameter(action, size, meaning)
@@ -141,42 +141,35 @@ def _parameter(toml: TomlReader, where: str, row: Mapping[str, Any], action: str
     return parameter
 
 
-def _shape(
-    toml: TomlReader, where: str, row: Mapping[str, Any], action: str, of: str
-) -> tuple[str, str, Constants, str]:
+def _shape(toml: TomlReader, where: str, row: Document, action: str, of: str) -> tuple[str, str, Constants, str]:
     """Variable, shape, constants and column of an action; "" for a second variable, which is one `of` the first's."""
-    by_strut = () if of in (*IN_SERIES, "turning") else (*OF_FORCES, "strut length")
-    seen = [name for name in SEEN if name not in by_strut]
-    variable = toml.choice(f"{where}.varies_with", row.get("varies_with"), seen, f"one of {', '.join(seen)}")
-    shapes = SHAPES_OF.get(variable, SHAPES[1:-1])
-    shape = toml.choice(f"{where}.shape", row.get("shape"), shapes, f"one of {', '.join(shapes)}")
-    column = row.get("of", "")
-    columns = [name for name in COLUMNS.get(action, COLUMNS.get(variable, ("",))) if not by_strut or name not in SWINGS]
+    by_strut = of in (*IN_SERIES, "turning")
+    seen = [name for name in SEEN if by_strut or name not in (*OF_FORCES, "strut length")]
+    variable = _choice(toml, where, row, "varies_with", seen)
+    shape = _choice(toml, where, row, "shape", SHAPES_OF.get(variable, SHAPES[1:-1]))
     if variable == "setup" and action != "joint offset":
-        column = _text(toml, f"{where}.of", column)
+        column = _text(toml, f"{where}.of", row.get("of"))
     else:
-        toml.choice(f"{where}.of", column, columns, f"one of {', '.join(map(repr, columns))}")
-    constants = toml.table(f"{where}.constants", row.get("constants", {}), "a table of numbers")
+        columns = COLUMNS.get(action, COLUMNS.get(variable, ("",)))
+        column = _choice(toml, where, {"of": "", **row}, "of", [c for c in columns if by_strut or c not in SWINGS])
+    given = toml.table(f"{where}.constants", row.get("constants", {}), "a table of numbers")
     pair = PAIR if action == "coupling" else ()
-    known = [
-        {constant_key(name, variable)[0]: name for name in (*names, *pair)} for kind, names in FORMULAS if kind == shape
+    ways = [
+        {constant_key(name, variable): name for name in (*names, *pair)} for kind, names in FORMULAS if kind == shape
     ]
-    names = next((keys for keys in known if keys.keys() == constants.keys()), None)
-    if names is None:
-        ways = " or ".join(", ".join(keys) or "none" for keys in known)
-        raise toml.error(
-            f"constants {', '.join(constants) or 'none'}", f"of {shape}: {ways}", where=f"{where}.constants"
-        )
+    keys = next((way for way in ways if {key for key, _ in way} == given.keys()), None)
+    if keys is None:
+        known = " or ".join(", ".join(key for key, _ in way) or "none" for way in ways)
+        raise toml.error(f"constants {', '.join(given) or 'none'}", f"of {shape}: {known}", where=f"{where}.constants")
     values = tuple(
-        (name, toml.number(f"{where}.constants", constants[key], LARGEST) * constant_key(name, variable)[1])
-        for key, name in names.items()
+        (name, toml.number(f"{where}.constants", given[key], LARGEST) * si) for (key, si), name in keys.items()
     )
     if pair and not {dict(values)[name] for name in pair} <= set(range(1, 7)):
         raise toml.error("first and second", "two numbers of struts, 1 to 6", where=f"{where}.constants")
     return variable, shape, values, column
 
 
-def _place(toml: TomlReader, where: str, row: Mapping[str, Any], action: str) -> int | None:
+def _place(toml: TomlReader, where: str, row: Document, action: str) -> int | None:
     """Number of the strut or of the vertex; None: all of them."""
     number = row.get("where")
     needed = action == "joint offset" or row["link"] == "one strut"

@@ -19,7 +19,7 @@ from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ADDING, ActiveEffect
@@ -79,16 +79,15 @@ def refuse_failing(effects: Iterable[Effect], machine: Hexapod, machine_name: st
     """Raise `InputError` for the first effect from outside the package that fails on a machine, which it names."""
     for effect in effects:
         if reason := failure(effect, machine):
-            file = file_of(effect)
-            check = command_line("effects", "check", file, *options(machine=machine_name))
+            check = command_line("effects", "check", file_of(effect), *options(machine=machine_name))
             hint = f"`{check}` says more; with {ALLOW} (allow_unchecked_effects=True) it is used all the same"
-            raise EffectError(f"effect {effect.name} {reason}", file=file, hint=hint)
+            raise EffectError(f"effect {effect.name} {reason}", file=file_of(effect), hint=hint)
 
 
 def failures(effects: Iterable[Effect], machine: Hexapod) -> list[str]:
     """What results say of effects that were used although they fail."""
-    reasons = {effect.name: failure(effect, machine) for effect in effects}
-    return [f"UNCHECKED effect {name} ({ALLOW}): it {reason}" for name, reason in reasons.items() if reason]
+    reasons = ((effect.name, failure(effect, machine)) for effect in effects)
+    return [f"UNCHECKED effect {name} ({ALLOW}): it {reason}" for name, reason in reasons if reason]
 
 
 def failure(effect: Effect, machine: Hexapod) -> str:
@@ -288,10 +287,8 @@ class EffectCheck(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a check."""
-        import pandas as pd
-
         rows = [{"effect": t["effect"], **check} for t in self.to_dict()["effects"] for check in t["checks"]]
-        return pd.DataFrame(rows)
+        return frame_of(rows)
 
     def __str__(self) -> str:
         return str(self.view.trials_text(self))

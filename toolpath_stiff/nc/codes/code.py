@@ -5,19 +5,14 @@ Each module here has a group of codes, each a function and a row; `registry` joi
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.groups import STEPS, Group
 from toolpath_stiff.nc.state import CurrentBlock, State
 
 EVERYWHERE = ("generic", "linuxcnc", "fanuc", "haas")
-
-
-NAME = re.compile(r"[GM](0|[1-9]\d*)(\.\d)?|[FST]|,[CR]")
-
-
+FANUC, HAAS = "Fanuc, operator's manuals", "Haas, mill operator's manual"
 Act = Callable[[State, CurrentBlock, str], None]
 
 
@@ -46,8 +41,6 @@ class Code:
         Whether it takes the axis words of its block, which then cannot move.
     listed
         Why it is listed as not acted upon, although it is understood.
-    label
-        What `tps check` calls it, where not by `meaning`.
     many
         Whether plain lines of it are executed many at a time (`plain_lines`), by the same rules on arrays.
     """
@@ -61,20 +54,7 @@ class Code:
     step: Group | None = None
     takes_axes: bool = False
     listed: str = ""
-    label: str = ""
     many: bool = False
-
-    def __post_init__(self) -> None:
-        if NAME.fullmatch(self.name) is None:
-            raise ValueError(f"{self.name!r} is not the name of a code: expected G1, G59.3, M6, F, S, T, `,C` or `,R`")
-        if not callable(self.act):
-            raise TypeError(f"{self.name} has no function that acts")
-        if self.when not in STEPS:
-            raise ValueError(f"{self.name} acts at {self.when!r}, which is not a step of the order of execution")
-        if not self.meaning or not self.source:
-            raise ValueError(f"{self.name} needs its meaning and its source")
-        if not self.controls or not set(self.controls) <= set(EVERYWHERE):
-            raise ValueError(f"{self.name} is of the controls {self.controls}: expected some of {EVERYWHERE}")
 
     @property
     def when(self) -> Group:
@@ -106,7 +86,24 @@ class Alias:
     meaning: str
     source: str
     controls: tuple[str, ...]
-    label: str = ""
+
+
+def family(
+    meanings: Mapping[str, str],
+    group: Group,
+    act: Act,
+    source: str,
+    controls: tuple[str, ...] = EVERYWHERE,
+    listed: str = "",
+) -> tuple[Code, ...]:
+    """Codes of one function, by their names and meanings.
+
+    Examples
+    --------
+    >>> [code.name for code in family({"M3": "on", "M5": "off"}, "M spindle", holds_anyway, m_codes("M3 M4 M5"))]
+    ['M3', 'M5']
+    """
+    return tuple(Code(name, group, act, text, source, controls, listed=listed) for name, text in meanings.items())
 
 
 def code_name(letter: str, value: float) -> str:

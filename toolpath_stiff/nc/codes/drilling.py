@@ -7,28 +7,20 @@ cycle") where a dialect follows them.
 from __future__ import annotations
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.code import Code, g_codes
-from toolpath_stiff.nc.codes.modes import time_word
+from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
+from toolpath_stiff.nc.codes.feeds import time_word
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_polar_words
-from toolpath_stiff.nc.geometry import MOST_STROKES, SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.moves import CYCLE, RAPID
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import SECONDS_PER_DAY
 
 CYCLES = ("G73", "G74", "G76", "G81", "G82", "G83", "G84", "G85", "G86", "G89")
-
-
 TAPS = ("G74", "G84")
-
-
 PECKS, DWELLS = ("G73", "G83"), ("G82", "G89")
-
-
 MOST_REPEATS = 10_000
-
-
 RENEWED = ("level", "unit")  # what one cycle leaves to another one of its run
 
 
@@ -50,18 +42,11 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     if not given and not any(block.has(letter) for letter in POINT_WORDS):
         return
     if code == "G76" and not state.dialect.increments:
-        if state.dialect.name == "linuxcnc":
-            raise block.fail(code, "is a lathe's threading cycle on LinuxCNC", hint="this is a mill")
-        raise block.fail(
-            code,
-            "is a threading cycle on LinuxCNC, fine boring on Fanuc's and Haas' controls",
-            hint="name the control with --dialect, or leave threading out",
-        )
+        problem = "is a lathe's threading cycle on LinuxCNC, fine boring on Fanuc's and Haas' controls"
+        raise block.fail(code, problem, hint="name the control with --dialect, or leave threading out")
     if code in TAPS and state.plane != "G17" and not state.dialect.increments:
         problem = f"{code} in {state.plane}: LinuxCNC's rs274 taps along another axis"
-        raise block.fail(
-            None, problem, "G17", "" if state.dialect.name == "linuxcnc" else "name the control with --dialect"
-        )
+        raise block.fail(None, problem, "G17", "name the control with --dialect")
     normal = geometry.PLANES[state.plane][2]
     repeats = _repeats(state, block)
     _keep_heights(state, block, code, normal)
@@ -91,26 +76,19 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
         place[normal] = level
         record(state, block, RAPID, frames.to_control(place), words)
         level = clear
-        _drill(state, block, normal, hole)
+        _along_normal(state, block, normal, hole.retract, RAPID)
+        for stroke in strokes(hole):
+            _along_normal(state, block, normal, stroke.height, CYCLE if stroke.feed else RAPID)
+            if stroke.dwell:
+                state.recorder.add_dwell(stroke.dwell)
 
 
-def _drill(state: State, block: CurrentBlock, normal: int, hole: Drilling) -> None:
-    """The strokes of one hole, from above it."""
-    _along_normal(state, block, normal, hole.retract, RAPID)
-    for stroke in strokes(hole):
-        _along_normal(state, block, normal, stroke.height, CYCLE if stroke.feed else RAPID, stroke.dwell)
-
-
-def _along_normal(
-    state: State, block: CurrentBlock, normal: int, height: float, motion: int, dwell: float = 0.0
-) -> None:
+def _along_normal(state: State, block: CurrentBlock, normal: int, height: float, motion: int) -> None:
     frames = state.frames
     place = frames.to_program(frames.position)
     if place[normal] != height:
         place[normal] = height
         record(state, block, motion, frames.to_control(place), (normal,))
-    if dwell:
-        state.recorder.add_dwell(dwell)
 
 
 def _repeats(state: State, block: CurrentBlock) -> int:
@@ -134,12 +112,8 @@ def _keep_heights(state: State, block: CurrentBlock, code: str, normal: int) -> 
     if len(renewed) == 2 or keeps is False:
         return
     if keeps is None or renewed:
-        raise block.fail(
-            None,
-            f"{code} after a change between G90 and G91: controls differ in whether the hole keeps its heights",
-            f"R and {AXES[normal]} in the block",
-            "" if renewed else "name the control with --dialect",
-        )
+        problem = f"{code} after a change between G90 and G91: controls differ in whether the hole keeps its heights"
+        raise block.fail(None, problem, f"R and {AXES[normal]} in the block, or --dialect")
     level = state.sticky["level"]
     heights = (retract, bottom) if state.absolute else (retract - level, bottom - retract)
     state.sticky["R"], state.sticky["Z"] = heights
@@ -155,10 +129,8 @@ def _cycle_words(state: State, block: CurrentBlock, code: str, normal: int, give
         state.sticky["P"] = time_word(state, block, "P") or 0.0
     _words_of_one_control(state, block, code)
     words = point_words(state, block)
-    if not words and given:
-        raise block.fail(None, f"{code} without axis words", "X, Y, Z")
-    if any(axis > 2 for axis in words):
-        raise block.fail(None, f"{code} with rotary axes", "the rotary axes in a block before it")
+    if (not words and given) or any(axis > 2 for axis in words):
+        raise block.fail(None, f"{code} without axis words, or with rotary axes", "X, Y, Z; A, B, C before it")
     if normal in words:
         state.sticky["Z"] = words.pop(normal)
     if state.dialect.name == "haas" and "R" not in state.sticky:  # Haas, mill operator's manual, G81: R is optional
@@ -210,11 +182,8 @@ def _check_cycle(state: State, block: CurrentBlock, code: str, normal: int) -> N
         if dwell is None or not 0.0 <= dwell <= SECONDS_PER_DAY:
             raise block.fail(None, f"{code} without its dwell", "P with the seconds, 0 or more")
     if state.sticky.setdefault("unit", state.length_scale) != state.length_scale:
-        raise block.fail(
-            None,
-            f"{code} after a change between G20 and G21: controls differ in whether the run keeps its heights",
-            "G80 before it, and R and Z again",
-        )
+        problem = f"{code} after a change between G20 and G21: controls differ in whether the run keeps its heights"
+        raise block.fail(None, problem, "G80 before it, and R and Z again")
 
 
 def _heights(state: State, block: CurrentBlock, code: str, initial: float) -> tuple[float, float]:
@@ -235,27 +204,19 @@ def _check_pecks(state: State, block: CurrentBlock, code: str, depth: float, rep
         raise block.fail(None, f"{code} with more than {MOST_STROKES} strokes", "a larger Q, or fewer repeats")
 
 
-_FANUC = "Fanuc, operator's manuals, Canned cycle for drilling"
-
-
+_MANUAL = f"{FANUC}, Canned cycle for drilling"
+_RETURNS = {"G98": "cycles return to their level", "G99": "cycles return to R"}
+_FINE = f"{_MANUAL}, Fine boring cycle (G76)"
 DRILLING_CODES = (
     Code("G73", "motion", cycle, "chip-breaking drilling", g_codes("G73")),
     Code("G81", "motion", cycle, "drilling", g_codes("G81")),
     Code("G82", "motion", cycle, "drilling with dwell", g_codes("G82")),
     Code("G83", "motion", cycle, "peck drilling", g_codes("G83")),
-    Code("G74", "motion", cycle, "left-hand tapping", f"{g_codes('G74')}; {_FANUC}, G74"),
-    Code("G84", "motion", cycle, "right-hand tapping", f"{g_codes('G84')}; {_FANUC}, G84"),
-    Code(
-        "G76",
-        "motion",
-        cycle,
-        "fine boring, rapid out",
-        f"{_FANUC}, Fine boring cycle (G76)",
-        controls=("fanuc", "haas"),
-    ),
+    Code("G74", "motion", cycle, "left-hand tapping", f"{g_codes('G74')}; {_MANUAL}, G74"),
+    Code("G84", "motion", cycle, "right-hand tapping", f"{g_codes('G84')}; {_MANUAL}, G84"),
+    Code("G76", "motion", cycle, "fine boring, rapid out", _FINE, ("fanuc", "haas")),
     Code("G86", "motion", cycle, "boring, spindle stop, rapid out", g_codes("G86")),
     Code("G85", "motion", cycle, "boring, feed out", g_codes("G85")),
     Code("G89", "motion", cycle, "boring with dwell, feed out", g_codes("G89")),
-    Code("G98", "cycle return", return_level, "cycles return to their level", g_codes("G98 G99")),
-    Code("G99", "cycle return", return_level, "cycles return to R", g_codes("G98 G99")),
+    *family(_RETURNS, "cycle return", return_level, g_codes("G98 G99")),
 )

@@ -2,38 +2,34 @@
 
 from __future__ import annotations
 
-from toolpath_stiff.nc.codes.code import Code, m_codes
-from toolpath_stiff.nc.codes.offsets import take_offset
+from toolpath_stiff.nc.codes.code import family, m_codes
 from toolpath_stiff.nc.codes.points import forget_polar
+from toolpath_stiff.nc.codes.work_offsets import take_offset
 from toolpath_stiff.nc.state import CurrentBlock, SavedModes, State
 
 OTHER_CONTROLS = "is an M code of the machine's builder on other controls"
+MODES = ("inch", "absolute", "arc_absolute", "speed", "retract", "feed_mode")
 
 
-def save_modes(state: State, block: CurrentBlock, code: str) -> None:
-    """M70: save the modes at this level of calls; M73: the same, and restore them where the subprogram returns."""
-    _check_block(state, block, code)
-    state.saved[state.level] = SavedModes(
-        state.inch, state.plane, state.absolute, state.arc_absolute, state.feed_mode, state.feed, state.speed,
-        state.retract, state.frames.active, state.frames.tool, state.frames.tip_held, code == "M73",
-    )  # fmt: skip
-
-
-def forget_modes(state: State, block: CurrentBlock, code: str) -> None:
-    """M71: what was saved at this level does not hold any more."""
-    _check_block(state, block, code)
-    state.saved.pop(state.level, None)
-
-
-def restore_modes(state: State, block: CurrentBlock, code: str) -> None:
-    """M72: the modes saved at this level hold again."""
-    _check_block(state, block, code)
-    saved = state.saved.get(state.level)
-    if saved is None:
-        raise block.fail(code, "and nothing was saved at this level of calls", "M70 or M73 before it")
-    obstacle = _restore(state, saved)
-    if obstacle:
-        raise block.fail(code, f"where {obstacle}", "G40, G49, G69 and G15 before it")
+def saved_modes(state: State, block: CurrentBlock, code: str) -> None:
+    """M70: save the modes at this level of calls; M73: until its return; M71: forget them, M72: restore them."""
+    word, frames = block.codes[code], state.frames
+    if state.dialect.name != "linuxcnc":
+        raise block.fail(word, OTHER_CONTROLS, hint="name the control with --dialect linuxcnc if it saves modal state")
+    if len(block.codes) > 1 or block.values:
+        raise block.fail(word, "beside other words", "a block of its own")
+    if code == "M71":
+        state.saved.pop(state.level, None)
+    elif code == "M72":
+        saved = state.saved.get(state.level)
+        obstacle = "nothing was saved at this level of calls" if saved is None else _restore(state, saved)
+        if obstacle:
+            raise block.fail(code, f"where {obstacle}", "M70 or M73 before it, and G40, G49, G69 and G15")
+    else:
+        modes = {name: getattr(state, name) for name in MODES}
+        state.saved[state.level] = SavedModes(
+            modes, state.plane, state.feed, frames.active, (frames.tool, frames.tip_held), code == "M73"
+        )
 
 
 def leave_level(state: State, level: int) -> str:
@@ -44,15 +40,14 @@ def leave_level(state: State, level: int) -> str:
 
 def _restore(state: State, saved: SavedModes) -> str:
     frames = state.frames
-    if frames.tool != saved.tool or frames.tip_held != saved.tip_held:
-        return "the tool length in force is another one than where the modes were saved"
-    if frames.tool and state.inch != saved.inch:
-        return "the unit would change while a tool length is in force"
+    other_unit = frames.tool != 0.0 and state.inch != saved.modes["inch"]
+    if (frames.tool, frames.tip_held) != saved.tool or other_unit:
+        return "the tool length in force, or its unit, is another one than where the modes were saved"
     if state.cutter is not None or frames.rotation is not None or state.polar is not None:
         return "cutter compensation, G68 or G16 is in force"
-    state.inch, state.absolute, state.arc_absolute = saved.inch, saved.absolute, saved.arc_absolute
-    state.speed, state.retract, state.feed_mode = saved.speed, saved.retract, saved.feed_mode
-    state.feed = None if saved.feed_mode == "G93" else saved.feed
+    for name, value in saved.modes.items():
+        setattr(state, name, value)
+    state.feed = None if state.feed_mode == "G93" else saved.feed
     if state.plane != saved.plane:
         state.plane = saved.plane
         forget_polar(state)
@@ -60,20 +55,8 @@ def _restore(state: State, saved: SavedModes) -> str:
     return ""
 
 
-def _check_block(state: State, block: CurrentBlock, code: str) -> None:
-    word = block.codes[code]
-    if state.dialect.name != "linuxcnc":
-        raise block.fail(word, OTHER_CONTROLS, hint="name the control with --dialect linuxcnc if it saves modal state")
-    if len(block.codes) > 1 or block.values:
-        raise block.fail(word, "beside other words", "a block of its own")
-
-
-_SAVED = m_codes("M70 - M73")
-
-
-SAVED_CODES = (
-    Code("M70", "M modal state", save_modes, "modes saved", _SAVED, ("linuxcnc",)),
-    Code("M71", "M modal state", forget_modes, "saved modes forgotten", _SAVED, ("linuxcnc",)),
-    Code("M72", "M modal state", restore_modes, "saved modes restored", _SAVED, ("linuxcnc",)),
-    Code("M73", "M modal state", save_modes, "modes saved, restored at the return", _SAVED, ("linuxcnc",)),
-)
+_MEANINGS = {
+    "M70": "modes saved", "M71": "saved modes forgotten", "M72": "saved modes restored",
+    "M73": "modes saved, restored at the return",
+}  # fmt: skip
+SAVED_CODES = family(_MEANINGS, "M modal state", saved_modes, m_codes("M70 - M73"), ("linuxcnc",))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolpath_stiff.nc.codes.code import Code, g_codes
-from toolpath_stiff.nc.codes.modes import SLOWEST
+from toolpath_stiff.nc.codes.feeds import SLOWEST
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.points import control_point, point_words
 from toolpath_stiff.nc.moves import CYCLE, FEED
@@ -23,15 +23,12 @@ def synchronised(state: State, block: CurrentBlock, code: str) -> None:
             f"is under {code}, spindle-synchronised motion, whose words differ from control to control",
             hint="leave threading and rigid tapping out, or name the control with --dialect linuxcnc",
         )
-    pitch = block.take("K")
+    pitch = block.take("K") or 0.0
     words = point_words(state, block)
-    if pitch is None or not words:
-        raise block.fail(first, f"under {code} without its point or its pitch", "X, Y, Z and K")
     feed = abs(pitch) * state.length_scale * state.speed
-    if feed < SLOWEST:
-        raise block.fail(first, f"under {code} with K{pitch:g} and the spindle at S{state.speed:g}", "both above 0")
-    if any(axis in words for axis in ROTARY):
-        raise block.fail(first, f"moves rotary axes under {code}", "X, Y and Z")
+    if not words or feed < SLOWEST or any(axis in words for axis in ROTARY):
+        problem = f"under {code} without point or pitch (K{pitch:g}), or with the spindle at S{state.speed:g}"
+        raise block.fail(first, problem, "a point in X, Y, Z, and K and S above 0")
     frames = state.frames
     here = list(frames.position)
     target = control_point(state, block, frames.to_program(here), words)

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
-from toolpath_stiff.nc.cutter_location.statements import MajorStatement, MinorWord, is_number
-from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling
+from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number
+from toolpath_stiff.nc.strokes import MOST_STROKES, Drilling
 from toolpath_stiff.units import SECONDS_PER_DAY
 
 # The first word of a cycle, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip
@@ -27,25 +27,25 @@ def cycle(state: CutterLocationState, statement: MajorStatement) -> None:
     """The cycle that the next points drill; CYCLE/OFF ends it."""
     state.no_circle("CYCLE/")
     state.hole, arguments = None, list(statement.arguments)
-    kind = arguments.pop(0).text.upper() if arguments else ""
+    kind = arguments.pop(0).upper() if arguments else ""
     if kind in ("OFF", "NOMORE"):
         return
     if kind not in KINDS:
         known = ", ".join(f"CYCLE/{known}" for known in (*KINDS, "OFF"))
         raise state.fail(f"CYCLE/{kind} is not supported", known, EXPAND)
-    if arguments and arguments[0].text.upper() in ("DEEP", "BRKCHP"):  # NX, CAMplete: CYCLE/DRILL,DEEP
-        kind = arguments.pop(0).text.upper()
+    if arguments and arguments[0].upper() in ("DEEP", "BRKCHP"):  # NX, CAMplete: CYCLE/DRILL,DEEP
+        kind = arguments.pop(0).upper()
     values = dict[str, float]()
     for key, value in zip(arguments[::2], arguments[1::2], strict=False):
         name = _name_in_cycle(state, key)
         if name in values:
-            raise state.fail(f"{key.text} twice", "one", EXPAND, key)
-        values[name] = state.number(value, f"the number of {key.text}")
+            raise state.fail(f"{key} twice", "one", EXPAND)
+        values[name] = state.number(value, f"the number of {key}")
         if name == "feed":
-            factor, state.hole_per_revolution = FEED_UNITS[key.text.upper()]
+            factor, state.hole_per_revolution = FEED_UNITS[key.upper()]
             state.hole_feed = values["feed"] * (factor or state.scale)
     if len(arguments) % 2:
-        raise state.fail(f"{arguments[-1].text!r} without its value", "a number", EXPAND, arguments[-1])
+        raise state.fail(f"{arguments[-1]!r} without its value", "a number", EXPAND)
     for needed in ("DEPTH", "feed", "CLEAR"):
         if needed not in values:
             raise state.fail(f"{statement.shown} without {needed}", "DEPTH, CLEAR and a feed as MMPM,100", EXPAND)
@@ -62,17 +62,17 @@ def cycle(state: CutterLocationState, statement: MajorStatement) -> None:
     )
 
 
-def _name_in_cycle(state: CutterLocationState, key: MinorWord) -> str:
+def _name_in_cycle(state: CutterLocationState, key: str) -> str:
     """The quantity that a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
-    name = ALIASES.get(key.text.upper(), key.text.upper())
+    name = ALIASES.get(key.upper(), key.upper())
     if name in FEED_UNITS:
         return "feed"
     if is_number(name):
         problem = "a cycle of numbers without words: their order depends on the CAM system"
-        raise state.fail(problem, "pairs, as DEPTH,5", EXPAND, key)
+        raise state.fail(problem, "pairs, as DEPTH,5", EXPAND)
     if name not in PAIRS:
         expected = "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed"
-        raise state.fail(f"CYCLE/ with {name}, which is not supported", expected, EXPAND, key)
+        raise state.fail(f"CYCLE/ with {name}, which is not supported", expected, EXPAND)
     return name
 
 
@@ -83,16 +83,12 @@ def _check_cycle(state: CutterLocationState, code: str, values: dict[str, float]
     back = values.get("RETURN", clear)
     if not depth or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= dwell <= SECONDS_PER_DAY:
         raise state.fail(shown, "DEPTH and feed above 0, CLEAR and DWELL of 0 or more")
-    if "RETURN" in values and not back > 0.0:
-        raise state.fail("RETURN,0 goes to a plane of the CAM system's", "a height above the point", EXPAND)
-    if back < clear:
-        raise state.fail("a return below CLEAR", "a height of CLEAR or more")
+    if "RETURN" in values and (back < clear or not back > 0.0):
+        raise state.fail(f"RETURN,{back:g}: a plane of the CAM system's, or below CLEAR", "CLEAR or more", EXPAND)
     if back != clear and "FEDTO" in state.statement.words:
         problem = "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate"
         raise state.fail(problem, "DEPTH", EXPAND)
-    if step and not pecks:
-        raise state.fail("STEP without DEEP or BRKCHP", "CYCLE/DEEP or CYCLE/BRKCHP")
-    if pecks and (not step > 0.0 or (clear + abs(depth)) / step > MOST_STROKES):
-        raise state.fail(f"{shown} without its STEP, or with one too small", "STEP above 0")
+    if bool(step) != pecks or (pecks and not 0.0 < (clear + abs(depth)) / step <= MOST_STROKES):
+        raise state.fail(shown, f"STEP above 0 with DEEP or BRKCHP alone, for up to {MOST_STROKES} strokes")
     if dwell and pecks:
         raise state.fail("DWELL in a cycle with pecks", "no DWELL", EXPAND)

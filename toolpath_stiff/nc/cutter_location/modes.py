@@ -9,6 +9,7 @@ from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number
 from toolpath_stiff.nc.cutter_location.tool_axes import unit_axis
 from toolpath_stiff.nc.moves import ToolUse
+from toolpath_stiff.nc.tables import tool_of
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY, SECONDS_PER_MINUTE
 
 MM_PER_FOOT = 12.0 * MM_PER_INCH
@@ -26,7 +27,6 @@ FEED_UNITS: dict[str, tuple[float | None, bool]] = {
 INCH_FEEDS = ("IPM", "IPR", "FPM", "FPR")
 LENGTH_UNITS = {"MM": 1.0, "INCH": MM_PER_INCH, "INCHES": MM_PER_INCH, "IN": MM_PER_INCH}
 SEVERAL_TOOLS = ToolUse(0, math.nan, math.nan, "several tools without numbers")
-SAME_LENGTH_MM = 1e-3
 TURNING = "turning: the points are read as those of a mill, X as a position"
 HEADING = "a heading or a remark"
 TOOL = "about the tool; LOADTL, LOAD/TOOL and CUTTER are what counts"
@@ -61,7 +61,7 @@ def fedrat(state: CutterLocationState, statement: MajorStatement) -> None:
             raise state.fail(statement.shown, "a feed per minute or per revolution")
         state.note("how the post processor writes feeds")
         return
-    values = [argument for argument in statement.arguments if is_number(argument.text)]
+    values = [word for word in words if is_number(word)]
     units = [word for word in words if not is_number(word)]
     if len(values) != 1 or len(units) > 1 or not FEED_UNITS.keys() >= set(units):
         raise state.fail(statement.shown, f"FEDRAT/ with a number and one of {', '.join(FEED_UNITS)}")
@@ -73,7 +73,7 @@ def fedrat(state: CutterLocationState, statement: MajorStatement) -> None:
         )
     value = state.number(values[0])
     if value < 0.0:
-        raise state.fail(f"a feed of {value:g}", "a feed above 0", place=values[0])
+        raise state.fail(f"a feed of {value:g}", "a feed above 0")
     factor, state.per_revolution = FEED_UNITS[units[0]] if units else (None, False)
     state.feed = value * (factor or state.scale) or None
 
@@ -126,7 +126,7 @@ def tlaxis(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def frame_word(state: CutterLocationState, statement: MajorStatement) -> None:
     """A second, different one is refused."""
-    numbers = tuple(state.number(argument) for argument in statement.arguments if is_number(argument.text))
+    numbers = tuple(state.number(argument) for argument in statement.arguments if is_number(argument))
     one_frame(state, statement.word, numbers, statement.shown)
     state.note(FRAMES[statement.word])
 
@@ -163,7 +163,7 @@ def loadtl(state: CutterLocationState, statement: MajorStatement) -> None:
         raise state.fail("LOADTL without a tool", "LOADTL/ and the tool's number")
     number = state.number(given[0], "the tool's number")
     if number != int(number) or not 0 <= number < 1e9:
-        raise state.fail(f"tool {given[0].text}", "a whole number", place=given[0])
+        raise state.fail(f"tool {given[0]}", "a whole number")
     state.no_circle(f"{statement.word}/")
     length = math.nan
     if "LENGTH" in words[:-1]:
@@ -175,26 +175,16 @@ def loadtl(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def _length_of(state: CutterLocationState, number: int, given: float) -> float:
     """The tool table's length, or the one that the file gives; nan: the machine's reference tool."""
-    entry = (state.tools or {}).get(number)
-    if entry is None or math.isnan(entry.length):
-        if not math.isnan(given):
-            state.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools takes precedence")
-        return given
-    if abs(given - entry.length) > SAME_LENGTH_MM:
-        state.assume(f"tool {number}: the tool table's length {entry.length:g} mm, not LOADTL's {given:g} mm")
-    return entry.length
-
-
-def toolno(state: CutterLocationState, statement: MajorStatement) -> None:
-    """Listed; a turning tool is doubted."""
-    turns = "TURN" in statement.words
-    state.note(TURNING if turns else TOOL, doubtful=turns)
+    length = tool_of(state.tools, number).length
+    if not math.isnan(given):
+        state.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools takes precedence")
+    return given if math.isnan(length) else length
 
 
 def cutter(state: CutterLocationState, statement: MajorStatement) -> None:
     """The diameter: the first number, in all of APT's forms of CUTTER/; of TLDATA/ after the kind of tool."""
     given = statement.arguments[:1] if statement.word == "CUTTER" else statement.arguments
-    first = next((argument for argument in given if is_number(argument.text)), None)
+    first = next((argument for argument in given if is_number(argument)), None)
     if first is not None:
         diameter = state.number(first) * state.scale
         state.diameter = diameter if diameter > 0.0 else math.nan
@@ -204,12 +194,12 @@ def cutter(state: CutterLocationState, statement: MajorStatement) -> None:
 def heading(state: CutterLocationState, statement: MajorStatement) -> None:
     """The name of an operation; after TOOL PATH/ perhaps of its tool."""
     if statement.arguments:
-        state.marks.append((statement.line, statement.arguments[0].text))
+        state.marks.append((statement.line, statement.arguments[0]))
     if statement.word == "TOOL PATH":
         state.no_circle("TOOL PATH/")
         words = statement.words
         if "TOOL" in words[1:-1]:
-            name = statement.arguments[words.index("TOOL", 1) + 1].text
+            name = statement.arguments[words.index("TOOL", 1) + 1]
             if state.tool == 0 and 0 in state.used_tools and name != state.tool_name:
                 state.used_tools[0] = SEVERAL_TOOLS
             state.tool_name = name

@@ -24,10 +24,6 @@ POINT = re.compile(r"\(\s*POINT\s*/([^()]*)\)", re.IGNORECASE)
 
 def goto(state: CutterLocationState, statement: MajorStatement) -> None:
     """A point; on a circle several points, too."""
-    named = next((given for given in statement.arguments if given.text[:1].isalpha() or given.text[:1] == "("), None)
-    if named is not None:
-        hint = "names need APT's processor: give the file of points that it writes"
-        raise state.fail(f"GOTO/ to {named.text[:30]!r}", "numbers", hint, named)
     numbers = [state.number(argument) for argument in statement.arguments]
     if len(numbers) in (3, 6):
         to_point(state, numbers)
@@ -127,10 +123,10 @@ def circle(state: CutterLocationState, statement: MajorStatement) -> None:
     """A circle in the forms of PTC, NX and APT."""
     times = 1
     arguments = statement.arguments
-    if len(arguments) > 2 and arguments[-2].text.upper() == "TIMES":
-        count = state.number(arguments[-1], "a whole number of turns")
+    if len(arguments) > 2 and arguments[-2].upper() == "TIMES":
+        count = state.number(arguments[-1])
         if count != int(count) or not 1 <= count <= 10000:
-            raise state.fail("CIRCLE/ ... TIMES", "a whole number of turns", place=arguments[-1])
+            raise state.fail(statement.shown, "TIMES and a whole number of turns")
         times, arguments = int(count), arguments[:-2]
     numbers = [state.number(argument) for argument in arguments]
     if len(numbers) not in (4, 6, 7, 11):
@@ -156,7 +152,7 @@ def movarc(state: CutterLocationState, statement: MajorStatement) -> None:
     *arguments, _, last = statement.arguments
     numbers, angle = [state.number(argument) for argument in arguments], state.number(last)
     if not 0.0 < angle <= 3.6e6:
-        raise state.fail(f"an arc of {angle:g} degrees", "an angle above 0", place=last)
+        raise state.fail(f"an arc of {angle:g} degrees", "an angle above 0")
     axis = unit_axis(numbers[3:6], CIRCLE_AXIS)
     _await_circle(state, Circle(state.scaled(numbers[:3]), axis, numbers[6] * state.scale, sweep=angle))
 
@@ -213,7 +209,7 @@ def tlon(state: CutterLocationState, statement: MajorStatement) -> None:
     """CATIA's and Creo's arcs in APT's own words."""
     if state.direction is None:
         raise state.fail("TLON,GOFWD/ without its direction", "INDIRV/ before it")
-    texts, words, which = [argument.text for argument in statement.arguments], statement.words, 1
+    texts, words, which = list(statement.arguments), statement.words, 1
     if len(words) == 5 and words[2] in ("1", "2") and words[3] == "INTOF":
         texts, which = [texts[0], texts[1], texts[4]], int(words[2])
     if len(texts) != 3 or words[1] != "ON" or not texts[0].startswith("(") or not texts[2].startswith("("):
@@ -233,7 +229,7 @@ def _circle(state: CutterLocationState, text: str) -> Circle:
     if word in ("CYLNDR", "CIRCLE") and len(numbers) == 7:
         axis = unit_axis(numbers[3:6], CIRCLE_AXIS)
         return Circle(state.scaled(numbers[:3]), axis, numbers[6] * state.scale)
-    raise state.fail(f"TLON,GOFWD/ along {_shortened(text)}", "(CIRCLE/x,y,z,r) or (CYLNDR/x,y,z,i,j,k,r)")
+    raise state.fail(f"TLON,GOFWD/ along {text[:40]}", "(CIRCLE/x,y,z,r) or (CYLNDR/x,y,z,i,j,k,r)")
 
 
 def _line(state: CutterLocationState, text: str) -> tuple[Vector, Vector]:
@@ -243,7 +239,7 @@ def _line(state: CutterLocationState, text: str) -> tuple[Vector, Vector]:
         word, numbers = "LINE", [value for point in POINT.findall(text)[-2:] for value in _numbers(point)]
     if word == "LINE" and len(numbers) == 6:
         return state.scaled(numbers[:3]), state.scaled(numbers[3:])
-    raise state.fail(f"TLON,GOFWD/ up to {_shortened(text)}", "(LINE/x,y,z,x,y,z)")
+    raise state.fail(f"TLON,GOFWD/ up to {text[:40]}", "(LINE/x,y,z,x,y,z)")
 
 
 def _geometry(text: str) -> tuple[str, list[float]]:
@@ -256,7 +252,3 @@ def _numbers(text: str) -> list[float]:
     """The numbers between commas, none if one of them is none."""
     parts = [part.strip() for part in text.split(",")]
     return [number(part) for part in parts] if all(map(is_number, parts)) else []
-
-
-def _shortened(text: str) -> str:
-    return f"{text.partition('/')[0].replace(' ', '').upper()}/...)"

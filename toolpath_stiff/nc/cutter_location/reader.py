@@ -83,7 +83,7 @@ def run(state: CutterLocationState, lines: tuple[str, ...], most_errors: int = 1
     """Execute all lines in order, from what is in force in `state`, up to so many errors, which are returned."""
     index, errors = 0, list[InputError]()
     while index < len(lines) and not state.ended and len(errors) < most_errors:
-        if len(state.recorder.line) > PACKED_AT:
+        if len(state.recorder.recent) > PACKED_AT:
             state.recorder.pack()
         here = index
         statement: MajorStatement | None = MajorStatement(here + 1, 1, "GOTO")
@@ -145,7 +145,7 @@ def _conclude(state: CutterLocationState) -> None:
         state.assume(NO_UNITS)
     for noted in state.noted.values():
         if noted.doubtful:
-            state.warnings.append(f"line {noted.statement.line}: {noted.statement.shown}: {noted.sentence}")
+            state.warnings.append(f"line {noted.statement.line}: {noted.statement.shown}: {noted.reason}")
     if state.unsmooth and not state.smooth:
         state.warnings.append(
             f"line {state.first_unsmooth}: the tool turns back where this arc begins, and no arc of the file begins "
@@ -157,7 +157,7 @@ def unsupported(state: CutterLocationState) -> tuple[Unsupported, ...]:
     """Words that were not acted upon, in the order of the file, each once."""
     noted = sorted(state.noted.values(), key=lambda word: word.statement.line)
     return tuple(
-        Unsupported(word.statement.line, word.statement.column, word.statement.word, word.sentence) for word in noted
+        Unsupported(word.statement.line, word.statement.column, word.statement.word, word.reason) for word in noted
     )
 
 

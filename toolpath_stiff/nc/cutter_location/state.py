@@ -12,12 +12,14 @@ from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.hints import both_names
+from toolpath_stiff.nc.courses import point_on_arc
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, dot, minus
-from toolpath_stiff.nc.cutter_location.statements import NUMBERS, MajorStatement, MinorWord, number
+from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
-from toolpath_stiff.nc.geometry import Drilling, Vector, point_on_arc, strokes
-from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Recorder, ToolUse
+from toolpath_stiff.nc.geometry import Vector
+from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Move, Recorder, ToolUse
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.strokes import Drilling, strokes
 from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry, tool_of
 
 FIRST_POINT = "the path begins at the file's first point; where the tool comes from is not given (no FROM)"
@@ -29,17 +31,11 @@ NOT_MOVED = (False, False)
 
 @dataclass
 class Noted:
-    """A word that was not acted upon: where it stands first, why, whether that is a warning, how often."""
+    """A word that was not acted upon: where it stands first, why, whether that is a warning."""
 
     statement: MajorStatement
     reason: str
     doubtful: bool
-    count: int = 1
-
-    @property
-    def sentence(self) -> str:
-        """Why, and how often."""
-        return self.reason + (f" ({self.count} times)" if self.count > 1 else "")
 
 
 @dataclass
@@ -100,10 +96,9 @@ class CutterLocationState:
     unsmooth: int = 0
     first_unsmooth: int = 0
 
-    def fail(self, problem: str, expected: str = "", hint: str = "", place: MinorWord | None = None) -> ProgramError:
+    def fail(self, problem: str, expected: str = "", hint: str = "") -> ProgramError:
         """The error for the statement being executed."""
-        line, column = (place or self.statement).line, (place or self.statement).column
-        return Place(self.name, line, max(column, 1)).fail(problem, expected, hint)
+        return Place(self.name, self.statement.line, self.statement.column).fail(problem, expected, hint)
 
     def note(self, reason: str, doubtful: bool = False) -> None:
         """Note that the word being executed is not acted upon; `doubtful`: which is a warning."""
@@ -111,19 +106,17 @@ class CutterLocationState:
         noted = self.noted.get(word)
         if noted is None or doubtful > noted.doubtful:
             self.noted[word] = Noted(self.statement, reason, doubtful)
-        elif doubtful == noted.doubtful:
-            noted.count += 1
 
     def assume(self, text: str) -> None:
         """Note an assumption, once."""
         if text not in self.assumptions:
             self.assumptions.append(text)
 
-    def number(self, argument: MinorWord, expected: str = "a number") -> float:
+    def number(self, argument: str, expected: str = "a number") -> float:
         """The number of an argument. Raises `InputError`."""
-        value = number(argument.text) if NUMBERS.fullmatch(argument.text) else math.nan
+        value = number(argument) if is_number(argument) else math.nan
         if not abs(value) <= LARGEST_MM * 100.0:
-            raise Place(self.name, argument.line, argument.column).fail(f"{argument.text[:30]!r}", expected)
+            raise self.fail(f"{argument[:30]!r}", expected, "names need APT's processor: give the file that it writes")
         return value
 
     def numbers(self, statement: MajorStatement, *counts: int) -> list[float]:
@@ -250,8 +243,9 @@ def _add(
 ) -> None:
     assert state.point is not None
     start = [*state.point, *state.angles, 0.0]
-    tool, line = state.tool, state.statement.line
-    added = state.recorder.add(line, motion, start, [*end, *angles, 0.0], feed, tool, state.tool_length, NOT_MOVED, arc)
+    tool, there = state.tool, [*end, *angles, 0.0]
+    move = Move(state.statement.line, motion, start, there, feed, tool, state.tool_length, NOT_MOVED, arc)
+    added = state.recorder.add(move)
     state.point, state.angles = end, angles
     if added and tool not in state.used_tools:  # the tool table wins over the file
         entry = tool_of(state.tools, tool)

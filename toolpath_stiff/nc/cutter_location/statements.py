@@ -6,10 +6,7 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
-from collections.abc import Callable
 from dataclasses import dataclass
-from operator import itemgetter
 
 from toolpath_stiff.nc.place import Place
 
@@ -55,33 +52,24 @@ _POINT = re.compile(rf"\s*GOTO\s*/{_FIRST}{_NEXT * 2}(?:{_NEXT * 3})?\s*$", re.I
 
 
 @dataclass(frozen=True)
-class MinorWord:
-    """A text between two commas, and where it begins."""
-
-    text: str
-    line: int
-    column: int
-
-
-@dataclass(frozen=True)
 class MajorStatement:
     """A statement. `word` is upper case, "" for a line of numbers alone; `text` is free text after a text word."""
 
     line: int
     column: int
     word: str
-    arguments: tuple[MinorWord, ...] = ()
+    arguments: tuple[str, ...] = ()
     text: str = ""
 
     @property
     def words(self) -> list[str]:
         """The arguments in upper case."""
-        return [argument.text.upper() for argument in self.arguments]
+        return [argument.upper() for argument in self.arguments]
 
     @property
     def shown(self) -> str:
         """The statement for a message."""
-        arguments = ",".join(" ".join(argument.text.split()) for argument in self.arguments)
+        arguments = ",".join(" ".join(argument.split()) for argument in self.arguments)
         shown = f"{self.word}/{arguments}" if arguments else self.word or self.text
         return shown if len(shown) <= 60 else shown[:57] + "..."
 
@@ -116,7 +104,7 @@ def read_statement(lines: tuple[str, ...], index: int, name: str) -> tuple[Major
     if text_word:
         text = line[text_word.end() :].strip().removeprefix("/").strip()
         return MajorStatement(index + 1, text_word.start(1) + 1, text_word[1].upper(), (), text), index + 1
-    joined, starts = "", list[tuple[int, int, int]]()  # where in the joined text a line begins, and its first column
+    joined, place = "", Place(name, index + 1, begin + len(line[begin:]) - len(line[begin:].lstrip()) + 1)
     while True:
         code, continues, rest = lines[index].partition("$$")[0].partition("$")
         if rest.strip():
@@ -124,11 +112,10 @@ def read_statement(lines: tuple[str, ...], index: int, name: str) -> tuple[Major
                 f"{rest.strip()[:20]!r} after a $, which continues a statement on the next line",
                 "nothing, or $$ and a comment",
             )
-        starts.append((len(joined), index + 1, begin + 1))
         joined += code[begin:]
         index, begin = index + 1, 0
         if not continues:
-            return _parse(joined, starts, name), index
+            return _parse(joined.strip(), place), index
         if index == len(lines) or _NEW_STATEMENT.match(lines[index]):
             raise Place(name, index, len(code) + 1).fail(
                 "a $ at the end of a line, and no line that continues the statement", "the rest of the statement"
@@ -165,46 +152,36 @@ def frame_in_comment(lines: tuple[str, ...], index: int) -> tuple[str, tuple[flo
     return (frame[0].strip(), numbers) if len(numbers) == FRAME_NUMBERS else None
 
 
-def _parse(joined: str, starts: list[tuple[int, int, int]], name: str) -> MajorStatement | None:
-    """The statement of a text; of each line in it where it begins, and its line and column in the file."""
-
-    def place(index: int) -> tuple[int, int]:
-        begin, line, column = starts[bisect_right(starts, index, key=itemgetter(0)) - 1]
-        return line, column + index - begin
-
-    text = joined.strip()
+def _parse(text: str, place: Place) -> MajorStatement | None:
+    """The statement of a text, at the place of its first character."""
+    line, column = place.line, place.column or 1
     if not text:
         return None
-    line, column = place(len(joined) - len(joined.lstrip()))
-    if _ONLY_NUMBERS.fullmatch(joined):
-        return MajorStatement(line, column, "", _arguments(joined, 0, place), text)
-    head = _WORD.match(joined)
+    if _ONLY_NUMBERS.fullmatch(text):
+        return MajorStatement(line, column, "", _arguments(text), text)
+    head = _WORD.match(text)
     if head is None:
-        raise Place(name, line, column).fail(
+        hint = "definitions and computations need APT's processor: give the file that it or the CAM system writes"
+        raise place.fail(
             f"{text[:40]!r} is not a statement of a cutter-location file",
             "a word, or a word and / and its arguments",
-            "definitions and computations need APT's processor: give the file that it or the CAM system writes"
-            if "=" in joined
-            else "",
+            hint if "=" in text else "",
         )
     word = re.sub(r"\s*,\s*", ",", re.sub(r"\s+", " ", head[1].strip().upper()))
     if head[2]:
-        return MajorStatement(line, column, word, _arguments(joined, head.end(), place))
+        return MajorStatement(line, column, word, _arguments(text[head.end() :]))
     # Without a slash, words after a comma are arguments: CHANNEL,1 or MULTAX,ON.
     word, _, rest = word.partition(",")
-    return MajorStatement(line, column, word, (MinorWord(rest, line, column),) if rest else ())
+    return MajorStatement(line, column, word, (rest,) if rest else ())
 
 
-def _arguments(joined: str, begin: int, place: Callable[[int], tuple[int, int]]) -> tuple[MinorWord, ...]:
-    """The texts between the commas outside parentheses, from `begin` on."""
-    if not joined[begin:].strip():
-        return ()
-    arguments, depth, start = [], 0, begin
-    for index, character in enumerate(joined[begin:] + ",", begin):
+def _arguments(text: str) -> tuple[str, ...]:
+    """The texts between the commas outside parentheses."""
+    arguments, depth = [""], 0
+    for character in text:
         depth += (character == "(") - (character == ")")
-        if character == "," and (depth <= 0 or index == len(joined)):
-            text = joined[start:index]
-            lead = len(text) - len(text.lstrip())
-            arguments.append(MinorWord(text.strip(), *place(min(start + lead, len(joined) - 1))))
-            start = index + 1
-    return tuple(arguments)
+        if character == "," and depth <= 0:
+            arguments.append("")
+        else:
+            arguments[-1] += character
+    return tuple(argument.strip() for argument in arguments) if text.strip() else ()

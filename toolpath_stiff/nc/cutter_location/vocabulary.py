@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from toolpath_stiff.nc.cutter_location import cycles, modes, motion
 from toolpath_stiff.nc.cutter_location.modes import FRAMES, HEADING, TOOL
@@ -19,7 +18,7 @@ from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_numb
 READ, LISTED, DOUBTFUL, REFUSED = "read", "listed", "listed, with a warning", "refused"
 # Who writes it.
 ALL, CREO, NX, CATIA, AUTODESK, CAMPLETE = "all", "Creo", "NX", "CATIA", "Autodesk", "Autodesk for CAMplete"
-CATIA_CREO, MOST = f"{CATIA}, {CREO}", f"{CATIA}, {CREO}, {AUTODESK}"
+CATIA_CREO, CREO_NX, MOST = f"{CATIA}, {CREO}", f"{CREO}, {NX}, {AUTODESK}", f"{CATIA}, {CREO}, {AUTODESK}"
 # Where it is described.
 ISO, APT = "ISO 4343", "ISO 4342, the APT language"
 PTC, SIEMENS = 'PTC, "Supported CL Data Commands"', 'Siemens NX, "CLSF Manager"'
@@ -30,7 +29,7 @@ LIKE_MOTION = ("GO", "RAP", "FED", "CIR", "ARC", "MOV", "HEL", "CYC", "TLA", "TL
 NUMBERS_OF_A_POINT = 3
 LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
 GEOMETRY = "points, tool axes and feeds alone"
-UNKNOWN = "is not known"
+UNKNOWN, NO_CHANGE = "is not known", "changes nothing"
 Act = Callable[[CutterLocationState, MajorStatement], None]
 
 
@@ -72,70 +71,35 @@ def listed(meaning: str, written_by: str, source: str, names: str, kind: str = L
     return [MajorWord(name, act, meaning, written_by, source, kind=kind) for name in names.split()]
 
 
-class Harmless(NamedTuple):
-    """Statements of a refused word that change nothing: which they are, why, what is expected of the others."""
-
-    holds: Callable[[MajorStatement], bool]
-    reason: str
-    expected: str = GEOMETRY
-
-
-def refused(
-    meaning: str,
-    hint: str,
-    source: str,
-    names: str,
-    form: str = "",
-    harmless: Harmless | None = None,
-) -> list[MajorWord]:
-    """Words that change the path in a way that is not supported."""
+def refused(meaning: str, source: str, names: str, unless: str = "") -> list[MajorWord]:
+    """Words that change the path in a way that is not supported, `unless` the statement is one that changes nothing."""
 
     def act(state: CutterLocationState, statement: MajorStatement) -> None:
-        if harmless is None or not harmless.holds(statement):
-            expected = harmless.expected if harmless else GEOMETRY
-            raise state.fail(f"{statement.shown} {meaning}, which is not supported", expected, hint)
-        state.note(harmless.reason)
+        if not unless or not changes_nothing(statement):
+            hint = "have the CAM system write points and tool axes, of the tool's centre and in one system"
+            raise state.fail(f"{statement.shown} {meaning}, which is not supported", unless or GEOMETRY, hint)
+        state.note(f"{unless} {NO_CHANGE}")
 
+    form = f" other than {unless}" if unless else ""
     return [MajorWord(name, act, meaning, "", source, form, REFUSED) for name in names.split()]
 
 
-def no_shift(statement: MajorStatement) -> bool:
-    """True for a statement that shifts by nothing."""
-    return len(statement.words) == 3 and all(is_number(word) and not number(word) for word in statement.words)
+def changes_nothing(statement: MajorStatement) -> bool:
+    """True for OFF, and where all numbers are 0: a shift or a turn by nothing."""
+    numbers = [number(word) for word in statement.words if is_number(word)]
+    return statement.words == ["OFF"] or (bool(numbers) and not any(numbers))
 
 
-def no_turn(statement: MajorStatement) -> bool:
-    """True for a rotary axis that turns by nothing, or goes to 0."""
-    angles = [number(word) for word in statement.words if is_number(word)]
-    return bool(angles) and not any(angles)
-
-
-_POINT_FORM, _SHIFT_FORM, _TURN_FORM = "/x,y,z[,i,j,k]", "/x,y,z other than 0,0,0", "/angle other than 0"
-_CIRCLE, _DIRECTION = "the next motion follows a circle", "direction in which the next circle begins"
-_CYCLE_FORM = "/DRILL, DEEP, BRKCHP or TAP and pairs, or /OFF"
-_PAUSE_FORM = "/seconds or revolutions,REV"
-_COMPENSATION = "cutter compensation"
-_TOOL_CENTRE = "have the CAM system write the path of the tool centre"
+_POINT, _PAUSE = "/x,y,z[,i,j,k]", "/seconds or revolutions,REV"
+_CIRCLE, _SHIFTS = "the next motion follows a circle", "shifts all that follows"
 _TOLERANCE = "a tolerance of the CAM system: the points are taken as they stand"
-_STOP = "a stop: the path goes on"
-_SCREEN = "for the CAM system's screen"
+_SCREEN, _STOP = "for the CAM system's screen", "a stop: the path goes on"
 _OUTPUT = "about the output of the post processor"
 _RETRACT = "a plane to retract to, of which nothing is made without RETRCT"
 _BLOCK = "a block for the control as it stands: what it does is not known"
 _M_CODE, _G_CODE = (f"{kind} of one control: what it does is not known" for kind in ("an M code", "a G code"))
-_WHERE_CUT = "have the CAM system write the points where they are cut"
-_ONE_SYSTEM = "have the CAM system write points and tool axes in one system"
-_TURNS = "turns the work or the head of one machine"
-_REPEATS, _OUT = "repeats or calls a part of the file", "have the CAM system write the points out"
-_DRIVE, _PROCESSOR = "is driven along surfaces", "give the file of points that APT's processor writes"
-_POINT, _POINTS = "have the CAM system write the point", "have the CAM system write points"
-
-
-def cutcom(state: CutterLocationState, statement: MajorStatement) -> None:
-    """Refused unless it is off."""
-    if statement.words != ["OFF"]:
-        raise state.fail(f"{statement.shown} is {_COMPENSATION}, which is not supported", "", _TOOL_CENTRE)
-    state.note("cutter compensation is off")
+_TURNS, _COMPENSATES = "turns the work or the head of one machine", "is cutter compensation"
+_REPEATS, _DRIVE = "repeats or calls a part of the file", "is driven along surfaces: APT's processor writes the points"
 
 
 def table(words: Iterable[MajorWord]) -> dict[str, MajorWord]:
@@ -149,19 +113,17 @@ def table(words: Iterable[MajorWord]) -> dict[str, MajorWord]:
 
 
 _ACTING = (
-    MajorWord("GOTO", motion.goto, "the tool moves to a point", ALL, ISO, _POINT_FORM),
+    MajorWord("GOTO", motion.goto, "the tool moves to a point", ALL, ISO, _POINT),
     MajorWord("", motion.more_points, "further points of the GOTO before it", CREO, PTC, "x,y,z[,i,j,k]"),
-    MajorWord("GODLTA", motion.godlta, "the tool moves by a distance", "", ISO, _POINT_FORM),
-    MajorWord("FROM", motion.from_, "the tool stands at a point", ALL, ISO, _POINT_FORM),
+    MajorWord("GODLTA", motion.godlta, "the tool moves by a distance", "", ISO, _POINT),
+    MajorWord("FROM", motion.from_, "the tool stands at a point", ALL, ISO, _POINT),
     MajorWord("RAPID", motion.rapid, "the next motion is rapid", ALL, ISO),
     MajorWord("GOHOME", motion.gohome, motion.HOME, NX, SIEMENS, " without a point", DOUBTFUL),
-    MajorWord(
-        "CIRCLE", motion.circle, _CIRCLE, f"{CREO}, {NX}, {AUTODESK}", f"{PTC}; {SIEMENS}", "/x,y,z,i,j,k[,r[,t,f,d,e]]"
-    ),
+    MajorWord("CIRCLE", motion.circle, _CIRCLE, CREO_NX, f"{PTC}; {SIEMENS}", "/x,y,z,i,j,k[,r[,t,f,d,e]]"),
     MajorWord("MOVARC", motion.movarc, _CIRCLE, AUTODESK, ISO, "/x,y,z,i,j,k,r,ANGLE,a"),
-    MajorWord("INDIRV", motion.indirv, _DIRECTION, CATIA_CREO, APT, "/i,j,k"),
+    MajorWord("INDIRV", motion.indirv, "direction in which the next circle begins", CATIA_CREO, APT, "/i,j,k"),
     MajorWord("TLON,GOFWD", motion.tlon, "the tool moves along a circle", CATIA_CREO, DASSAULT, "/(...),ON,(...)"),
-    MajorWord("CYCLE", cycles.cycle, "drilling cycle", ALL, PTC, _CYCLE_FORM),
+    MajorWord("CYCLE", cycles.cycle, "drilling cycle", ALL, PTC, "/DRILL, DEEP, BRKCHP or TAP and pairs, or /OFF"),
     MajorWord("FEDRAT", modes.fedrat, "feed", ALL, ISO, "/number[,unit] or unit,number"),
     MajorWord("SPINDL", modes.spindl, "spindle speed", ALL, ISO),
     MajorWord("UNITS", modes.units, "length unit", f"{CREO}, {AUTODESK}", ISO, "/MM or INCHES"),
@@ -172,27 +134,24 @@ _ACTING = (
     MajorWord("LOAD", modes.loadtl, "tool change", NX, SIEMENS, "/TOOL,n"),
     MajorWord("CUTTER", modes.cutter, "tool diameter", MOST, ISO, "/d"),
     MajorWord("TLDATA", modes.cutter, "tool diameter", NX, SIEMENS, "/kind,d"),
-    MajorWord("DELAY", modes.delay, "pause", ALL, ISO, _PAUSE_FORM),
-    MajorWord("DWELL", modes.delay, "pause", "", ISO, _PAUSE_FORM),
+    MajorWord("DELAY", modes.delay, "pause", ALL, ISO, _PAUSE),
+    MajorWord("DWELL", modes.delay, "pause", "", ISO, _PAUSE),
     MajorWord("MODE", modes.mode, "milling; turning is read alike", AUTODESK, POSTS, "/MILL or TURN"),
-    MajorWord("CUTCOM", cutcom, _COMPENSATION, CATIA_CREO, ISO, "/OFF"),
     MajorWord("FINI", modes.fini, "end of the file", MOST, ISO),
     MajorWord("TOOL PATH", modes.heading, HEADING, NX, SIEMENS, "/name,TOOL,tool", LISTED),
     MajorWord("CSI_TOOL_PATH", modes.heading, HEADING, CAMPLETE, POSTS, "/name", LISTED),
-    MajorWord("TOOLNO", modes.toolno, TOOL, CATIA, ISO, kind=LISTED),
     MajorWord("MSYS", modes.frame_word, FRAMES["MSYS"], NX, SIEMENS, kind=LISTED),
     MajorWord("MCS", modes.frame_word, FRAMES["MCS"], AUTODESK, POSTS, kind=LISTED),
     MajorWord("CSYS", modes.frame_word, FRAMES["CSYS"], "", VERICUT, kind=LISTED),
     MajorWord("ZERO", modes.frame_word, FRAMES["ZERO"], AUTODESK, POSTS, kind=LISTED),
 )
-_SHIFT = Harmless(no_shift, "a shift of zero", "0,0,0")
-_TURN = Harmless(no_turn, "a rotary axis that stays at 0")
 WORDS = table(
     (
         *_ACTING,
-        *refused("shifts all that follows", _WHERE_CUT, ISO, "TRANS ORIGIN", _SHIFT_FORM, _SHIFT),
-        *refused(_TURNS, _ONE_SYSTEM, ISO, "ROTABL ROTHED", _TURN_FORM, _TURN),
-        *refused(_TURNS, _ONE_SYSTEM, MANUALS, "ROTATE TABLE INDEX TILT", _TURN_FORM, _TURN),
+        *refused(_COMPENSATES, ISO, "CUTCOM", unless="OFF"),
+        *refused(_SHIFTS, ISO, "TRANS ORIGIN", unless="0,0,0"),
+        *refused(_TURNS, ISO, "ROTABL ROTHED", unless="0"),
+        *refused(_TURNS, MANUALS, "ROTATE TABLE INDEX TILT", unless="0"),
         *listed(HEADING, ALL, ISO, "PARTNO PPRINT REMARK LETTER"),
         *listed(HEADING, "", APT, "TITLES TITLE"),
         *listed(HEADING, CATIA, DASSAULT, "TPRINT"),
@@ -219,20 +178,20 @@ WORDS = table(
         *listed(_BLOCK, "", ISO, "INSERT", DOUBTFUL),
         *listed(_BLOCK, CAMPLETE, POSTS, "CSI_INSERT_CUSTOM_GCODE", DOUBTFUL),
         *listed("statements that the operator may leave out: they are read", "", ISO, "OPSKIP", DOUBTFUL),
-        *refused("changes where all that follows lies", _WHERE_CUT, APT, "TRACUT MIRROR SCALE"),
-        *refused(_TURNS, _ONE_SYSTEM, ISO, "PIVOTZ"),
-        *refused(_REPEATS, _OUT, APT, "COPY CALL CALSUB DEFSUB ENDSUB MACRO TERMAC LOOPST JUMPTO"),
-        *refused(_REPEATS, _OUT, MANUALS, "CALLSUB"),
-        *refused(_DRIVE, _PROCESSOR, APT, "TLLFT TLRGT TLON TLONPS TLOFPS TLNDON"),
-        *refused(_DRIVE, _PROCESSOR, APT, "GO GOFWD GOBACK GOLFT GORGT GOUP GODOWN OFFSET POCKET SCURV"),
-        *refused(f"is {_COMPENSATION}", _TOOL_CENTRE, MANUALS, "TLCOMP"),
-        *refused("feeds the tool to where a post processor knows", _POINT, MANUALS, "PLUNGE"),
-        *refused("retracts the tool to a plane of the post processor's", _POINT, ISO, "RETRCT"),
-        *refused("cuts a thread", "leave threading out", ISO, "THREAD"),
-        *refused("is an arc of one post processor", "have the CAM system write CIRCLE/ or points", VERICUT, "ARC"),
-        *refused("is a NURBS curve", _POINTS, SIEMENS, "NURBS"),
-        *refused("is a spline", _POINTS, MANUALS, "SPLINE"),
-        *refused("is a polynomial", _POINTS, MANUALS, "POLYNO"),
+        *listed(TOOL, CATIA, ISO, "TOOLNO"),
+        *refused(_SHIFTS, APT, "TRACUT MIRROR SCALE"),
+        *refused(_TURNS, ISO, "PIVOTZ"),
+        *refused(_REPEATS, APT, "COPY CALL CALSUB DEFSUB ENDSUB MACRO TERMAC LOOPST JUMPTO"),
+        *refused(_REPEATS, MANUALS, "CALLSUB"),
+        *refused(_DRIVE, APT, "TLLFT TLRGT TLON TLONPS TLOFPS TLNDON"),
+        *refused(_DRIVE, APT, "GO GOFWD GOBACK GOLFT GORGT GOUP GODOWN OFFSET POCKET SCURV"),
+        *refused(_COMPENSATES, MANUALS, "TLCOMP"),
+        *refused("feeds the tool to where a post processor knows", MANUALS, "PLUNGE"),
+        *refused("retracts the tool to a plane of the post processor's", ISO, "RETRCT"),
+        *refused("cuts a thread", ISO, "THREAD"),
+        *refused("is an arc of one post processor", VERICUT, "ARC"),
+        *refused("is a NURBS curve", SIEMENS, "NURBS"),
+        *refused("is a spline or a polynomial", MANUALS, "SPLINE POLYNO"),
     )
 )
 

@@ -21,7 +21,7 @@ from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line
-from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Jump, Recorder
+from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Jump, Move, Recorder
 from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, tool_table_hint
 from toolpath_stiff.nc.words import AXES
@@ -291,8 +291,8 @@ class Follower:
         end = [value - zero for value, zero in zip(end, shift, strict=True)]
         feed = math.nan if motion == RAPID else self._feed_of(start, end, arc is not None)
         flags = self._machine_flags(start, end)
-        added = self.recorder.add(self.line, motion, start, end, feed, self.tool, self.tool_length, flags, centred)
-        if added and self.tool not in self.used_tools:
+        move = Move(self.line, motion, start, end, feed, self.tool, self.tool_length, flags, centred)
+        if self.recorder.add(move) and self.tool not in self.used_tools:
             self.used_tools.append(self.tool)
 
     def _arc(self, start: Vector, end: Vector, c1: float, c2: float, turns: float) -> Arc:

@@ -16,7 +16,7 @@ def front(placed: Placement) -> Figure:
     """Range against mean, coloured by the weakest place: the front, the chosen placement, the present one."""
     best, before = placed.chosen, placed.present
     note = f"machine {machine_text(placed.machine_stated)}   ·   load {placed.best.load}"
-    note += f"   ·   objective {placed.objective}"
+    note += f"   ·   objective {placed.task.rules.objective}"
     figure = new_figure(9.0, 6.2, f"Placements of {plain(placed.best.program.name)}", note, 1.08)
     axes = panel(figure, 1.08, 0.74, 6.3, 4.28)
     mean, spread, weakest = ([getattr(row, key) for row in placed.front] for key in FIGURES.values())

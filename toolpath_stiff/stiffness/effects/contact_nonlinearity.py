@@ -9,6 +9,8 @@ from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, complian
 
 REFERENCE_FORCE = 500.0  # N, force in the strut at which the compliance is given
 IDLE = 1e-3  # N: below, a strut adds nothing to the tip that could be measured, and the power law would diverge
+SOURCE = "Hertz: 7.5 nm/N a joint at 500 N for steel, ball in socket of effective radius 0.2 m (assumed)"
+MEANING = "secant compliance of one strut's contacts together, at 500 N in the strut"
 
 
 class ContactNonlinearity(Effect):
@@ -25,19 +27,11 @@ class ContactNonlinearity(Effect):
     source = "Hertz (1882), point contact: approach grows as F^(2/3)"
     load_dependent = True
     needs = ("force_N",)
-    told = (
+    clause = (
         "the contacts in the joints of a strut give way by about {compliance} nm/N at "
         f"{REFERENCE_FORCE:g} N, less under more load"
     )
-    parameters = (
-        compliance(
-            "compliance",
-            largest=200.0,
-            typical=(3.0, 20.0),
-            source="Hertz: 7.5 nm/N a joint at 500 N for steel, ball in socket of effective radius 0.2 m (assumed)",
-            meaning="secant compliance of one strut's contacts together, at 500 N in the strut",
-        ),
-    )
+    parameters = (compliance("compliance", 200.0, (3.0, 20.0), SOURCE, MEANING),)
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Secant compliance of the contacts under the present strut forces."""

@@ -11,6 +11,10 @@ from toolpath_stiff.stiffness.sizes import about
 
 ALONG = 0.999  # |d_axis| from which a reading counts as taken along that axis: 2.6 degrees, no one aligns better
 WHICH = "1, 2, 3: readings along X, Y, Z; 0: every direction"
+SOURCE = (
+    "load cells: 0.02 to 0.1 % of full scale (senstech.co.kr, terms); a wrong range or lever: "
+    "engineering experience, no source"
+)
 
 
 class GaugeScale(Effect):
@@ -27,16 +31,7 @@ class GaugeScale(Effect):
     parameters = (
         choice("direction", (0, 3), "direction of the measurements", WHICH, typical=(1, 3)),
         setup_parameter('name of the set-up; "": every one'),
-        Parameter(
-            name="scale",
-            unit="%",
-            si=0.01,
-            bounds=(-20.0, 20.0),
-            typical=(-5.0, 5.0),
-            source="load cells: 0.02 to 0.1 % of full scale (senstech.co.kr, terms); a wrong range or lever: "
-            "engineering experience, no source",
-            meaning="how much too high the readings are",
-        ),
+        Parameter("scale", "%", 0.01, (-20.0, 20.0), (-5.0, 5.0), SOURCE, meaning="how much too high the readings are"),
     )
 
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:

@@ -9,6 +9,8 @@ from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Value
 
 # N: a strut under less is idle. It would add less than g times this over F^2 to the tip's compliance, some 1e-14 m/N.
 IDLE = 1e-3
+EXPERIENCE = "engineering experience, no source"
+MEANING = "motion of one strut to one side before it carries: half its total play"
 
 
 class JointClearance(Effect):
@@ -25,18 +27,8 @@ class JointClearance(Effect):
     source = "secant through a gap, taken up in full by any load"
     load_dependent = True
     needs = ("force_N",)
-    told = "every strut moves about {lost_motion} um to each side before it carries its load"
-    parameters = (
-        Parameter(
-            name="lost_motion",
-            unit="um",
-            si=1e-6,
-            bounds=(0.0, 200.0),
-            typical=(1.0, 10.0),
-            source="engineering experience, no source",
-            meaning="motion of one strut to one side before it carries: half its total play",
-        ),
-    )
+    clause = "every strut moves about {lost_motion} um to each side before it carries its load"
+    parameters = (Parameter("lost_motion", "um", 1e-6, (0.0, 200.0), (1.0, 10.0), EXPERIENCE, meaning=MEANING),)
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Secant compliance of the gaps under the present strut forces."""

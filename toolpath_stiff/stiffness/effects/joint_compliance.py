@@ -7,6 +7,12 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance
 
+SOURCE = (
+    "two joints in series: 94 N/um each for a flexure joint (T. Dehaeze, test bench of flexible joints, "
+    "by finite elements), over 100 N/um for a kinematic coupling (Schouten, Rosielle, Schellekens 1997); "
+    "lower end: engineering experience, no source"
+)
+
 
 class JointCompliance(Effect):
     """The same constant compliance in series with each strut.
@@ -19,17 +25,9 @@ class JointCompliance(Effect):
     link = "joints"
     equation = "c_i += c_j"
     source = "springs in series"
-    told = "joints and nut of every strut give way by about {compliance} nm/N"
+    clause = "joints and nut of every strut give way by about {compliance} nm/N"
     parameters = (
-        compliance(
-            "compliance",
-            largest=200.0,
-            typical=(3.0, 20.0),
-            source="two joints in series: 94 N/um each for a flexure joint (T. Dehaeze, test bench of flexible joints, "
-            "by finite elements), over 100 N/um for a kinematic coupling (Schouten, Rosielle, Schellekens 1997); "
-            "lower end: engineering experience, no source",
-            meaning="both joints, nut and bearings of one strut together",
-        ),
+        compliance("compliance", 200.0, (3.0, 20.0), SOURCE, "both joints, nut and bearings of one strut together"),
     )
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:

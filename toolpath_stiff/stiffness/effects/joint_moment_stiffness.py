@@ -8,6 +8,12 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
 from toolpath_stiff.stiffness.sizes import about
 
+SOURCE = (
+    "5 N m/rad for a flexure joint (T. Dehaeze, test bench of flexible joints); 4 E I / L for locked "
+    "joints: 0.84e5, 1.75e5, 5.5e5 for steel of 50, 60, 80 mm diameter, 3 m long"
+)
+MEANING = "rotational stiffness at each end of each strut"
+
 
 class JointMomentStiffness(Effect):
     """Rotational springs kappa at both ends of every strut, which stays straight.
@@ -26,18 +32,7 @@ class JointMomentStiffness(Effect):
     link = "joints"
     equation = "K += kappa sum_i (B_fi^T B_fi + B_pi^T B_pi), B: rotations of strut i against frame and platform"
     source = "derived here from rotational springs at the ends of straight struts"
-    parameters = (
-        Parameter(
-            name="stiffness",
-            unit="N m/rad",
-            si=1.0,
-            bounds=(0.0, 2e6),
-            typical=(5.0, 5.5e5),
-            source="5 N m/rad for a flexure joint (T. Dehaeze, test bench of flexible joints); 4 E I / L for locked "
-            "joints: 0.84e5, 1.75e5, 5.5e5 for steel of 50, 60, 80 mm diameter, 3 m long",
-            meaning="rotational stiffness at each end of each strut",
-        ),
-    )
+    parameters = (Parameter("stiffness", "N m/rad", 1.0, (0.0, 2e6), (5.0, 5.5e5), SOURCE, meaning=MEANING),)
 
     def parallel_stiffness(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Stiffness of all twelve rotational springs about the tip."""

@@ -10,6 +10,8 @@ from toolpath_stiff.stiffness.sizes import about
 from toolpath_stiff.stiffness.truss import free_platform_flexibility
 from toolpath_stiff.units import n_per_um_from_n_per_m
 
+SOURCE = "Clinton, Zhang, Wavering (1997), Figure 3: above 1e10 N/m the bars are rigid"
+
 
 class PlatformFlexibility(Effect):
     """Bars of equal stiffness k_p between joints, hub and tip."""
@@ -21,14 +23,7 @@ class PlatformFlexibility(Effect):
     source = "Clinton, Zhang, Wavering (1997), Figures 2b and 3"
     parameters = (
         Parameter(
-            name="bar_stiffness",
-            unit="N/m",
-            si=1.0,
-            bounds=(1e8, np.inf),
-            typical=(3e8, 1e10),
-            source="Clinton, Zhang, Wavering (1997), Figure 3: above 1e10 N/m the bars are rigid",
-            neutral=np.inf,
-            meaning="stiffness of each platform bar",
+            "bar_stiffness", "N/m", 1.0, (1e8, np.inf), (3e8, 1e10), SOURCE, np.inf, "stiffness of each platform bar"
         ),
     )
 

@@ -7,6 +7,8 @@ import numpy as np
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, Values, length_error
 
+EXPERIENCE = "engineering experience, no source"
+
 
 class PlatformRadiusError(Effect):
     """Every platform joint is moved outwards from the tool axis, unknown to the control.
@@ -21,14 +23,8 @@ class PlatformRadiusError(Effect):
     equation = "P_i += e (P_ix, P_iy, 0) / |(P_ix, P_iy)|"
     source = "geometry"
     unknown_to_control = True
-    told = "the platform's joints stand about {error} mm further {error:out/in} than in the machine file"
-    parameters = (
-        length_error(
-            typical=(-3.0, 3.0),
-            source="engineering experience, no source",
-            meaning="true radius less that of the machine file",
-        ),
-    )
+    clause = "the platform's joints stand about {error} mm further {error:out/in} than in the machine file"
+    parameters = (length_error((-3.0, 3.0), EXPERIENCE, "true radius less that of the machine file"),)
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Joints on the wider circle; one on the tool axis has no outward direction and stays."""

@@ -8,6 +8,12 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, at_the_tip, compliance
 from toolpath_stiff.stiffness.sizes import sizes_in_words
 
+RADIAL = (
+    "FAG spindle bearing catalogue, pairs 7014 to 7020: 0.4 to 1.8 nm/N at the bearings; M. Tsutsumi in "
+    "Modular Design for Machine Tools, p. 446: 25 to 100 nm/N for a 45 x 160 mm arm in HSK-A63 or ISO 40"
+)
+AXIAL = "FAG spindle bearing catalogue, pairs 7014 to 7020, medium preload: 127 to 387 N/um"
+
 
 class SpindleCompliance(Effect):
     """A spring of radial and axial compliance at the tip, in platform axes.
@@ -22,21 +28,8 @@ class SpindleCompliance(Effect):
     equation = "c += (R^T d)^T diag(c_r, c_r, c_a) (R^T d)"
     source = "springs in series; the load's components in platform axes"
     parameters = (
-        compliance(
-            "radial",
-            largest=1000.0,
-            typical=(1.0, 30.0),
-            source="FAG spindle bearing catalogue, pairs 7014 to 7020: 0.4 to 1.8 nm/N at the bearings; M. Tsutsumi in "
-            "Modular Design for Machine Tools, p. 446: 25 to 100 nm/N for a 45 x 160 mm arm in HSK-A63 or ISO 40",
-            meaning="compliance across the tool axis",
-        ),
-        compliance(
-            "axial",
-            largest=1000.0,
-            typical=(2.6, 7.9),
-            source="FAG spindle bearing catalogue, pairs 7014 to 7020, medium preload: 127 to 387 N/um",
-            meaning="compliance along the tool axis",
-        ),
+        compliance("radial", 1000.0, (1.0, 30.0), RADIAL, "compliance across the tool axis"),
+        compliance("axial", 1000.0, (2.6, 7.9), AXIAL, "compliance along the tool axis"),
     )
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:

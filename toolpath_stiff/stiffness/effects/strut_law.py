@@ -7,6 +7,9 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
 
+SOURCE = "-3.1 % if compliance instead of stiffness is linear between the paper's 46.5 and 32.5 N/um"
+MEANING = "how much stiffer a strut is midway between L_1 and L_2 than on the straight line"
+
 
 class StrutLawCurvature(Effect):
     """A curved deviation from the machine's linear law, none at its two lengths L_1 and L_2.
@@ -19,21 +22,11 @@ class StrutLawCurvature(Effect):
     link = "struts"
     equation = "k(L) = k_linear(L) exp(q (1 - x^2)), x = (2 L - L_1 - L_2) / (L_2 - L_1)"
     source = "lowest-order deviation from the paper's equation 5 that leaves both its constants as they are"
-    told = (
+    clause = (
         "midway between the strut law's two lengths struts are about {curvature} % {curvature:stiffer/softer} than on "
         "its straight line"
     )
-    parameters = (
-        Parameter(
-            name="curvature",
-            unit="%",
-            si=0.01,
-            bounds=(-40.0, 40.0),
-            typical=(-4.0, 4.0),
-            source="-3.1 % if compliance instead of stiffness is linear between the paper's 46.5 and 32.5 N/um",
-            meaning="how much stiffer a strut is midway between L_1 and L_2 than on the straight line",
-        ),
-    )
+    parameters = (Parameter("curvature", "%", 0.01, (-40.0, 40.0), (-4.0, 4.0), SOURCE, meaning=MEANING),)
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Difference of the compliances with and without curvature.

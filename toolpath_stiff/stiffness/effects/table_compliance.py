@@ -9,6 +9,7 @@ from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Value
 from toolpath_stiff.stiffness.sizes import sizes_in_words
 
 EXPERIENCE = "engineering experience, no source: machine beds are built for 100 to 500 N/um"
+LEVER = EXPERIENCE + " at a lever of about 1 m"
 
 
 class TableCompliance(Effect):
@@ -29,13 +30,7 @@ class TableCompliance(Effect):
             for axis in "xyz"
         ),
         Parameter(
-            name="rocking",
-            unit="nrad/N/m",
-            si=1e-9,
-            bounds=(0.0, 500.0),
-            typical=(0.5, 10.0),
-            source=EXPERIENCE + " at a lever of about 1 m",
-            meaning="rotation about X and Y per moment",
+            "rocking", "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), LEVER, meaning="rotation about X and Y per moment"
         ),
     )
 

@@ -7,6 +7,8 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
 
+SOURCE = "engineering experience, no source: a steel strut of 3 m grows 35 um/K, rooms change by 1 K/h"
+
 
 class ThermalDrift(Effect):
     """A displacement that grows with the time since the indicator was zeroed is read as deflection."""
@@ -17,16 +19,10 @@ class ThermalDrift(Effect):
     equation = "F / k_read = F / k + rate time"
     source = "growth of the loop between work and tip at a constant rate"
     needs = ("time_min",)
-    told = "the indicator drifts by about {rate} um/min towards {rate:larger/smaller} deflection while it is read"
+    clause = "the indicator drifts by about {rate} um/min towards {rate:larger/smaller} deflection while it is read"
     parameters = (
         Parameter(
-            name="rate",
-            unit="um/min",
-            si=1e-6 / 60.0,
-            bounds=(-20.0, 20.0),
-            typical=(-1.0, 1.0),
-            source="engineering experience, no source: a steel strut of 3 m grows 35 um/K, rooms change by 1 K/h",
-            meaning="drift towards larger deflection",
+            "rate", "um/min", 1e-6 / 60.0, (-20.0, 20.0), (-1.0, 1.0), SOURCE, meaning="drift towards larger deflection"
         ),
     )
 

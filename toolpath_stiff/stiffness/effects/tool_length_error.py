@@ -7,6 +7,8 @@ import numpy as np
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.contract import Effect, Values, length_error
 
+EXPERIENCE = "engineering experience, no source: the tool of the neighbouring pocket"
+
 
 class ToolLengthError(Effect):
     """The platform stands where the control puts it; the true tip, where the load acts, lies further along the tool."""
@@ -17,14 +19,8 @@ class ToolLengthError(Effect):
     equation = "r_i += R (0, 0, e), tip -= R (0, 0, e): the struts stay, their arms about the tip grow"
     source = "geometry"
     unknown_to_control = True
-    told = "the tool is about {error} mm {error:longer/shorter} than the length that was entered"
-    parameters = (
-        length_error(
-            typical=(-10.0, 10.0),
-            source="engineering experience, no source: the tool of the neighbouring pocket",
-            meaning="true tool length less the entered one",
-        ),
-    )
+    clause = "the tool is about {error} mm {error:longer/shorter} than the length that was entered"
+    parameters = (length_error((-10.0, 10.0), EXPERIENCE, "true tool length less the entered one"),)
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Platform joints further above the tip."""

@@ -8,6 +8,9 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, choice
 from toolpath_stiff.stiffness.sizes import about
 
+EXPERIENCE = "engineering experience, no source"
+MEANING = "stiffness of this strut over that of the others"
+
 
 class WeakStrut(Effect):
     """The stiffness of one strut, after the machine's strut law, is multiplied by a factor."""
@@ -19,16 +22,7 @@ class WeakStrut(Effect):
     source = "worn nut, lost preload"
     parameters = (
         choice("strut", (1, 6), "number of the strut", "which strut", neutral=1),
-        Parameter(
-            name="factor",
-            unit="",
-            si=1.0,
-            bounds=(0.3, 1.0),
-            typical=(0.4, 0.9),
-            source="engineering experience, no source",
-            neutral=1.0,
-            meaning="stiffness of this strut over that of the others",
-        ),
+        Parameter("factor", "", 1.0, (0.3, 1.0), (0.4, 0.9), EXPERIENCE, 1.0, MEANING),
     )
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:

@@ -1,4 +1,4 @@
-"""Effects that readings neither show nor exclude beside an explanation."""
+"""Sizes of effects that stay hidden: too small for these readings to show, or not excluded beside an explanation."""
 
 from __future__ import annotations
 
@@ -14,6 +14,67 @@ from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.inference.least_squares import bounded_step
 from toolpath_stiff.inference.size_priors import LIKELY, log_expected, log_usual
 from toolpath_stiff.stiffness.contract import Effect, Parameter
+
+POWER_80 = 0.8416  # normal quantile of 80 % power
+
+
+TIED = 1e-9  # share by which changes differ that are one and the same: of a factor and of its inverse
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """Smallest size of one parameter that these data would have shown.
+
+    Attributes
+    ----------
+    effect, parameter
+        Which.
+    value
+        SI value of the parameter at that size; nan if no size shows.
+    rms
+        Rms change of ln stiffness that it makes; the largest possible one if no size shows.
+    seen
+        Whether any size within the bounds would have been seen.
+    """
+
+    effect: str
+    parameter: Parameter
+    value: float
+    rms: float
+    seen: bool
+
+
+def detectable_sizes(problem: Problem, families: Sequence[Family], gain_threshold: float) -> list[Detectable]:
+    """Per parameter, the size seen with 80 % power at the threshold that the best of all candidates must pass.
+
+    Of an effect with choices the choice that is hardest to see counts. Only the parameter itself differs from neutral.
+    """
+    wanted = float(np.sqrt(gain_threshold)) + POWER_80
+    detectable = []
+    for family in sorted(families, key=lambda family: family.name):
+        for j in range(len(family.tables[0].candidate.components)):
+            worst: Detectable | None = None
+            for table in family.tables:
+                for sign in problem.prior(table, j).log_sizes:
+                    smallest = _smallest(problem, table, j, sign, wanted)
+                    # Hardest to see: not at all, else by the largest change; of two alike the first.
+                    if worst is None or (
+                        smallest.rms > (1.0 + TIED) * worst.rms if smallest.seen == worst.seen else not smallest.seen
+                    ):
+                        worst = smallest
+            detectable += [worst] if worst else []
+    return detectable
+
+
+def _smallest(problem: Problem, table: CandidateTable, j: int, sign: float, wanted: float) -> Detectable:
+    name, component, prior = table.candidate.name, table.candidate.components[j], problem.prior(table, j)
+    logs, rms, lengths = prior.log_sizes[sign], prior.rms[sign], np.maximum.accumulate(prior.lengths[sign])
+    if lengths[-1] < wanted:
+        return Detectable(name, component.parameter, float("nan"), float(rms[-1]), seen=False)
+    log_size = float(np.interp(wanted, lengths, logs))
+    change = float(np.interp(log_size, logs, rms))
+    return Detectable(name, component.parameter, component.value(sign * float(np.exp(log_size))), change, seen=True)
+
 
 # Rms change of ln stiffness from which an effect matters; assumed: at 5 % of its stiffness the tip's deflection is off
 # by less than the 10 % to which a cutting force is known.
@@ -35,8 +96,6 @@ class Unexcluded:
         SI value of the parameter up to which the readings do not exclude it (95 %), its other parameters neutral.
     rms
         Rms change of the tip's ln stiffness that it makes there, on its own.
-    left
-        Rms of what strut law and explanation cannot take up of that.
     probability
         Of being there beside the explanation, at any size.
     """
@@ -46,7 +105,6 @@ class Unexcluded:
     parameter: Parameter
     value: float
     rms: float
-    left: float
     probability: float = np.nan
 
 
@@ -98,26 +156,24 @@ class _Beside:
         And the mean of the likelihood over the prior of the size, 1 where the readings say nothing.
         """
         component = table.candidate.components[j]
-        least, squares = self._moved(self.fit.residual[None])
-        none, gain, mass = float(squares[0]), 0.0, 0.0
+        none, gain, mass = float(self._squares(self.fit.residual[None])[0]), 0.0, 0.0
         sides = []
         for sizes in self._sizes(table, j):
             every = np.zeros((len(sizes), len(table.candidate.components)))
             every[:, j] = sizes
             whole = self.problem.base_compliance if table.candidate.effect.is_instrument else self.compliance
             change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
-            moves, squares = self._moved(self.fit.residual + change)
-            rest = change - (moves - least[0]) @ self.fit.jacobian.T
-            changes, lefts = (np.sqrt(np.mean(rows[:, self.tip] ** 2, axis=1)) for rows in (change, rest))
-            sides.append((sizes, changes, lefts, squares))
+            squares = self._squares(self.fit.residual + change)
+            changes = np.sqrt(np.mean(change[:, self.tip] ** 2, axis=1))
+            sides.append((sizes, changes, squares))
             # Of the prior, as far as sizes are expected; whether the readings would show them does not matter here.
             weights = np.exp(log_expected(changes) + log_usual(sizes, component.typical()))
             weights *= np.abs(np.gradient(np.log(np.abs(sizes))))
             gain, mass = gain + float(weights @ np.exp(0.5 * (none - squares))), mass + float(weights.sum())
         most = min(none, *(float(squares.min()) for *_, squares in sides)) + LIKELY
-        size, rms, left = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
+        size, rms = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
         candidate, value = table.candidate, component.value(size)
-        return Unexcluded(candidate.effect, candidate, component.parameter, value, rms, left), gain / mass
+        return Unexcluded(candidate.effect, candidate, component.parameter, value, rms), gain / mass
 
     def _sizes(self, table: CandidateTable, j: int) -> Iterator[FloatArray]:
         """Sizes (g,) of each sign, rising."""
@@ -132,27 +188,24 @@ class _Beside:
             ends = np.minimum(np.array([SMALLEST, LARGEST]) / max(scale, 1e-300), component.reach(sign))
             yield sign * np.geomspace(min(ends[0], 0.1 * ends[1]), ends[1], SIZES)
 
-    def _moved(self, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Moves (g, 2 + p) of law and sizes that fit residuals (g, n) best, and the squares (g,) that are left."""
+    def _squares(self, residuals: FloatArray) -> FloatArray:
+        """(g,) squares that are left of residuals (g, n) once law and sizes have moved to fit them best."""
         gradient = residuals @ self.weighted.T + self.pull
         moves = np.linalg.solve(self.information, gradient.T).T
         for k in np.flatnonzero(((moves < self.low) | (moves > self.high)).any(axis=1)).tolist():
             moves[k] = bounded_step(self.information, gradient[k], self.low, self.high)
         squares = self.precision.squares(residuals) - 2.0 * (gradient * moves).sum(axis=1)
-        return moves, squares + ((moves @ self.information) * moves).sum(axis=1)
+        return np.asarray(squares + ((moves @ self.information) * moves).sum(axis=1))
 
 
-def _widest(side: tuple[FloatArray, ...], none: float, most: float) -> tuple[float, float, float]:
-    """Size, rms and what is left at the largest size whose squares are at most `most`; between two by a line.
+def _widest(side: tuple[FloatArray, ...], none: float, most: float) -> tuple[float, float]:
+    """Size and rms at the largest size whose squares are at most `most`; between two by a line.
 
     `side`: the same and the squares of sizes (g,) of one sign; `none`: the squares at size 0.
     """
-    figures = np.concatenate([[[0.0], [0.0], [0.0], [none]], np.array(side)], axis=1)
-    squares = figures[3]
+    sizes, rms, squares = np.concatenate([[[0.0], [0.0], [none]], np.array(side)], axis=1)
     last = int(np.flatnonzero(squares <= most).max(initial=0))
-    share = 0.0
-    if last + 1 < len(squares):
-        share = float(np.clip((most - squares[last]) / (squares[last + 1] - squares[last]), 0.0, 1.0))
-    further = figures[:3, min(last + 1, len(squares) - 1)]
-    size, rms, left = (figures[:3, last] + share * (further - figures[:3, last])).tolist()
-    return size, rms, left
+    after = min(last + 1, len(squares) - 1)
+    share = float(np.clip((most - squares[last]) / (squares[after] - squares[last]), 0.0, 1.0)) if after > last else 0.0
+    size, value = (float(x[last] + share * (x[after] - x[last])) for x in (sizes, rms))
+    return size, value

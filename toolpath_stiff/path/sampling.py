@@ -1,35 +1,26 @@
-"""Moves to sampled poses: arc length, time, tangents, weights; rigid turns of the work; the path as a table.
+"""Moves to sampled poses: arc length, time, tangents, weights.
 
-Samples follow the true path: lines, arcs, helices, spirals; all moves at once. Placing moves of the set-up frame on the
-machine has one rule: points p' = o + Q p with Q = Rz(C) Ry(B) Rx(A); orientations R' = Q R Rz(-C). Path and tool axis
-turn with the work, the vertical platform never yaws. With it the machine's 120-degree symmetry holds exactly.
+Samples follow the true path: lines, arcs, helices, spirals; all moves at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
-from toolpath_stiff.column_files import csv_pieces
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.files import write_atomically
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
-from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves, held_once
-from toolpath_stiff.results import Result
-from toolpath_stiff.rotations import along_tool_axis, roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
-
-if TYPE_CHECKING:
-    import pandas as pd
+from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
+from toolpath_stiff.nc.moves import RAPID, Moves, held_once
+from toolpath_stiff.path.placing import place_orientations
+from toolpath_stiff.rotations import along_tool_axis
+from toolpath_stiff.units import mm_from_m, rad_from_deg
 
 ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
 BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
@@ -111,64 +102,6 @@ class Samples:
         return Samples(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
 
-def place(moves: Moves, origin: ArrayLike) -> Moves:
-    r"""Moves in machine coordinates, positions only.
-
-    `start`, `end`, arc centres and normals are turned; the rotary words stay as programmed, because a control
-    interpolates them as such. `place_orientations` turns the sampled orientations.
-
-    Parameters
-    ----------
-    moves
-        In the set-up frame.
-    origin
-        (6,) x, y, z in m, A, B, C in rad: where program zero sits.
-
-    Examples
-    --------
-    >>> from toolpath_stiff.nc.reader import parse_program
-    >>> moves = parse_program("G21 G90 F600\nG1 X40\nM30\n").moves
-    >>> placed = place(moves, (0.1, 0.0, 0.8, 0.0, 0.0, np.pi / 2))
-    >>> placed.end[:, :3].round(9).tolist()  # m
-    [[0.1, 0.04, 0.8]]
-    """
-    zero = np.asarray(origin, dtype=float)
-    turn = rotation_matrices(zero[3:])
-
-    def placed(pose: FloatArray) -> FloatArray:
-        # Plain addition where nothing turns: a multiplication by the unit matrix would cost the last digit.
-        point = product(pose[:, :3], turn.T) if zero[3:].any() else pose[:, :3]
-        return np.concatenate([point + zero[:3], pose[:, 3:]], axis=1)
-
-    placed_moves = replace(moves, start=placed(moves.start), end=placed(moves.end))
-    if not moves.arc_sweep.any():  # a long program of straight moves need not hold its zeros twice
-        return placed_moves
-    arc = (moves.arc_sweep != 0.0)[:, None]
-    return replace(
-        placed_moves,
-        arc_center=np.where(arc, product(moves.arc_center, turn.T) + zero[:3], 0.0),
-        arc_normal=product(moves.arc_normal, turn.T),
-    )
-
-
-def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
-    """Roll, pitch, yaw (n, 3) rad on the machine of programmed angles (n, 3) rad; unturned ones stay as they are.
-
-    Examples
-    --------
-    >>> tilted = place_orientations(np.radians([[10.0, 0.0, 0.0]]), (0.0, 0.0, 0.8, 0.0, 0.0, np.pi / 2))
-    >>> np.degrees(tilted).round(6).tolist()
-    [[0.0, 10.0, 0.0]]
-    """
-    angles = np.asarray(origin, dtype=float)[3:]
-    if not angles.any():
-        return abc
-    if not angles[:2].any() and not abc.any():
-        return abc  # a vertical platform never yaws
-    turn, back = rotation_matrices(angles), rotation_about_z(-angles[2])
-    return roll_pitch_yaw(product(product(turn, rotation_matrices(abc)), back))
-
-
 def move_durations(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> FloatArray:
     r"""(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s.
 
@@ -212,6 +145,7 @@ def sample_moves(
     Examples
     --------
     >>> from toolpath_stiff.nc.reader import parse_program
+    >>> from toolpath_stiff.path.placing import place
     >>> moves = parse_program("G21 G90 F600\nG2 X20 Y0 I10 J0\nM30\n").moves
     >>> samples = sample_moves(place(moves, (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)), step=0.016)
     >>> (samples.position * 1e3).round(3).tolist()  # mm
@@ -397,103 +331,3 @@ def _durations(moves: Moves, length: FloatArray, turn: FloatArray, rapid_feed: f
     feed = np.where(moves.motion == RAPID, rapid_feed, moves.feed)
     distance = np.where(length > 0.0, length, np.where(moves.motion == RAPID, 0.0, turn))
     return np.asarray(distance / np.where(feed > 0.0, feed, 1.0))
-
-
-# Column -> decimals; None: a whole number or a word. A millionth of a millimetre is finer than any machine and
-# lets sums over a long path keep their digits.
-PATH_COLUMNS: dict[str, int | None] = {
-    **dict.fromkeys(("line", "motion", "tool")),
-    **dict.fromkeys(("s_mm", "t_s", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"), 6),
-    "feed_mm_per_min": 3,
-}
-
-
-def path_columns(samples: Samples, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
-    r"""Column of `PATH_COLUMNS` -> values, for some rows.
-
-    Examples
-    --------
-    >>> from toolpath_stiff.nc.reader import parse_program
-    >>> samples = sample_moves(parse_program("G21 G90 F600\nG1 X40\nM30\n").moves, step=0.02)
-    >>> columns = path_columns(samples)
-    >>> columns["x_mm"].tolist(), columns["motion"].tolist()
-    ([0.0, 20.0, 40.0], ['feed', 'feed', 'feed'])
-    """
-    axes = zip("xyz", mm_from_m(samples.position[rows]).T, strict=True)
-    angles = zip("abc", deg_from_rad(samples.abc[rows]).T, strict=True)
-    return {
-        "line": samples.line[rows],
-        "motion": np.array(MOTION_NAMES)[samples.motion[rows]],
-        "tool": samples.tool[rows],
-        "s_mm": mm_from_m(samples.s[rows]),
-        "t_s": samples.t[rows],
-        **{f"{axis}_mm": column for axis, column in axes},
-        **{f"{axis}_deg": column for axis, column in angles},
-        "feed_mm_per_min": mm_per_min_from_m_per_s(samples.feed[rows]),
-    }
-
-
-@dataclass(frozen=True, repr=False)
-class SampledPath(Result):
-    r"""The sampled path of a program, without a machine.
-
-    Attributes
-    ----------
-    samples
-        Arrays in SI.
-    name, warnings, unsupported
-        The program's; what deserves a look; "line:column: word: reason" of what was not acted upon.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
-    >>> path = tps.sample_path(slot, step_mm=10)
-    >>> path
-    <SampledPath: slot.nc, 9 samples>
-    >>> path.to_dict()["x_mm"][-2:]
-    [30.0, 40.0]
-    >>> b"".join(path.csv()).decode().splitlines()[0][:26]
-    'line,motion,tool,s_mm,t_s,'
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path.save(pathlib.Path(folder, "path.csv")).name
-    'path.csv'
-    """
-
-    command: ClassVar[str] = "path"
-
-    name: str
-    samples: Samples
-    warnings: list[str]
-    unsupported: list[str]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        columns = self.to_frame()
-        return {
-            "program": self.name,
-            "warnings": self.warnings,
-            "unsupported": self.unsupported,
-            **{str(name): columns[name].astype(object).where(columns[name].notna(), None).tolist() for name in columns},
-        }
-
-    def to_frame(self) -> pd.DataFrame:
-        """The samples, one a row."""
-        import pandas as pd
-
-        return pd.DataFrame(path_columns(self.samples))
-
-    def csv(self) -> Iterator[bytes]:
-        """The table as the command writes it, in pieces."""
-        return csv_pieces(partial(path_columns, self.samples), len(self.samples), PATH_COLUMNS)
-
-    def __str__(self) -> str:
-        return b"".join(self.csv()).decode()
-
-    def _short(self) -> str:
-        return f"{self.name}, {len(self.samples)} samples"
-
-    def save(self, file: str | Path) -> Path:
-        """Write the table as CSV, whole or not at all."""
-        return write_atomically(file, self.csv())

@@ -1,0 +1,66 @@
+"""Corners to the next block: `,C` and `,R` behind a feed move cut or round the corner between it and the next one. mm.
+
+Fanuc's operator's manuals, "Optional chamfering and corner R": both moves lie in the plane in force; C counts from the
+corner that is cut off, both ways.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.code import FANUC, HAAS, family
+from toolpath_stiff.nc.moves import ARC, FEED, Arc
+from toolpath_stiff.nc.state import Corner, CurrentBlock, State
+from toolpath_stiff.nc.words import CORNERS
+
+
+def corner(state: State, block: CurrentBlock, code: str) -> None:
+    """`,C` and `,R`: the corner to the next block is cut off or rounded."""
+    word, size, recent = block.values[code], block.take(code) or 0.0, state.recorder.recent
+    if state.dialect.name == "linuxcnc":
+        raise block.fail(word, "is not a word of the dialect linuxcnc", "generic, fanuc or haas")
+    if size <= 0.0:
+        raise block.fail(word, "is the size of a corner", "more than 0")
+    after_feed = recent and recent[-1].line == block.line and recent[-1].motion == FEED
+    if not after_feed or len(block.values.keys() & {*CORNERS}) > 1 or state.feed_mode == "G93":
+        raise block.fail(word, "beside another corner, under G93, or without a feed move", "one corner beside a G1")
+    state.corner = Corner(code, size * state.length_scale, block.line)
+
+
+def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
+    """Shorten the move before this one, and add the corner between them; the tool then stands at its end."""
+    pending, frames, before = state.corner, state.frames, state.recorder.recent[-1]
+    assert pending is not None
+    harmless = {"motion", "distance", *(group for group in block.groups if group.startswith("M "))}
+    if block.groups.keys() - harmless or before.dwell:
+        problem = f"the second move of a corner ({pending.letter}, line {pending.line}) beside other codes"
+        raise block.fail(None, problem, "G1")
+    state.corner = None
+    begin, vertex, end = before.start, frames.to_setup(frames.position), frames.to_setup(target)
+    normal = frames.turn_direction(geometry.normal_of(state.plane))
+    try:
+        if begin[3:] != vertex[3:] or vertex[3:] != end[3:]:
+            raise geometry.ArcError("a corner while the rotary axes turn", "X, Y and Z alone")
+        ends = geometry.corner(begin[:3], vertex[:3], end[:3], normal, pending.size, pending.letter == ",R")
+    except geometry.ArcError as error:
+        raise block.fail(None, f"{error.found} ({pending.letter} of line {pending.line})", error.expected) from None
+    if ends is None:  # the path goes straight on
+        return
+    first, last, center, sweep = ends
+    before.end = [*first, *vertex[3:]]
+    arc = Arc(center, normal, sweep) if pending.letter == ",R" else None
+    bound, motion, beyond = before.from_machine[1], ARC if arc else FEED, [*last, *vertex[3:]]
+    state.recorder.add(
+        replace(before, motion=motion, start=before.end, end=beyond, from_machine=(bound, bound), arc=arc)
+    )
+    frames.position = [p + new - old for p, new, old in zip(frames.position, beyond, vertex, strict=True)]
+
+
+CORNER_CODES = family(
+    {",C": "chamfer to the next block", ",R": "rounding to the next block"},
+    "corner",
+    corner,
+    f"{FANUC}, Optional chamfering and corner R; {HAAS}, G01",
+    ("generic", "fanuc", "haas"),
+)

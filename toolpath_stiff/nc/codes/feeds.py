@@ -1,0 +1,155 @@
+"""F and S, feed and spindle modes (G93 G94 G95, G96 G97), G4, and the feed of a move. mm/min inside."""
+
+from __future__ import annotations
+
+import math
+
+from toolpath_stiff.hints import both_names
+from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes, holds_anyway
+from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
+from toolpath_stiff.nc.frames import Numbers
+from toolpath_stiff.nc.moves import Arc
+from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
+
+SLOWEST = 1e-6  # mm/min, or 1/min: slower is a slip, and its time beyond all numbers
+
+
+def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
+    """G93: F is one over the minutes of the move; G94: per minute; G95: per revolution."""
+    if code != state.feed_mode:
+        state.feed = None  # the old number means something else now
+    state.feed_mode = code
+    if code == "G95":
+        state.turning.setdefault("feed per revolution (G95)", block.line)
+
+
+def feed_word(state: State, block: CurrentBlock, code: str) -> None:
+    """F: the feed from here on; F0 takes it away."""
+    feed, word = block.take("F") or 0.0, block.values["F"]
+    if feed < 0.0 or 0.0 < feed * state.feed_scale < SLOWEST:
+        raise block.fail(word, "is no feed that moves", "F above 0, a nanometre a minute or more")
+    if "." not in word.text and feed and bare_feed_is_open(state):
+        units = "inch" if state.inch else "mm"
+        raise block.fail(
+            word,
+            f"without a decimal point is a feed that depends on the control's parameters ({state.dialect.name})",
+            f"{word.text}. if it is that many {units} per {'revolution' if state.feed_mode == 'G95' else 'minute'}",
+        )
+    state.feed = feed * state.feed_scale or None
+
+
+def bare_feed_is_open(state: State) -> bool:
+    """Whether a control's parameters say what F without a decimal point counts."""
+    if state.feed_mode == "G93":
+        return False
+    per_revolution = state.dialect.increments and state.feed_mode == "G95"
+    return per_revolution or ("inch" if state.inch else "mm") in state.dialect.feed_needs_point
+
+
+def speed_word(state: State, block: CurrentBlock, code: str) -> None:
+    """S: the spindle speed, 1/min."""
+    if _dwells_by(state, block) == "S":
+        return
+    state.speed = block.take("S") or 0.0
+    if state.speed < 0.0:
+        raise block.fail("S", "is a negative speed", "S of 0 or more")
+
+
+def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
+    """G96: D is its greatest spindle speed, which does not enter."""
+    block.take("D")
+    state.turning.setdefault("constant surface speed (G96)", block.line)
+
+
+def _dwells_by(state: State, block: CurrentBlock) -> str:
+    """The word that holds the time of a block's G4: P; X on Fanuc's controls, S in Marlin; "" for no such word."""
+    if "G4" not in block.codes:
+        return ""
+    letters = {"linuxcnc": "P", "generic": "PXS"}.get(state.dialect.name, "XP")
+    return next((letter for letter in letters if letter in block.values), "")
+
+
+def dwell(state: State, block: CurrentBlock, code: str) -> None:
+    """G4: a pause, before the block's own moves."""
+    letter = _dwells_by(state, block)
+    seconds = time_word(state, block, letter) if letter else None
+    if not letter and state.dialect.name in ("generic", "fanuc") and "F" not in block.values:  # F: Siemens' seconds
+        state.assume("G4 without a time is no pause: an exact stop (Fanuc), the end of the moves before it (Marlin)")
+        seconds = 0.0
+    if state.dialect.name == GENERIC.name and letter in ("X", "S"):
+        word = block.values[letter]
+        if letter == "X" and ("." not in word.text or any(block.has(axis) for axis in POINT_WORDS)):
+            raise block.fail(
+                word,
+                "beside G4 is not certainly a time: without a point it counts milliseconds on Fanuc's controls",
+                f"{word.text.rstrip('.')}. alone, for seconds",
+                "name the control with --dialect",
+            )
+        state.assume(f"the {letter} of G4 is a time in seconds, as {'Fanuc' if letter == 'X' else 'Marlin'} means it")
+    if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
+        raise block.fail(code, "needs its time", "P with the seconds, 0 or more")
+    state.recorder.add_dwell(seconds)
+
+
+def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
+    """A time word in s; what its number counts is the dialect's."""
+    value = block.take(letter)
+    if value is None or state.dialect.dwell == SECONDS:
+        return value
+    written = block.as_written(letter)
+    if "." not in written.text:
+        return written.value / 1e3
+    if letter == "P" and state.dialect.dwell == MILLISECONDS:
+        raise block.fail(written, f"has a decimal point, which {state.dialect.name} does not allow", "milliseconds")
+    return value
+
+
+def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: list[float], arc: Arc | None) -> float:
+    """Feed of a move in mm/min, or deg/min for one of the rotary axes alone."""
+    if state.feed is None:
+        word = next((word for word in block.block.words if word.letter == "G"), block.block.words[0])
+        if state.feed_mode == "G93":
+            raise block.fail(word, "is a feed move without F under G93", "F above 0")
+        hint = f", or {both_names('--feed', 'MM_PER_MIN')} for such moves" if state.feed_mode == "G94" else ""
+        raise block.fail(word, "is a feed move before any feed", f"F above 0{hint}")
+    if state.feed_mode == "G93":
+        feed, state.feed = state.feed, None  # every move needs its own
+        return feed * length_of_move(start, end, arc)
+    if state.feed_mode == "G95":
+        if state.feed * state.speed < SLOWEST:
+            raise block.fail(None, f"feed per revolution (G95) with the spindle at S{state.speed:g}", "S above 0")
+        return state.feed * state.speed
+    return state.feed if _length(start, end, arc) else rotary_feed(state, state.feed)
+
+
+def rotary_feed(state: State, feed: Numbers) -> Numbers:
+    """G94's feed of the rotary axes alone, deg/min: degrees are degrees in inch programs too."""
+    return feed / (MM_PER_INCH if state.inch else 1.0)
+
+
+def length_of_move(start: list[float], end: list[float], arc: Arc | None) -> float:
+    """Millimetres of a move or, of the rotary axes alone, degrees of the one that turns most."""
+    return _length(start, end, arc) or max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True))
+
+
+def _length(start: list[float], end: list[float], arc: Arc | None) -> float:
+    """Millimetres of a move, an arc's as `courses.move_lengths` has it: so G93's F is one over the move's time."""
+    if arc is None:
+        return math.dist(start[:3], end[:3])
+    climb = sum((e - s) * n for s, e, n in zip(start, end, arc.normal, strict=False))
+    first = math.dist(start[:3], arc.center)
+    last = math.sqrt(max(math.dist(end[:3], arc.center) ** 2 - climb**2, 0.0))
+    return math.hypot(arc.sweep * (first + last) / 2.0, climb, last - first)
+
+
+_FEEDS = {"G93": "inverse-time feed", "G94": "feed per minute", "G95": "feed per revolution"}
+_SPINDLE, _UNUSED = g_codes("G96 G97"), "constant surface speed: the spindle speed does not enter"
+FEED_CODES = (
+    Code("F", "F", feed_word, "feed", "LinuxCNC, Other Codes, F: Set Feed Rate"),
+    Code("S", "S", speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
+    Code("G4", "non-modal", dwell, "dwell", f"{g_codes('G4')}; {FANUC}, Dwell (G04); Marlin, G004", step="dwell"),
+    *family(_FEEDS, "feed mode", feed_mode, g_codes("G93 G94 G95")),
+    Code("G96", "spindle mode", surface_speed, "constant surface speed", _SPINDLE, listed=_UNUSED),
+    Code("G97", "spindle mode", holds_anyway, "spindle speed in revolutions", _SPINDLE),
+)

@@ -1,0 +1,63 @@
+"""Which block runs next: subprogram calls (M97, M98, G65), M99, stops and the end; `program_run` carries them out."""
+
+from __future__ import annotations
+
+from toolpath_stiff.nc.codes.code import FANUC, Code, family, holds_anyway, m_codes
+from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, State
+
+
+def call(state: State, block: CurrentBlock, code: str) -> None:
+    """M98 P L: run a subprogram; M97 P L (Haas), M98 Q L (Fanuc): from that N number. The block's moves first."""
+    word, by_q = block.codes[code], code == "M98" and block.has("Q")
+    if code == "M97" and not state.dialect.local_calls:
+        hint = "give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)"
+        raise block.fail(word, "is Haas' call of a block by its N number", hint=hint)
+    if block.groups.get("non-modal") in ("G4", "G10"):
+        raise block.fail(word, "beside a code that uses the P word too", "two blocks")
+    if by_q:
+        if state.dialect.name != "fanuc" or block.has("P"):
+            raise block.fail(
+                "Q",
+                "beside M98 names the block at which the call begins, as on Fanuc's controls with parameter 6005",
+                "Q alone, with --dialect fanuc",
+                "or make what it calls a subprogram of its own (O, M99)",
+            )
+        state.assume("M98 Q calls the block of that N number, as Fanuc's controls do with parameter 6005 #0")
+    number = block.whole("Q" if by_q else "P", word)
+    if number is None:
+        raise block.fail(word, "without P", "P with the number of what it calls")
+    if state.dialect.name == "linuxcnc" and "L" in block.values and block.values["L"].value == 0:
+        block.take("L")  # LinuxCNC's tests/interp/m98m99: L0 calls nothing
+        return
+    repeats = block.whole("L", word)
+    block.flow = Call(number, repeats, word.column, by_q or code == "M97")
+
+
+def macro_call(state: State, block: CurrentBlock, code: str) -> None:
+    """G65, G66, G67: `parametric` carries them out; what comes here is of a control that has none."""
+    raise block.fail(code, "is a macro call of Fanuc's and Haas' controls", hint="name the control with --dialect")
+
+
+def end_of_subprogram(state: State, block: CurrentBlock, code: str) -> None:
+    """M99: back to the block after the call; with P, to the block of the caller with that N number."""
+    number = block.whole("P", block.codes[code])
+    block.flow = Flow.RETURN if number is None else GoTo(number, block.values["P"].column)
+
+
+def end_of_program(state: State, block: CurrentBlock, code: str) -> None:
+    """M2, M30: nothing runs after this block."""
+    block.flow = Flow.END
+
+
+_CALLS = "LinuxCNC, O Codes, Fanuc-Style Programs; Fanuc, operator's manuals, Subprogram (M98, M99)"
+_MACROS = {"G65": "macro call", "G66": "macro call after moves", "G67": "no such call"}
+_MACRO_SOURCE = f"{FANUC}, Custom macro, Macro call (G65, G66, G67)"
+FLOW_CODES = (
+    *family({"M0": "stop", "M1": "optional stop"}, "M stop", holds_anyway, m_codes("M0 M1")),
+    Code("M60", "M stop", holds_anyway, "stop", m_codes("M60")),
+    *family({"M2": "end", "M30": "end"}, "M stop", end_of_program, m_codes("M2 M30")),
+    Code("M97", "M subprogram", call, "call by line number (Haas)", "Haas, mill operator's manual, M97", ("haas",)),
+    Code("M98", "M subprogram", call, "subprogram call", _CALLS),
+    *family(_MACROS, "non-modal", macro_call, _MACRO_SOURCE, ("generic", "fanuc", "haas")),
+    Code("M99", "M subprogram", end_of_subprogram, "subprogram end", _CALLS),
+)

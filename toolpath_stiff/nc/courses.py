@@ -1,0 +1,105 @@
+"""Courses of moves: lengths, frames of arcs, points and tangents along them. SI units, but where mm are said."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.nc.moves import Arc, Moves
+
+
+def move_lengths(moves: Moves) -> FloatArray:
+    r"""(n,) m, length of the tip's path in each move.
+
+    An arc's is sqrt((r sweep)^2 + climb^2); where start and end radius differ (a control's tolerance, or a spiral)
+    r is their mean, which is exact to second order in the difference.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc.reader import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG1 X30 Y40\nG2 X50 Y40 I10 J0\nM30\n").moves
+    >>> (move_lengths(moves) * 1e3).round(3).tolist()  # mm
+    [50.0, 31.416]
+    """
+    chord = np.linalg.norm(moves.end[:, :3] - moves.start[:, :3], axis=1)
+    arc = moves.arc_sweep != 0.0
+    if arc.any():
+        frame = arc_frame(moves, np.flatnonzero(arc))
+        radius = 0.5 * (frame.radius_start + frame.radius_end)
+        sweep = moves.arc_sweep[arc]
+        chord[arc] = np.sqrt((radius * sweep) ** 2 + frame.climb**2 + (frame.radius_end - frame.radius_start) ** 2)
+    return np.asarray(chord)
+
+
+class ArcFrame:
+    """Plane, radii and climb of some arcs: position(u) = c + r(u) (cos e1 + sin e2) + (lift + u climb) n."""
+
+    def __init__(self, center: FloatArray, normal: FloatArray, start: FloatArray, end: FloatArray) -> None:
+        from_center, to_end = start - center, end - center
+        self.normal, self.center = normal, center
+        lift = np.einsum("ni,ni->n", from_center, normal)
+        self.climb = np.einsum("ni,ni->n", to_end, normal) - lift
+        in_plane = from_center - lift[:, None] * normal
+        self.radius_start = np.linalg.norm(in_plane, axis=1)
+        end_in_plane = to_end - (lift + self.climb)[:, None] * normal
+        self.radius_end = np.linalg.norm(end_in_plane, axis=1)
+        self.e1 = in_plane / self.radius_start[:, None]
+        self.e2 = np.cross(normal, self.e1)
+        self.lift = lift
+
+
+def arc_frame(moves: Moves, rows: IntArray) -> ArcFrame:
+    """The frames of the arcs in `rows` of moves."""
+    return ArcFrame(moves.arc_center[rows], moves.arc_normal[rows], moves.start[rows, :3], moves.end[rows, :3])
+
+
+def frame_of(arc: Arc, start: Sequence[float], end: Sequence[float]) -> ArcFrame:
+    """The frame of a single arc in mm."""
+    return ArcFrame(*(np.array([point[:3]], dtype=float) for point in (arc.center, arc.normal, start, end)))
+
+
+def point_on_arc(arc: Arc, start: Sequence[float], end: Sequence[float], share: float) -> tuple[float, float, float]:
+    """The point at a share of an arc's sweep, as it is sampled; mm."""
+    frame, row = frame_of(arc, start, end), np.zeros(1, dtype=np.int64)
+    x, y, z = _along_arcs(frame, np.array([arc.sweep]), row, np.array([share]))[0][0].tolist()
+    return (x, y, z)
+
+
+def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Positions (n, 3) and unit tangents (n, 3) at shares u of moves; ends are met exactly."""
+    start, end = moves.start[:, :3], moves.end[:, :3]
+    chord = end - start
+    length = np.linalg.norm(chord, axis=1)
+    direction = chord / np.where(length > 0.0, length, 1.0)[:, None]
+    tangent = direction.take(move, axis=0)
+    position = start.take(move, axis=0)  # of most samples in a program of short moves: they are ends
+    last = np.flatnonzero(u == 1.0)
+    position[last] = end[move[last]]
+    inner = np.flatnonzero((u != 0.0) & (u != 1.0))
+    of = move[inner]
+    position[inner] += u[inner, None] * chord[of]
+    arcs = np.flatnonzero(moves.arc_sweep != 0.0)
+    if len(arcs):
+        frame = arc_frame(moves, arcs)
+        which = np.full(len(moves), -1)
+        which[arcs] = np.arange(len(arcs))
+        rows = np.flatnonzero(moves.arc_sweep[move] != 0.0)
+        along, tangent[rows] = _along_arcs(frame, moves.arc_sweep[arcs], which[move[rows]], u[rows])
+        between = (u[rows] != 0.0) & (u[rows] != 1.0)
+        position[rows[between]] = along[between]
+    return position, tangent
+
+
+def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    angle = (u * sweep[arc])[:, None]
+    growth = (frame.radius_end - frame.radius_start)[arc][:, None]
+    radius = frame.radius_start[arc][:, None] + u[:, None] * growth
+    e1, e2, normal = frame.e1[arc], frame.e2[arc], frame.normal[arc]
+    outward = np.cos(angle) * e1 + np.sin(angle) * e2
+    around = -np.sin(angle) * e1 + np.cos(angle) * e2
+    height = (frame.lift[arc] + u * frame.climb[arc])[:, None]
+    position = frame.center[arc] + radius * outward + height * normal
+    velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
+    return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)

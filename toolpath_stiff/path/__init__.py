@@ -1,0 +1,1 @@
+"""Moves placed on a machine, sampled to poses, and as a table."""
