@@ -24,7 +24,7 @@ from toolpath_stiff.report.compare import page as compare_html
 from toolpath_stiff.report.compare import residuals_csv
 from toolpath_stiff.report.compare import text as terminal_text
 from toolpath_stiff.report.pictures.compare import PICTURES
-from toolpath_stiff.report.pictures.style import SHARP, picture_file
+from toolpath_stiff.report.pictures.files import SHARP, picture_file
 
 NASTY = '<script>alert("1")</script>$x^2$'
 

@@ -29,7 +29,7 @@ from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.diagnose import page as diagnose_html
 from toolpath_stiff.report.map import page as map_page
 from toolpath_stiff.report.pages import asset
-from toolpath_stiff.report.pictures import style
+from toolpath_stiff.report.pictures import files
 from toolpath_stiff.report.pictures.ladder import ladder
 from toolpath_stiff.report.pictures.plan import visits_drawn
 from toolpath_stiff.stiffness.model import build_model
@@ -129,7 +129,7 @@ def visits_at(z):
 def test_every_pose_is_in_the_panel_of_its_own_height(heights):
     visits = visits_at(np.array([*heights, heights[0]]))
     count = len(heights) + 1
-    with style.house_style():
+    with files.house_style():
         figure = visits_drawn(visits, range(count), ["vertical"] * count, None, ("title", "text"))
     found = {}
     for axes in figure.axes:
@@ -190,5 +190,5 @@ def test_surfaces_of_a_map_stand_above_their_planes(tmp_path):
 
 def test_a_picture_stands_in_a_page_as_wide_as_it_was_drawn():
     found = diagnosed(*VERDICTS["ambiguous"])
-    text = diagnose_html(found, {"ladder.png": style.picture_file("ladder.png", ladder, found, style.SHARP)})
+    text = diagnose_html(found, {"ladder.png": files.picture_file("ladder.png", ladder, found, files.SHARP)})
     assert text.count('class="picture"') == 1 and '<img alt="" style="--natural:1400px" src="data:image/png' in text

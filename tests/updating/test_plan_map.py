@@ -10,8 +10,8 @@ from tests.updating.planning import rivals, table_1_design
 from toolpath_stiff.planning.gap_map import gap_map, top_pair
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import plan_measurements
+from toolpath_stiff.report.pictures.files import picture_file
 from toolpath_stiff.report.pictures.plan import visits_drawn
-from toolpath_stiff.report.pictures.style import picture_file
 
 
 @pytest.fixture(scope="module")

@@ -79,8 +79,8 @@ def maps(
     (rows, columns), (left, top, side) = panels(data), place
     along, levels, limit = directions(data), planes(data), limit or _limit([residual])
     for i, j in np.ndindex(len(rows), len(columns)):
-        at = left + side * j, top - side * (i + 1) + 0.1
-        axes, here = panel(figure, *at, side - 0.15, side - 0.3, xticks=[], yticks=[]), levels == rows[i]
+        corner = left + side * j, top - side * (i + 1) + 0.1
+        axes, here = panel(figure, *corner, side - 0.15, side - 0.3, xticks=[], yticks=[]), levels == rows[i]
         points = _map(axes, data, residual, here & (along == columns[j]), limit)
         axes.set_title(columns[j] if i == 0 else "", size=9.5, color=MUTED)
         if j == 0:
