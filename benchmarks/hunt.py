@@ -26,10 +26,10 @@ from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.lines import split_lines
 from toolpath_stiff.nc.linuxcnc.reader import fenced
 from toolpath_stiff.nc.moves import MOTION_NAMES, ReadProgram
 from toolpath_stiff.nc.reader import read_program
-from toolpath_stiff.nc.words import split_lines
 
 TOLERANCE = 0.01  # mm and degrees
 PRINTED = 0.011  # a move shorter than rs274's digits, and twice their sum

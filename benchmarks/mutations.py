@@ -126,7 +126,7 @@ def _command(content: bytes, number: int) -> object:
     out, error = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(error):
         code = tps(words)
-    if code not in (0, 1, 2, 3) or "TPS_TRACEBACK" in error.getvalue():
+    if code not in (0, 1, 2, 3) or "report this line" in error.getvalue():
         raise AssertionError(f"exit code {code} of {words}: {error.getvalue()[:300]}")
     if code == 2 and not error.getvalue() and not out.getvalue():
         raise AssertionError(f"not a word about {words}")

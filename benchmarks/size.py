@@ -21,7 +21,10 @@ from pathlib import Path
 from benchmarks.pages import write_page
 from benchmarks.processes import describe_machine, whole_command
 from benchmarks.size_programs import KINDS, program
+from toolpath_stiff.nc.lines import split_lines
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.request import Request
 
 FASTER, FLAT, CPU_SECONDS, GIGABYTES, COLUMNAR = 12.0, 1.5, 12.0, 1.0, 0.8
 LENGTHS = (10_000, 30_000, 100_000, 300_000, 1_000_000)
@@ -88,16 +91,9 @@ def reading(report: Report, lines: int, rounds: int) -> None:
 
 def one_by_one(text: str) -> None:
     """Our reader without its fast way."""
-    from toolpath_stiff.nc.frames import Frames
-    from toolpath_stiff.nc.program_run import ProgramRun
-    from toolpath_stiff.nc.request import ZERO
-    from toolpath_stiff.nc.state import State
-    from toolpath_stiff.nc.tables import Offsets
-    from toolpath_stiff.nc.words import split_lines
-
-    state = State("p", Frames(Offsets(), None, ZERO), None)
-    ProgramRun(state, split_lines(text, "p"), "p", frozenset(), fast=False).run()
-    state.recorder.moves()
+    run = ProgramRun(Request(split_lines(text, "p"), "p"), fast=False)
+    run.run()
+    run.state.recorder.moves()
 
 
 def lengths(report: Report, longest: int, rounds: int) -> None:

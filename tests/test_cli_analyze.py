@@ -228,7 +228,7 @@ def test_pose_csv_keeps_the_order_and_names_bad_cells(part, capsys):
     poses.write_text("x_mm,y_mm,z_mm\n1,2,abc\n1,nan,3\n")
     assert main(["pose", "--csv", "poses.csv"]) == 2
     error = capsys.readouterr().err
-    assert "poses.csv:2: row 1, z_mm: 'abc'" in error and "poses.csv:3: row 2, y_mm: 'nan'" in error
+    assert "poses.csv:2: pose 1, 2, abc" in error and "poses.csv:3: pose 1, nan, 3" in error
     poses.write_text("x_mm,y_mm,z_mm\n0,0,800\n0,0,9000\n")
     assert main(["pose", "--csv", "poses.csv"]) == 1
     captured = capsys.readouterr()

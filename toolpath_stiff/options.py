@@ -9,10 +9,10 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
-from typing import Any, TypeVar, cast, get_args, get_type_hints
+from typing import Any, TypeVar, Unpack, cast, get_args, get_origin, get_type_hints
 
 from toolpath_stiff.errors import InputError
 
@@ -154,14 +154,18 @@ def _hints(function: Callable[..., Any]) -> dict[str, Any]:
 def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
     """The arguments of a function that are options, by name."""
     function = inspect.unwrap(getattr(function, "__func__", function))
-    texts = parameter_texts(function)
+    texts, hints = parameter_texts(function), _hints(function)
+    for name, hint in tuple(hints.items()):
+        if get_origin(hint) is Unpack:  # the rest of the arguments, as a dictionary of options
+            hints |= _hints(get_args(hints.pop(name))[0])
     arguments = {}
-    for name, hint in _hints(function).items():
+    for name, hint in hints.items():
         parts = [hint, *get_args(hint)]
         marks = [mark for part in parts for mark in getattr(part, "__metadata__", ())]
         option = next((mark for mark in marks if isinstance(mark, Option)), None)
         if option is not None:
-            default = inspect.signature(function).parameters[name].default
+            parameter = inspect.signature(function).parameters.get(name)
+            default = parameter.default if parameter else None
             kinds = [kind for part in parts for kind in (part, *get_args(part)) if kind in (bool, int, float)]
             arguments[name] = Argument(
                 name,
@@ -172,6 +176,30 @@ def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
                 default is inspect.Parameter.empty,
             )
     return arguments
+
+
+def words_of(function: Callable[..., Any], given: Mapping[str, Any]) -> list[str]:
+    """Arguments of a function as the command takes them; those that are the function's own values go without saying.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> words_of(tps.place, {"x_mm": (-50, 50), "z_values_mm": (700, 800), "partial": None})
+    ['--x', '-50:50', '--z-values', '700,800']
+    """
+    words: list[str] = []
+    for name, argument in arguments_of(function).items():
+        value = given.get(name)
+        if value is None or value is False or value == argument.default:
+            continue
+        if isinstance(value, Mapping):
+            value = [f"{key}={part:.10g}" for key, part in value.items()]
+        several = value if isinstance(value, list | tuple | frozenset | set) else [value]
+        shown = [f"{part:.10g}" if isinstance(part, int | float) else str(part) for part in several]
+        joined = shown if argument.option.count else [(":" if argument.option.read is low_high else ",").join(shown)]
+        option = argument.option.name.split()[-1]
+        words += [option] if value is True else [word for text in joined for word in (option, text)]
+    return words
 
 
 def parameter_texts(function: Callable[..., Any]) -> dict[str, str]:

@@ -16,11 +16,11 @@ from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
+from toolpath_stiff.nc.languages import looks_like_cutter_location
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.words import looks_like_cutter_location
 from toolpath_stiff.rewriting.offset_blocks import offset_blocks
 from toolpath_stiff.rotations import rotation_matrices
 

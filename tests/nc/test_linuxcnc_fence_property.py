@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.lines import split_lines
 from toolpath_stiff.nc.linuxcnc.fence import refuse_other_programs
 from toolpath_stiff.nc.linuxcnc.inputs import numbered, split
-from toolpath_stiff.nc.words import split_lines
 
 PIECES = st.one_of(
     st.sampled_from(

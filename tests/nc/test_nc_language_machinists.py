@@ -110,9 +110,9 @@ def test_m97_calls_a_block_by_its_number():
     [
         (LOCAL, "generic", r"2:1: M97 is Haas' call.*--dialect haas"),
         (LOCAL, "linuxcnc", "M97 is Haas' call"),
-        (LOCAL.replace("P100", "P300"), "haas", "no such block"),
+        (LOCAL.replace("P100", "P300"), "haas", "no block has"),
         (LOCAL.replace("N200", "N100"), "haas", "lines 5, 8"),
-        (LOCAL.replace("P200", "P100"), "haas", "N100, which is running"),
+        (LOCAL.replace("P200", "P100"), "haas", "more than 10 subprograms within each other, N100"),
         (LOCAL.replace("P100", ""), "haas", "without P"),
         (LOCAL.replace("M99\nN200", "N200").replace("Z1.\nM99", "Z1."), "haas", "has no end"),
         (LOCAL.replace("L2", "L10000"), "haas", "repeats"),

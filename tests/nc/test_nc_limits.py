@@ -9,10 +9,10 @@ import pytest
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.languages import language_of
+from toolpath_stiff.nc.lines import LARGEST_FILE, LONGEST_LINE
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
-from toolpath_stiff.nc.words import LARGEST_FILE, LONGEST_LINE
 
 HEAD = "G21 G90 F600\nG1 X5\n"
 

@@ -11,10 +11,11 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import Controller, dialect_named
 from toolpath_stiff.nc.lathes import lathe_program
-from toolpath_stiff.nc.moves import FEED, RAPID
+from toolpath_stiff.nc.lines import read_lines
+from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.words import read_block, read_lines
+from toolpath_stiff.nc.words import read_block
 
 HEAD = "G21 G90 F600.\nG0 Z5.\n"
 
@@ -178,7 +179,7 @@ def test_a_subprogram_that_returns_elsewhere():
     back = read("N10 G1 X1.\nG1 X2.\nM99 P10")
     assert cuts(back) == [[1, 0, 5], [2, 0, 5]]
     assert "read once" in back.warnings[0]
-    with pytest.raises(InputError, match="M99 P goes to N11, and the file has no such block"):
+    with pytest.raises(InputError, match="M99 P goes to N11, which no block has"):
         read("M99 P11\nG1 X1.\nN10 G1 X2.")
     with pytest.raises(InputError, match="goes back to line 3 of the caller"):
         read("N10 G1 X3.\nM98 P2\nM30\nO2\nG1 X7.\nM99 P10")
@@ -309,12 +310,6 @@ def test_corners_are_no_words_of_linuxcnc():
 # -- messages ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_macro_statement_that_moves_nothing_is_called_one():
-    """The others are in tests/nc/test_parametric.py."""
-    with pytest.raises(InputError, match=r"^p.nc:3:1: POPEN is a statement of a control's macro language"):
-        read("POPEN", "fanuc")
-
-
 # -- lathes, feeds -----------------------------------------------------------------------------------------------------
 
 
@@ -396,80 +391,3 @@ def test_a_feed_for_programs_without_one():
     assert "as asked for" in program.assumptions[-1]
     with pytest.raises(InputError, match="--feed MM_PER_MIN"):
         parse_program(apt, "p.apt")
-
-
-# -- text before the tape mark -----------------------------------------------------------------------------------------
-
-
-def test_text_before_the_tape_mark_is_no_part_of_the_program():
-    text = "Part: bracket, rev. A\nmade 2024-05-01 by J.\n\n%\nO1234(NAME)\nG21 G90 F600\nG1 X5\nM30\n%\n"
-    program = parse_program(text, "p.nc")
-    assert cuts(program) == [[5, 0, 0]]
-    assert program.moves.line.tolist() == [7]
-    assert any("before the tape mark (%) in line 4 is not read" in text for text in program.warnings)
-    assert check(Request(tuple(text.splitlines()), "p.nc")).complete
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "Part: bracket\nG21 G90 F600\nG1 X5\nM30\n%\n",  # the mark ends the program
-        "G1 X5 F100\nsome text\n%\nG1 X6\nM30\n%\n",  # a block stands before it too
-        "#1 = 1\n%\nG1 X6 F100\nM30\n%\n",  # a variable may be meant
-        "text\n" * 60 + "%\nG1 X6 F100\nM30\n%\n",
-    ],
-)
-def test_text_that_is_no_leader_is_refused(text):
-    with pytest.raises(InputError):
-        parse_program(text, "p.nc")
-
-
-@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
-@pytest.mark.parametrize(("before", "kind"), [("G0", RAPID), ("G1", FEED)])
-def test_a_cycle_off_leaves_the_motion_of_its_own_group(dialect, before, kind):
-    """Fanuc, operator's manuals, Canned cycle cancel: normal operation goes on; cycles are of group 09, G0 of 01."""
-    moves = read(f"F100.\n{before} X1.\nG99 G81 X2. Z-2. R1.\nG80 Z25.\nX9.", dialect).moves
-    assert moves.motion[-2:].tolist() == [kind, kind] and moves.end[-1, 0] == pytest.approx(9e-3)
-
-
-def test_a_cycle_off_leaves_no_arc():
-    with pytest.raises(InputError, match="no motion mode"):
-        read("G2 X4. I2.\nG81 X2. Z-2. R1.\nG80 Z25.", "fanuc")
-
-
-@pytest.mark.parametrize(("mode", "depth"), [("G90", "Z-2."), ("G91", "Z-7.")])
-def test_a_cycle_without_r_begins_where_the_tool_stands(mode, depth):
-    program = read(f"{mode} G98 G81 X2. {depth}\nX3.", "haas")
-    assert [x[2] for x in cuts(program)] == [-2.0, -2.0] and any("without R" in text for text in program.assumptions)
-    with pytest.raises(InputError, match="without R"):
-        read("G98 G81 X2. Z-2.", "fanuc")
-
-
-@pytest.mark.parametrize(
-    ("dialect", "line"),
-    [
-        ("fanuc", "G0 G15 G17 G23 G25 G40 G49 G50 G50.1 G64 G69 G80 G90 G94 G98 G13.1"),
-        ("fanuc", "G22 X10. Y10. Z10. I0. J0. K0."),
-        ("fanuc", "G62\nG63\nG64\nG26 P100 Q5 R10\nG5.4 Q1"),
-        ("haas", "G100"),
-    ],
-)
-def test_safe_start_changes_no_path(dialect, line):
-    assert cuts(read(f"{line}\nG1 X5.", dialect)) == [[5, 0, 5]]
-    with pytest.raises(InputError):
-        read(f"{line}\nG1 X5.", "linuxcnc")
-
-
-@pytest.mark.parametrize(("dialect", "lines"), [("haas", "G10 L20 P2 X7.\nG111"), ("fanuc", "G10 L20 P2 X7.\nG54 P2")])
-def test_other_names_of_additional_offsets(dialect, lines):
-    """G110 to G129 are Haas' G154 P1 to P20; Fanuc's G54 P is G54.1 P."""
-    moves = read(f"G10 L2 P1 X0\nG1 X0\n{lines}\nG1 X1.", dialect).moves
-    assert moves.end[-1, 0] == pytest.approx(8e-3)
-    with pytest.raises(InputError, match=r"G154 P3|G54\.1 P3"):
-        read({"haas": "G112", "fanuc": "G54 P3"}[dialect], dialect)
-
-
-def test_the_second_reference_point_by_its_number():
-    assert len(read("G91 G30 P2 Z0.\nG90 G1 X1. Y1. Z1.", "fanuc").moves)
-    with pytest.raises(InputError, match="P3 is a reference point"):
-        read("G91 G30 P3 Z0.", "fanuc")

@@ -1,6 +1,5 @@
 """Plain lines many at a time and one by one: the same moves, the same words to the user, digit for digit."""
 
-import copy
 import dataclasses
 from pathlib import Path
 
@@ -10,16 +9,16 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import frames, geometry, plain_lines, plain_words, program_run
+from toolpath_stiff.nc import frames, geometry, plain_lines, plain_words
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.codes import feeds, increments
 from toolpath_stiff.nc.controller import DIALECTS, Controller
-from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.tables import Offsets, ToolEntry
-from toolpath_stiff.nc.words import read_block, read_lines, split_lines
+from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.words import read_block
 
 PROGRAMS = sorted((Path(__file__).parents[2] / "programs").glob("*.nc"))
 TOOLS = {1: ToolEntry(1, 50.0, 6.0), 2: ToolEntry(2, 80.0, 10.0), 3: ToolEntry(3, 120.0, 8.0)}
@@ -29,14 +28,12 @@ ZERO = (0.0,) * 6
 @pytest.fixture(autouse=True)
 def _runs_of_any_length(monkeypatch):
     monkeypatch.setattr(plain_lines, "FEWEST", 1)
-    monkeypatch.setattr(program_run, "FEWEST_LINES", 1)
 
 
 def outcome(lines, dialect, fast):
     """Everything that reading leaves behind, in comparable form, and how many lines were executed at once."""
-    axes = Frames(Offsets(), None, ZERO)
-    control = State("p", axes, copy.deepcopy(TOOLS), DIALECTS[dialect])
-    run = ProgramRun(control, lines, "p", frozenset(), fast=fast)
+    run = ProgramRun(Request(lines, "p", controller=Controller(DIALECTS[dialect], tools=TOOLS)), fast=fast)
+    control, axes = run.state, run.state.frames
     executed = []
     run._tally_plain = lambda at, rows: executed.append(len(rows.code))
     error = None
@@ -157,7 +154,7 @@ def test_random_programs_are_checked_alike(blocks):
     lines = split_lines("F300\n" + "\n".join(blocks), "p")
     fast = check(Request(lines, "p", controller=Controller()))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(program_run, "FEWEST_LINES", len(lines) + 1)
+        patch.setattr(plain_lines, "FEWEST", len(lines) + 1)
         slow = check(Request(lines, "p", controller=Controller()))
     for found in (fast, slow):
         assert found.used == slow.used

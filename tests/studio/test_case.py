@@ -313,43 +313,16 @@ def from_elsewhere(tmp_path, monkeypatch):
     return shutil.copytree(case.folder, tmp_path / "moved"), marker
 
 
-def test_a_moved_case_works_without_its_code_until_this_user_agrees(from_elsewhere):
+def test_a_moved_case_opens_once_this_user_agrees_to_its_code(from_elsewhere):
     folder, marker = from_elsewhere
-    case = tps.Case.open(folder)
-    assert case.not_agreed == ("effects/my_screw.py",)
-    assert "effects/my_screw.py" in repr(case)
-    found = case.analyze().to_dict()
-    assert found["mean_N_per_mm"] == tps.analyze(case.program, "nist").mean_N_per_mm
-    assert found["effects_idle"] == [
-        {"effect": "my_screw", "reason": "its code is not run, as you have not agreed to it"}
-    ]
-    assert [text for text in found["warnings"] if "my_screw" in text]
-    case.require(30000)  # a step that knows nothing of the effect leaves it where it is
-    case.switch("table_compliance", TABLE)
-    with pytest.raises(tps.TpsError, match="my_screw"):
-        case.switch("my_screw", {})
-    with pytest.raises(tps.InputError, match="no file of own effects"):
-        case.trust("effects/other.py")
+    for trust, said in (([], "you have not agreed to run it"), (["effects/other.py"], "no file of own effects")):
+        with pytest.raises(tps.InputError, match=said):
+            tps.Case.open(folder, trust=trust)
     assert not marker.exists()
-    case.trust("effects/my_screw.py")
-    assert marker.exists()
-    assert set(case.state.on) == {"my_screw", "table_compliance"}
-    assert case.analyze().mean_N_per_mm < found["mean_N_per_mm"]
-    assert tps.Case.open(folder).not_agreed == ()  # from now on
-
-
-def test_a_machine_that_carries_own_effects_is_loaded_without_them(from_elsewhere, tmp_path, monkeypatch):
-    folder, marker = from_elsewhere
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "sender"))
-    case = tps.Case.open(folder)
-    case.accept(case.path("machines/by-hand.toml"))
-    assert case.machine.effects == ["my_screw"]
-    marker.unlink()
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "mine"))
-    case = tps.Case.open(folder)
-    assert case.machine.effects == []
-    assert [one.effect for one in case.machine.running().withheld] == ["my_screw"]
-    assert not marker.exists()
+    case = tps.Case.open(folder, trust=["effects/my_screw.py"])
+    assert marker.exists() and set(case.state.on) == {"my_screw"}
+    assert case.analyze().mean_N_per_mm < tps.analyze(case.program, "nist").mean_N_per_mm
+    assert tps.Case.open(folder).machine.effect_files  # from now on
 
 
 def test_an_edited_file_is_not_run_though_its_case_was_agreed_to(from_elsewhere):
@@ -359,13 +332,14 @@ def test_an_edited_file_is_not_run_though_its_case_was_agreed_to(from_elsewhere)
     file = folder / "effects/my_screw.py"
     before = sha256(file.read_bytes())
     file.write_text(file.read_text() + "\n# edited\n")
-    assert case.not_agreed == ("effects/my_screw.py",)
-    assert case.machine.effect_files == ()
+    with pytest.raises(tps.InputError, match="you have not agreed to run it"):
+        case.machine  # noqa: B018
     with pytest.raises(tps.InputError, match="is not what was put into the case"):
         tps.Case.open(folder, trust=["effects/my_screw.py"])
     text = (folder / "case.toml").read_text()
     (folder / "case.toml").write_text(text.replace(before, sha256(file.read_bytes())))
-    assert tps.Case.open(folder).machine.effect_files == ()
+    with pytest.raises(tps.InputError, match="you have not agreed to run it"):
+        tps.Case.open(folder)
     assert not marker.exists()
 
 
@@ -390,11 +364,10 @@ def test_code_that_cannot_be_used_stays_off(from_elsewhere):
     file.write_text(broken)
     text = (folder / "case.toml").read_text()
     (folder / "case.toml").write_text(text.replace(before, sha256(file.read_bytes())))
-    case = tps.Case.open(folder)
     with pytest.raises(tps.TpsError, match="nothing_of_that_name"):
-        case.trust("effects/my_screw.py")
-    assert case.not_agreed == ("effects/my_screw.py",)
-    assert case.analyze().mean_N_per_mm > 0
+        tps.Case.open(folder, trust=["effects/my_screw.py"])
+    with pytest.raises(tps.InputError, match="you have not agreed to run it"):
+        tps.Case.open(folder)
 
 
 def test_a_relative_configuration_folder_does_not_count(tmp_path, monkeypatch):

@@ -11,6 +11,7 @@ import numpy as np
 
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.measurements import Data, Noise, Question
+from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.candidates import Candidate, Component
 from toolpath_stiff.inference.errors import deviation_percent, error_figures
 from toolpath_stiff.inference.evidence import Fit, Problem
@@ -44,19 +45,19 @@ class Preview:
         noise = max(noise_models(data, question.noise, question.strut_spread), key=lambda noise: noise.typical)
         self._problem = Problem.of(Predictor(question.model, data, question.on.effect_files), noise)
         self._on = question.on
-        self._near: tuple[Mapping[str, Mapping[str, Any]], Fit] | None = None
+        self._near: tuple[Mapping[str, Document], Fit] | None = None
 
-    def machine(self, effects: Mapping[str, Mapping[str, Any]]) -> Machine:
+    def machine(self, effects: Mapping[str, Document]) -> Machine:
         """The machine with these effects and the strut law refitted beside them; arguments and errors as of `at`."""
         given = self._on.model.given or self._on.model.machine
         return with_effects(self._on, effects, scaled_law(given.strut_law, self._fit(effects).law))
 
     def at(
         self,
-        effects: Mapping[str, Mapping[str, Any]] | None = None,
+        effects: Mapping[str, Document] | None = None,
         *,
         strut_law: bool = True,
-        near: Mapping[str, Mapping[str, Any]] | None = None,
+        near: Mapping[str, Document] | None = None,
     ) -> dict[str, Any]:
         """Errors in per cent with these effects beside those of the machine file.
 
@@ -89,14 +90,14 @@ class Preview:
             "modelled_N_per_mm": modelled.tolist(),
         }
 
-    def _fit_near(self, effects: Mapping[str, Mapping[str, Any]]) -> Fit:
+    def _fit_near(self, effects: Mapping[str, Document]) -> Fit:
         """The fit beside these effects; the last one is kept."""
         wanted = {name: dict(keys) for name, keys in effects.items()}
         if self._near is None or self._near[0] != wanted:
             self._near = (wanted, self._fit(wanted))
         return self._near[1]
 
-    def _fit(self, effects: Mapping[str, Mapping[str, Any]], law_free: bool = True, near: Fit | None = None) -> Fit:
+    def _fit(self, effects: Mapping[str, Document], law_free: bool = True, near: Fit | None = None) -> Fit:
         """The strut law fitted beside effects of these sizes, or left as it is.
 
         With `near`, a fit of other sizes, from its law on and with the readings wild that are wild there: to find out
@@ -122,9 +123,7 @@ class Preview:
         return fit
 
 
-def with_effects(
-    machine: Machine, effects: Mapping[str, Mapping[str, Any]], strut_law: StrutLaw | None = None
-) -> Machine:
+def with_effects(machine: Machine, effects: Mapping[str, Document], strut_law: StrutLaw | None = None) -> Machine:
     """A machine with further effects, name -> the keys of its entry in a machine file, and with another strut law."""
     entries, given = _entries(effects), machine.model.given or machine.model.machine
     read = [entry for entry in entries if find_effect(entry.name, machine.effect_files).is_instrument]
@@ -137,7 +136,7 @@ def with_effects(
     return replace(machine, model=replace(model, unchecked=machine.model.unchecked))
 
 
-def _entries(effects: Mapping[str, Mapping[str, Any]]) -> list[EffectEntry]:
+def _entries(effects: Mapping[str, Document]) -> list[EffectEntry]:
     """Effects as a machine file would have them."""
     return [EffectEntry(name, dict(keys)) for name, keys in effects.items()]
 

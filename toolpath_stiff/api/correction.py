@@ -17,9 +17,8 @@ from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import options
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.options import Option, checked
+from toolpath_stiff.options import Option, checked, words_of
 from toolpath_stiff.results import Progress, teller
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.model import build_model
@@ -141,7 +140,7 @@ def draft_effect(
     diagnosis = replace(
         diagnose(question.model, question.readings, progress=teller(progress), **question.common),
         names=question.files,
-        line=question.request.command("diagnose", *options(seed=seed or None)),
+        line=question.request.command("diagnose", *words_of(draft_effect, {"seed": seed})),
         asked=question.request,
         inputs=question.inputs,
     )

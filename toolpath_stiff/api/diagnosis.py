@@ -6,15 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from toolpath_stiff.api.inputs import Origin, origin_si, origin_word
+from toolpath_stiff.api.inputs import Origin, origin_si
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.hints import options
 from toolpath_stiff.nc.program import Program, program_from
-from toolpath_stiff.options import Option, checked
+from toolpath_stiff.options import Option, checked, words_of
 from toolpath_stiff.placement.case_study import case_study_program
 from toolpath_stiff.results import Progress, teller
 
@@ -73,18 +72,16 @@ def diagnose(
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     part = None if program is None else program_from(program)
     origin, conditions = origin_si(origin_mm_deg), question.on.running(part).conditions
-    circumstances = options(
-        program=None if part is None else part.file,
-        origin=None if origin is None else origin_word(origin),
-        setup=question.on.setup,
-        temperature=question.on.temperature_C,
-        seed=seed or None,
-    )
+    circumstances = [
+        *words_of(diagnose, {"program": part.file if part else None, "origin_mm_deg": origin_mm_deg, "seed": seed}),
+        *words_of(Machine.under, {"setup": question.on.setup, "temperature_C": question.on.temperature_C}),
+        *(part.words if part else ()),
+    ]
     tell = teller(progress)
     diagnosis = replace(
         with_plan(diagnose_readings(question.model, question.readings, progress=tell, **question.common), tell),
         names=question.files,
-        line=question.request.command("diagnose", *circumstances, *(part.words if part else ())),
+        line=question.request.command("diagnose", *circumstances),
         asked=question.request,
         inputs=(*question.inputs, *(part.inputs if part else ())),
     )

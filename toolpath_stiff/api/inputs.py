@@ -9,53 +9,19 @@ from typing import Annotated, Any
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.options import Option, numbers
-from toolpath_stiff.units import Pose, pose_in_mm, pose_in_si
+from toolpath_stiff.units import Pose, pose_in_si
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0
 
 # Options that several functions share.
-Step = Annotated[float, Option("--step", "mm", above=0, at_most=1000, help="Largest distance of two samples.")]
-Force = Annotated[
-    float,
-    Option(
-        "--force",
-        "N",
-        above=0,
-        at_most=1e6,
-        help="Load at the tool tip: for deflections, and for effects that depend on it.",
-    ),
-]
-LoadDirection = Annotated[
-    str,
-    Option(
-        "--load",
-        "DIRECTION",
-        help="Direction of the load: tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ.",
-    ),
-]
-Origin = Annotated[
-    Sequence[float] | None,
-    Option(
-        "--origin",
-        "X,Y,Z[,A,B,C]",
-        read=numbers,
-        help="Where program zero (G54) sits in machine coordinates, mm and degrees. Unless given, where the program's "
-        "G10 says, else the machine's default.",
-    ),
-]
+Step = Annotated[float, Option("--step", "mm", above=0, at_most=1000)]
+Force = Annotated[float, Option("--force", "N", above=0, at_most=1e6)]
+LoadDirection = Annotated[str, Option("--load", "DIRECTION")]
+Origin = Annotated[Sequence[float] | None, Option("--origin", "X,Y,Z[,A,B,C]", read=numbers)]
 # Coarser than 0.01 mm is not machining; beyond nine decimals a double has no more digits.
 Decimals = Annotated[int | None, Option("--decimals", at_least=2, at_most=9)]
-Linearised = Annotated[
-    float | None,
-    Option(
-        "--linearise",
-        "mm",
-        above=0,
-        at_most=10,
-        help="Write arcs that the turn takes out of the planes as straight moves within so much; else refuse them.",
-    ),
-]
+Linearised = Annotated[float | None, Option("--linearise", "mm", above=0, at_most=10)]
 
 
 def finite(name: str, value: Any) -> float:
@@ -87,9 +53,3 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
 def origin_si(origin_mm_deg: Sequence[float] | None) -> Pose | None:
     """A placement in SI, None where none is given. Raises `InputError`."""
     return None if origin_mm_deg is None else pose_si(both_names("--origin"), origin_mm_deg)
-
-
-def origin_word(origin: Pose) -> str:
-    """A placement in SI as --origin takes it; angles that are all 0 go without saying."""
-    words = [f"{value:.10g}" for value in pose_in_mm(origin)]
-    return ",".join(words if any(origin[3:]) else words[:3])

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from toolpath_stiff.analysis.machine_check import MachineCheck
-from toolpath_stiff.analysis.machine_check import check_machine as look
+from toolpath_stiff.analysis.machine_check import MachineCheck, check_machine
 from toolpath_stiff.analysis.poses import reach_along
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
@@ -25,7 +24,7 @@ from toolpath_stiff.options import Option, checked
 from toolpath_stiff.results import Result
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.contract import Conditions
-from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup, known_setups
+from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup
 from toolpath_stiff.stiffness.trial import failures, own_effects, refuse_failing
 from toolpath_stiff.units import mm_from_m, pose_in_mm, pose_in_si
 
@@ -40,26 +39,6 @@ def _named(text: str) -> str:
     return text.strip()
 
 
-Setup = Annotated[
-    str | None,
-    Option(
-        "--setup",
-        "NAME",
-        read=_named,
-        help="Set-up that is on the machine, for effects that belong to one; none: a set-up without a name. "
-        "Unless given, the controller file's, else the machine file's.",
-    ),
-]
-Temperature = Annotated[
-    float | None,
-    Option(
-        "--temperature",
-        "C",
-        at_least=-50,
-        at_most=200,
-        help="Degrees Celsius, for effects that need it; unless given, the machine file's.",
-    ),
-]
 FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the paper's Figure 2
 
 
@@ -90,10 +69,8 @@ class Machine(Result):
     <Machine nist: 6 struts, no effects>
     >>> machine.strut_lengths_mm((0, 0, 800)).round(1).tolist()
     [2884.7, 2869.9, 2884.7, 2869.9, 2884.7, 2869.9]
-    >>> machine.name, machine.title, machine.source[:24]
-    ('nist', 'NIST Ingersoll Octahedral Hexapod', 'Clinton, Zhang, Wavering')
-    >>> machine.effects, machine.setups, machine.inputs
-    ([], [], ('nist',))
+    >>> machine.name, machine.effects, machine.inputs
+    ('nist', [], ('nist',))
     >>> machine.origin_mm_deg
     (0.0, 0.0, 800.0, 0.0, 0.0, 0.0)
     >>> [round(value) for value in machine.joints_mm["frame"][0]], machine.joints_mm["tool"]
@@ -155,10 +132,22 @@ class Machine(Result):
         return loaded
 
     @checked
-    def under(self, setup: Setup = None, temperature_C: Temperature = None) -> Machine:
-        """The same machine under a set-up and a temperature, as of `load`; None: as the files say.
+    def under(
+        self,
+        setup: Annotated[str | None, Option("--setup", "NAME", read=_named)] = None,
+        temperature_C: Annotated[float | None, Option("--temperature", "C", at_least=-50, at_most=200)] = None,
+    ) -> Machine:
+        """The same machine under a set-up and a temperature.
 
         Whether an effect knows the set-up is checked where it matters: beside a second machine one of them has to.
+
+        Parameters
+        ----------
+        setup
+            Set-up that is on the machine, for effects that belong to one; none: a set-up without a name. Unless given,
+            the controller file's, else the machine file's.
+        temperature_C
+            Degrees Celsius, for effects that need it; unless given, the machine file's.
 
         Examples
         --------
@@ -202,24 +191,9 @@ class Machine(Result):
         return self.model.machine.name
 
     @property
-    def title(self) -> str:
-        """Its name for headings."""
-        return self.model.machine.title
-
-    @property
-    def source(self) -> str:
-        """Where its figures come from."""
-        return self.model.machine.source
-
-    @property
     def effects(self) -> list[str]:
         """Names of the effects that it carries, those that act on readings too."""
         return [active.effect.name for active in (*self.model.effects, *self.model.instruments)]
-
-    @property
-    def setups(self) -> list[str]:
-        """The set-ups that its file lists and its effects name."""
-        return known_setups([self.model])
 
     @property
     def origin_mm_deg(self) -> tuple[float, ...]:
@@ -240,7 +214,7 @@ class Machine(Result):
         """
         model, setup, said_by = self.model, self.setup, f"--setup {self.setup}"
         if setup is None and program is not None:
-            setup, said_by = program.controller.setup, str(program.given.get("controller"))
+            setup, said_by = program.request.controller.setup, str(program.given.get("controller"))
         check_setup(model.conditions.setup or "", f"machine {self.name}, [setup] name", model)
         check_setup(setup or "", said_by, model, *(other.model for other in beside))
         chosen = "" if setup == NO_SETUP else setup
@@ -377,8 +351,8 @@ class Machine(Result):
         """
         return {
             "name": self.name,
-            "title": self.title,
-            "source": self.source,
+            "title": self.model.machine.title,
+            "source": self.model.machine.source,
             "effects": self.effects,
             "figures": [figure._asdict() for figure in self.view.machine_figures(self.model.machine)],
         }
@@ -393,7 +367,7 @@ class Machine(Result):
         >>> machine.check()
         <MachineCheck: nist, 0 wrong, 0 doubtful>
         """
-        return check_machine(self)
+        return check_machine(self.running(), self.asked)
 
     def save(self, file: str | Path) -> Path:
         """Write the machine file, effects included, whole or not at all.
@@ -430,21 +404,3 @@ def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects
 def machine_from(machine: Machine | str | Path) -> Machine:
     """A machine, loaded if it is a name or a file."""
     return machine if isinstance(machine, Machine) else Machine.load(machine)
-
-
-def check_machine(machine: Machine | str | Path) -> MachineCheck:
-    """Look for slips in a machine's figures: units, signs, mirrored joints; what its effects wait for.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read as a machine at all.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.Machine.load("nist").check().good
-    True
-    """
-    on = machine_from(machine)
-    return look(on.running(), on.asked)

@@ -197,12 +197,12 @@ def analyze_many(
 
 def _named(example: Program, file: str) -> Program:
     """A program in a file, read as the example."""
-    return dataclasses.replace(example, name=Path(file).name, file=file, text=None, _last={})
+    return dataclasses.replace(example, name=Path(file).name, file=file, text=None, _last=[])
 
 
 def _absolute(program: Program) -> Program:
     """The same for another process."""
-    return dataclasses.replace(program, file=program.file and str(Path(program.file).absolute()), _last={})
+    return dataclasses.replace(program, file=program.file and str(Path(program.file).absolute()), _last=[])
 
 
 def _listed(programs: Iterable[str | Path | Program | Found]) -> tuple[list[Found], dict[str, Program]]:

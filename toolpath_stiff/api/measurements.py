@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 Noise = float | tuple[float, float] | None
+COMMON = ("columns", "noise_percent", "strut_spread_percent")  # options that `Asked.command` says
 
 
 class Measurements:
@@ -45,7 +46,10 @@ class Measurements:
     """
 
     def __init__(self, files: Sequence[str], columns: Mapped = None) -> None:
-        self.files, self.columns = tuple(files), columns_text(columns)
+        if columns is not None and not isinstance(columns, str):
+            columns = ", ".join(f"{ours}={theirs}" for ours, theirs in columns.items())
+        self.columns = columns
+        self.files = tuple(files)
         self._last: tuple[Hexapod, Readings] | None = None
 
     @classmethod
@@ -116,10 +120,8 @@ class Measurements:
         """
         columns = reading_columns(self.on(machine_from(machine)))
         cells = zip(*(values.tolist() for values in columns.values()), strict=True)
-        return {
-            "files": list(self.files),
-            "readings": without_nan([dict(zip(columns, row, strict=True)) for row in cells]),
-        }
+        rows = [dict(zip(columns, row, strict=True)) for row in cells]
+        return {"files": list(self.files), "readings": without_nan(rows)}
 
     def __repr__(self) -> str:
         return f"<Measurements {', '.join(self.files)}>"
@@ -130,13 +132,6 @@ class Measurements:
 
 
 Data = Measurements | str | Path | Sequence[str | Path]
-
-
-def columns_text(columns: Mapped) -> str | None:
-    """A mapping of columns as --columns has it."""
-    if columns is None or isinstance(columns, str):
-        return columns
-    return ", ".join(f"{ours}={theirs}" for ours, theirs in columns.items())
 
 
 def measurements_from(data: Data, columns: Mapped = None) -> Measurements:
@@ -178,12 +173,8 @@ class Question:
     @property
     def common(self) -> dict[str, Any]:
         """What every function below takes by these names."""
-        return {
-            "noise": self.noise,
-            "strut_spread": self.strut_spread,
-            "effect_files": self.on.effect_files,
-            "seed": self.seed,
-        }
+        common = {"noise": self.noise, "strut_spread": self.strut_spread, "seed": self.seed}
+        return {**common, "effect_files": self.on.effect_files}
 
 
 def _percents(text: str) -> float | tuple[float, ...]:

@@ -105,9 +105,14 @@ def place(
     earlier
         That search as its result, its document or the file `placement.json`.
     origin_mm_deg
-        The present placement; unless given, as `analyze` takes it.
-    load, step_mm, force_N
-        As of `analyze`.
+        The present placement, X, Y, Z or X, Y, Z, A, B, C of program zero; unless given, where the program's G10 says,
+        else the machine's default.
+    load
+        Direction of the load: tangential, axial, normal, softest, radial, x, y, z or "DX,DY,DZ".
+    step_mm
+        Largest distance of two samples.
+    force_N
+        Size of the load: for deflections, and for effects that depend on it.
     write
         The program itself, transformed so that, run at the present origin, it cuts at the placement: name of its file.
     decimals

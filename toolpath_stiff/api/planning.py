@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Annotated
 
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.api.measurements import Data, NoisePercent, Question, Seed, StrutSpread
+from toolpath_stiff.api.measurements import COMMON, Data, NoisePercent, Question, Seed, StrutSpread
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import options
-from toolpath_stiff.options import Option, checked, distinct_numbers, finite_number, names
+from toolpath_stiff.options import Option, checked, distinct_numbers, finite_number, names, words_of
 from toolpath_stiff.planning.menu import Costs
 from toolpath_stiff.planning.result import Plan, usual_menu
 from toolpath_stiff.planning.result import plan as plan_visits
@@ -94,21 +93,13 @@ def plan(
     >>> list(found.files(plots=False)), len(found.rows) == len(found.to_frame())
     (['plan.csv', 'plan.json', 'plan_tables.npz'], True)
     """
+    line = words_of(plan, {name: value for name, value in locals().items() if name not in COMMON})
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     minutes = {name: float(value) for name, value in (minutes or {}).items()}
     for name, value in minutes.items():
         one_of("minutes", name, COSTS)
         if not value >= 0.0:
             raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
-    line = question.request.command(
-        "plan",
-        *options(
-            between=_word(between or None), n=n, radius=_word(radius_mm), heights=_word(heights_mm),
-            max_tilt=_word(max_tilt_deg), loads=_word(loads_N), tools=_word(tool_extensions_mm), setups=_word(setups),
-            cost=[f"{name}={_word(value)}" for name, value in minutes.items()], seed=seed or None,
-            indicators=indicators,
-        ),
-    )  # fmt: skip
     readings = None if question.data is None else question.readings
     menu = usual_menu(readings).with_options(
         radius=None if radius_mm is None else m_from_mm(radius_mm),
@@ -124,7 +115,7 @@ def plan(
     proposal = plan_visits(
         question.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **question.common
     )
-    return replace(proposal, names=question.files, line=line, inputs=question.inputs)
+    return replace(proposal, names=question.files, line=question.request.command("plan", *line), inputs=question.inputs)
 
 
 def _cost(text: str) -> tuple[str, float]:
@@ -135,12 +126,3 @@ def _cost(text: str) -> tuple[str, float]:
 
 def _in_metres(values_mm: Sequence[float] | None) -> tuple[float, ...] | None:
     return None if values_mm is None else tuple(m_from_mm(float(value)) for value in values_mm)
-
-
-def _word(value: object) -> str | None:
-    """A value as an option takes it: a number as it is typed, several with commas."""
-    if value is None:
-        return None
-    if isinstance(value, list | tuple):
-        return ",".join(str(_word(part)) for part in value)
-    return f"{value:.10g}" if isinstance(value, int | float) else str(value)

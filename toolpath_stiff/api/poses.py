@@ -38,7 +38,7 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
     Raises
     ------
     InputError, InputErrors
-        A column is missing, there is no row; every cell that is no number within reason.
+        There is no row; every row that is no pose within reason.
 
     Examples
     --------
@@ -53,32 +53,20 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
     """
     name = str(file)
     table = read_table(name, "poses", Columns(POSE_COLUMNS))
-    missing = [column for column in POSE_COLUMNS[:3] if column not in table.heading]
-    if missing:
-        raise InputError(
-            f"column {missing[0]} is missing (found {', '.join(table.heading)})",
-            expected=", ".join(POSE_COLUMNS[:3]),
-            file=name,
-            line=table.heading_line,
-        )
-    if not table.rows:
-        raise InputError("no poses", expected=f"rows below the heading ({','.join(POSE_COLUMNS)})", file=name)
-    columns = [(i, table.heading.index(c), c) for i, c in enumerate(POSE_COLUMNS) if c in table.heading]
-    poses, errors = np.zeros((len(table.rows), 6)), []
-    for row, (line, cells) in enumerate(table.rows):
-        for i, place, column in columns:
-            text = cells[place] if place < len(cells) else ""
-            try:
-                value = float(text)
-            except ValueError:
-                value = np.nan
-            if abs(value) <= FARTHEST:
-                poses[row, i] = value
-            else:
-                expected = f"a number within +-{FARTHEST:g}"
-                errors.append(InputError(f"row {row + 1}, {column}: {text!r}", expected=expected, file=name, line=line))
+    expected = f"numbers within +-{FARTHEST:g}: {', '.join(POSE_COLUMNS[:3])}, and angles or none"
+    poses, errors = np.zeros((len(table.rows), len(POSE_COLUMNS))), []
+    for pose, (line, cells) in zip(poses, table.rows, strict=True):
+        row = {**dict.fromkeys(POSE_COLUMNS[3:], "0"), **dict(zip(table.heading, cells, strict=False))}
+        try:
+            pose[:] = [float(row[column]) for column in POSE_COLUMNS]
+        except (KeyError, ValueError):
+            pose[:] = np.nan
+        if not (np.abs(pose) <= FARTHEST).all():
+            errors.append(InputError(f"pose {', '.join(cells)}", expected=expected, file=name, line=line))
     if errors:
         raise InputErrors(errors)
+    if not len(poses):
+        raise InputError("no poses", expected=f"rows below the heading ({','.join(POSE_COLUMNS)})", file=name)
     return poses, tuple(table.notes)
 
 

@@ -17,7 +17,7 @@ from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
-from toolpath_stiff.nc.request import ZERO, Request
+from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.options import Option, arguments_of, checked
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
@@ -25,39 +25,9 @@ from toolpath_stiff.path.table import SampledPath
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, n_per_m_from_n_per_mm
 
-RequiredStiffness = Annotated[
-    float | None,
-    Option(
-        "--require",
-        "N/mm",
-        above=0,
-        at_most=1e7,
-        help="Stiffness that every cutting move must have; those below are listed (exit code 3).",
-    ),
-]
-Partial = Annotated[
-    bool, Option("--partial", help="Keep the reachable samples of a program that leaves the workspace (exit code 1).")
-]
-Compared = Annotated[
-    Machine | str | Path | None, Option("--compare", "MACHINE", help="Another machine to analyze the program on.")
-]
-Jobs = Annotated[
-    int | None,
-    Option(
-        "--jobs",
-        at_least=1,
-        help="Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for "
-        "each available CPU.",
-    ),
-]
-Table = Annotated[str, Option("--format", choices=("csv", "parquet"), help="Format of the samples.")]
-ShowPlunges = Annotated[
-    bool,
-    Option(
-        "--show-plunges",
-        help="Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).",
-    ),
-]
+Jobs = Annotated[int | None, Option("--jobs", at_least=1)]
+Table = Annotated[str, Option("--format", choices=("csv", "parquet"))]
+ShowPlunges = Annotated[bool, Option("--show-plunges")]
 
 
 @checked
@@ -69,9 +39,9 @@ def analyze(
     load: LoadDirection = LOAD,
     step_mm: Step = 1.0,
     force_N: Force = FORCE,
-    partial: Partial = False,
-    require_N_per_mm: RequiredStiffness = None,
-    compare_with: Compared = None,
+    partial: Annotated[bool, Option("--partial")] = False,
+    require_N_per_mm: Annotated[float | None, Option("--require", "N/mm", above=0, at_most=1e7)] = None,
+    compare_with: Annotated[Machine | str | Path | None, Option("--compare", "MACHINE")] = None,
     progress: Progress | None = None,
 ) -> Analysis:
     r"""Stiffness along the path of a program.
@@ -90,9 +60,9 @@ def analyze(
     force_N
         Size of the load: for deflections, and for effects that depend on it.
     partial
-        Keep the reachable samples of a program that leaves the workspace.
+        Keep the reachable samples of a program that leaves the workspace (exit code 1).
     require_N_per_mm
-        Stiffness that every cut must have; `below_required` lists those that have not.
+        Stiffness that every cutting move must have; those below are listed (exit code 3).
     compare_with
         Another machine to analyze the program on.
     progress
@@ -220,12 +190,10 @@ def check(
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
     hexapod = None if on is None else on.model.machine
-    request = Request(
-        part.lines,
-        part.name,
+    request = replace(
+        part.request,
+        lines=part.lines,
         origin=origin_si(origin_mm_deg),
         default_origin=ZERO if hexapod is None else hexapod.default_origin,
-        controller=part.controller,
-        **part.options,
     )
     return check_program(request, hexapod, m_from_mm(step_mm), speed)

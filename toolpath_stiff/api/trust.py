@@ -39,8 +39,3 @@ def agree(content: bytes, name: str) -> None:
     Raises `InputError` where the configuration folder cannot be written.
     """
     write_atomically(_record(content), f"{name}\n")
-
-
-def withdraw(content: bytes) -> None:
-    """Forget it again."""
-    _record(content).unlink(missing_ok=True)

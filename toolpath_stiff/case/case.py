@@ -13,16 +13,16 @@ The state is what the steps up to `done` have made of it; undo and redo move `do
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 from toolpath_stiff.api.inputs import finite, pose_si
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.measurements import Measurements
 from toolpath_stiff.api.programs import analyze
-from toolpath_stiff.api.trust import agree, withdraw
+from toolpath_stiff.api.trust import agree
 from toolpath_stiff.case.contents import reading_arguments
 from toolpath_stiff.case.exercise import BlindExercise
 from toolpath_stiff.case.files import (
@@ -37,21 +37,21 @@ from toolpath_stiff.case.files import (
     write_files,
 )
 from toolpath_stiff.case.history import recorded
-from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES, read_case
+from toolpath_stiff.case.reading import read_case
+from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES
+from toolpath_stiff.correction.draft import EffectDraft
 from toolpath_stiff.defaults import MACHINE
-from toolpath_stiff.errors import FileError, InputError, TpsError
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.documents import Document
+from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.files import read_bytes, writing_errors
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import arguments_of
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress
-from toolpath_stiff.stiffness.catalogue import find_effect
+from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.parameters import read_parameters
-
-if TYPE_CHECKING:
-    from toolpath_stiff.correction.draft import EffectDraft
 
 
 class Case(BlindExercise):
@@ -87,8 +87,7 @@ class Case(BlindExercise):
     def open(cls, folder: str | Path, machine: str | Path = MACHINE, trust: Iterable[str] = ()) -> Case:
         """Open a case, or begin one in a folder that has none.
 
-        Files of own effects that came with a case from elsewhere are code, and are run once you have agreed to them:
-        until then the case works without them, and `not_agreed` names them.
+        Files of own effects that came with a case from elsewhere are code: it opens once you have agreed to run them.
 
         Parameters
         ----------
@@ -97,13 +96,14 @@ class Case(BlindExercise):
         machine
             Of a new case: name or file.
         trust
-            Files of own effects of the case that you have read and agree to run, as of the method `trust`.
+            Files of own effects of the case (their names there) that you have read and agree to run. The agreement is
+            kept in your configuration folder: it holds for files of the same content in any case.
 
         Raises
         ------
         InputError
-            case.toml is no case, a file of the case is missing or was changed by another program, or it has no file
-            that `trust` names.
+            case.toml is no case, a file of the case is missing or was changed by another program, or holds code that
+            you have not agreed to run.
 
         Examples
         --------
@@ -116,23 +116,26 @@ class Case(BlindExercise):
         (<Machine genhexkins: 6 struts, no effects>, 1)
         """
         place = Path(folder)
-        try:
+        with writing_errors(folder, "open the case"):  # a name that is too long, a circle of links
             there = (place / CASE_FILE).is_file()
-        except OSError as error:  # a name that is too long, a circle of links
-            raise FileError(f"cannot open the case {str(folder)!r}: {error.strerror}") from None
-        if there:
-            case = cls(place, *read_case(place / CASE_FILE))
-            case.check_files()
-        else:
+        if not there:
             case = cls(place, [], 0, "")
             case.set_machine(machine)
-        if trust := tuple(trust):
-            case.trust(*trust)
+            return case
+        case = cls(place, *read_case(place / CASE_FILE))
+        case.check_files()
+        for name in trust:
+            if name not in case.state.effects:
+                raise InputError(
+                    f"{name!r} is no file of own effects of this case", expected=", ".join(case.state.effects)
+                )
+            known_effects([case.path(name)])  # raises where it cannot be used
+            agree((place / name).read_bytes(), name)
+        case.effect_files  # noqa: B018  (raises for one that is not agreed to)
         return case
 
     def __repr__(self) -> str:
-        off = f", without {', '.join(self.not_agreed)}: not agreed to" if self.not_agreed else ""
-        return f"<Case {self.folder.name}: {self._done} steps{off}>"
+        return f"<Case {self.folder.name}: {self._done} steps>"
 
     @recorded
     def set_machine(self, machine: str | Path) -> None:
@@ -152,7 +155,7 @@ class Case(BlindExercise):
         name = free_name(self.folder, f"machines/{Path(machine).stem}.toml")
         write_files(self.folder, {name: text})
         try:
-            Machine.load(self.path(name), effects=[self.path(file) for file in self.state.effects])
+            self.machine_of(name)
         except TpsError:
             drop(self.folder, name)
             raise
@@ -160,50 +163,15 @@ class Case(BlindExercise):
         self.record(
             "machine",
             f"machine {Path(machine).name}",
+            command_line("machine", "check", name),
             change={"machine": name, "on": {}},
             files=[name],
-            command=command_line("machine", "check", name),
             python="" if self.history else begun,
         )
 
-    def trust(self, *names: str) -> None:
-        """Agree to run these files of own effects of the case (their names there), as they are now; read them before.
-
-        The agreement is this user's, and kept in their configuration folder: it holds for files of the same content in
-        any case. Raises `InputError` for a file that the case has not, or that cannot be used, which stays unused.
-
-        Examples
-        --------
-        >>> import pathlib, tempfile
-        >>> import toolpath_stiff as tps
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     case = tps.Case.open(folder)
-        ...     case.add_effects(tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py")))
-        ...     case.trust("effects/my_screw.py")  # agreed to already, by adding it
-        ...     case.not_agreed, case.state == case.recorded
-        ((), True)
-        """
-        self.check_files()
-        for name in names:
-            if name not in self.recorded.effects:
-                expected = ", ".join(self.not_agreed) or "none is left"
-                raise InputError(f"{name!r} is no file of own effects of this case", expected=expected)
-            if name in self.not_agreed:
-                self._agree(name)
-
-    def _agree(self, name: str) -> None:
-        """Run a file of the case from now on; not if the machine cannot be built with it."""
-        content = (self.folder / name).read_bytes()
-        agree(content, name)
-        try:
-            self.machine  # noqa: B018
-        except TpsError:
-            withdraw(content)
-            raise
-
     @recorded
     def add_effects(self, file: str | Path) -> None:
-        """Use a Python file with effects of one's own. Its code is run: to add it is to agree to that, as of `trust`.
+        """Use a Python file with effects of one's own. Its code is run: to add it is to agree to that.
 
         Examples
         --------
@@ -213,8 +181,8 @@ class Case(BlindExercise):
         ...     case = tps.Case.open(folder)
         ...     case.add_effects(tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py")))
         ...     case.change_effects("effects/my_screw.py", pathlib.Path(folder, "my_screw.py"))
-        ...     case.state.effects
-        ('effects/my_screw-2.py',)
+        ...     case.state.effects, len(case.effect_files)
+        (('effects/my_screw-2.py',), 1)
         """
         name = copied(self.folder, file, "effects")
         self._take_effects(name, "", f"own effects of {Path(file).name}")
@@ -229,20 +197,18 @@ class Case(BlindExercise):
 
     def _take_effects(self, new: str, old: str, text: str) -> None:
         """Put a file of the case among the effects, in place of `old` if there is one; drop it where it is at fault."""
-        state, recorded = self.state, self.recorded
-        files = [*(file for file in state.effects if file != old), new]
+        state = self.state
+        files = (*(file for file in state.effects if file != old), new)
+        paths = [self.path(file) for file in files]
         try:
-            Machine.load(self.path(state.machine), effects=[self.path(file) for file in files])
-            agree((self.folder / new).read_bytes(), new)
+            Machine.load(self.path(state.machine), effects=paths)
         except TpsError:
             drop(self.folder, new)
             raise
-        lost = set(state.on) - set(self._known(state.on, files)) if old else set()
-        change = {
-            "effects": (*(file for file in recorded.effects if file != old), new),
-            "on": {name: keys for name, keys in recorded.on.items() if name not in lost},
-        }
-        self.record("effects", text, change=change, files=[new], command=command_line("effects", "check", new))
+        agree((self.folder / new).read_bytes(), new)
+        on = {name: keys for name, keys in state.on.items() if name in known_effects(paths)}
+        line = command_line("effects", "check", new)
+        self.record("effects", text, line, change={"effects": files, "on": on}, files=[new])
 
     @recorded
     def add_data(self, *files: str | Path) -> None:
@@ -266,7 +232,7 @@ class Case(BlindExercise):
             drop(self.folder, *names)
             raise
         text = f"{', '.join(Path(file).name for file in files)} added: {counted(count, 'reading')} in all"
-        self.record("data", text, change={"data": after}, files=names, command=self._line("compare", after))
+        self.record("data", text, self.question("compare", files=after), change={"data": after}, files=names)
 
     @recorded
     def set_aside(self, file: str, line: int, back: bool = False) -> None:
@@ -277,15 +243,24 @@ class Case(BlindExercise):
         aside = tuple(other for other in state.aside if other != entry) if back else (*state.aside, entry)
         lines = replace(state, aside=aside).lines_aside.get(file, [])
         write_files(self.folder, {used_name(file): without_lines(self.folder / file, lines)})
-        if not back:
-            self._check_aside(file, line)
+        left = self._lines(used_name(file))
+        if not back and (not left or line in left or line not in self._lines(file)):
+            self._rewrite_used(state)
+            raise InputError(f"{file} line {line} cannot be left out by itself")
         words = " ".join(f"-e '{number}s/^/# /'" for number in lines)
-        command = f"sed {words} {file} > {used_name(file)}" if words else self._line("compare", state.data)
+        command = f"sed {words} {file} > {used_name(file)}" if words else self.question("compare", files=state.data)
         text = f"{file} line {line} {'used again' if back else 'set aside'}"
-        self.record("aside", text, change={"aside": aside}, command=command)
+        self.record("aside", text, command, change={"aside": aside})
+
+    def _lines(self, file: str) -> set[int]:
+        """The lines of the readings of a file; none where it cannot be read."""
+        try:
+            return set(Measurements([self.path(file)]).on(self.machine).line.tolist())
+        except TpsError:
+            return set()
 
     @recorded
-    def switch(self, effect: str, values: Mapping[str, Any] | None) -> None:
+    def switch(self, effect: str, values: Document | None) -> None:
         """Switch an effect on with these values (keys as in a machine file), or off with None.
 
         Raises `InputError` for an effect that is unknown or in the machine, and for values that it cannot have.
@@ -300,22 +275,25 @@ class Case(BlindExercise):
         ...     case.state.on
         {'weak_strut': {'strut': 4, 'factor': 0.8}}
         """
-        self._check_effect(effect, values or {}, values is not None)
-        on = {name: dict(keys) for name, keys in self.recorded.on.items() if name != effect}
+        found = find_effect(effect, self.effect_files)
+        on = {name: dict(keys) for name, keys in self.state.on.items() if name != effect}
         if values is not None:
+            read_parameters(found, EffectEntry(effect, dict(values)), "by hand")
+            if effect in self.machine.effects:
+                raise InputError(f"{effect} is in the machine already")
             on[effect] = dict(values)
-        acting, name = self._known(on, self.state.effects), self.state.machine
-        if acting:
+        name = self.state.machine
+        if on:
             name = free_name(self.folder, "machines/by-hand.toml")
-            self.machine_with(acting).save(self.folder / name)
+            self.machine_with(on).save(self.folder / name)
         sizes = ", ".join(f"{key} {_short(value)}" for key, value in (values or {}).items())
         command = self.question("compare", name) if self.state.data else command_line("machine", "check", name)
         self.record(
             "switch",
             f"{effect} off" if values is None else f"{effect} on: {sizes}",
+            command,
             change={"on": on},
-            files=[name] if name != self.state.machine else [],
-            command=command,
+            files=[name] if on else [],
         )
 
     @recorded
@@ -335,13 +313,8 @@ class Case(BlindExercise):
         name = free_name(self.folder, f"machines/{Path(self.state.machine).stem.removesuffix('-updated')}-updated.toml")
         write_files(self.folder, {name: read_bytes(file, "the machine file")})
         command = next((step.command for step in reversed(self.history) if step.kind == "update"), "")
-        self.record(
-            "accept",
-            f"goes on with {name}",
-            change={"machine": name, "on": {}},
-            files=[name],
-            command=f"{command} -o {name}" if command else "",
-        )
+        command = f"{command} -o {name}" if command else ""
+        self.record("accept", f"goes on with {name}", command, change={"machine": name, "on": {}}, files=[name])
 
     @recorded
     def add_program(self, file: str | Path, **reading: Unpack[Reading]) -> None:
@@ -388,7 +361,7 @@ class Case(BlindExercise):
         text = ", ".join(f"{TABLES.get(name, name)} {Path(str(value)).name}" for name, value in reading.items())
         self._take_program(self.state.program, reading, [], "reading", f"programs are read with {text}")
 
-    def _take_program(self, program: str, given: Mapping[str, Any], files: list[str], kind: str, text: str) -> None:
+    def _take_program(self, program: str, given: Document, files: list[str], kind: str, text: str) -> None:
         """Read a program of the case with what it has and what is given; drop the files where it cannot be read."""
         state, reading = self.state, dict(self.state.reading)
         try:
@@ -412,7 +385,7 @@ class Case(BlindExercise):
         change: dict[str, Any] = {"reading": reading} if reading != state.reading else {}
         if program != state.program:
             change |= {"program": program, "origin": ()}
-        self.record(kind, text, change=change, files=files, command=self.program_line(change=change))
+        self.record(kind, text, self.program_line(change=change), change=change, files=files)
 
     @recorded
     def place_at(self, origin_mm_deg: Sequence[float]) -> None:
@@ -421,7 +394,7 @@ class Case(BlindExercise):
         origin = tuple(round(float(value), 6) for value in origin_mm_deg)
         word = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", origin, strict=False))
         change = {"origin": origin}
-        self.record("place_at", f"program zero at {word}", change=change, command=self.program_line(change=change))
+        self.record("place_at", f"program zero at {word}", self.program_line(change=change), change=change)
 
     @recorded
     def require(self, stiffness_N_per_mm: float) -> None:
@@ -430,7 +403,7 @@ class Case(BlindExercise):
         if required:
             arguments_of(analyze)["require_N_per_mm"].check(required)
         change = {"require": required}
-        self.record("require", f"{required:g} N/mm required", change=change, command=self.program_line(change=change))
+        self.record("require", f"{required:g} N/mm required", self.program_line(change=change), change=change)
 
     @recorded
     def draft(self, progress: Progress | None = None) -> EffectDraft:
@@ -438,31 +411,10 @@ class Case(BlindExercise):
 
         It competes like an effect of one's own; without new readings it is `described` at best.
         """
-        result = self.next_result("draft")
-        draft, command = self._draft(result, progress)
-        self.record("draft", draft._short(), command=command, result=result)
+        draft = self._step("draft", EffectDraft, progress)
         if draft.text:
-            self.add_effects(self.folder / result / f"{draft.name}.toml")
+            self.add_effects(self.folder / self.latest("draft") / f"{draft.name}.toml")
         return draft
-
-    def _check_effect(self, name: str, values: Mapping[str, Any], on: bool) -> None:
-        effect = find_effect(name, [self.path(file) for file in self.state.effects])
-        if on:
-            read_parameters(effect, EffectEntry(name, dict(values)), "by hand")
-            if name in self.machine.effects:
-                raise InputError(f"{name} is in the machine already")
-
-    def _check_aside(self, file: str, line: int) -> None:
-        machine = self.machine
-        try:
-            before = Measurements([self.path(file)]).on(machine)
-            after = Measurements([self.path(used_name(file))]).on(machine)
-            good = len(before) - len(after) >= 1 and line not in set(after.line.tolist())
-        except TpsError:
-            good = False
-        if not good:
-            self._rewrite_used()
-            raise InputError(f"{file} line {line} cannot be left out by itself")
 
 
 def _short(value: Any) -> str:

@@ -8,26 +8,25 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
 
+import toolpath_stiff as tps
 from toolpath_stiff.api.by_hand import Preview, preview, with_effects
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.measurements import Measurements
+from toolpath_stiff.api.trust import is_agreed
 from toolpath_stiff.case.files import used_name
 from toolpath_stiff.case.history import History
 from toolpath_stiff.case.steps import TABLES
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import command_line, options
-from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.program import Program, Reading
-from toolpath_stiff.stiffness.catalogue import known_effects
-from toolpath_stiff.stiffness.model import Idle, build_model
+from toolpath_stiff.options import words_of
 
-NOT_AGREED = "its code is not run, as you have not agreed to it"
-
-
-NO_CHANGE: Mapping[str, Any] = MappingProxyType({})
+NO_CHANGE: Document = MappingProxyType({})
 
 
-def reading_arguments(folder: Path, reading: Mapping[str, Any]) -> Reading:
+def reading_arguments(folder: Path, reading: Document) -> Reading:
     """The same as arguments of `Program.read`."""
     given = {name: str(folder / value) if name in TABLES else value for name, value in reading.items()}
     if isinstance(switches := given.get("block_delete"), str):
@@ -41,12 +40,24 @@ class Contents(History):
     _preview: tuple[object, Preview] | None = None
 
     @property
+    def effect_files(self) -> tuple[str, ...]:
+        """The files of own effects; raises `InputError` for one whose code this user has not agreed to run."""
+        for name in self.state.effects:
+            file = self.folder / name
+            if not is_file(file) or not is_agreed(file.read_bytes()):
+                raise InputError(
+                    f"{file} is code that came with the case, and you have not agreed to run it",
+                    hint=f"read it, then `{command_line('studio', *options(case=self.folder, trust=name))}`",
+                )
+        return tuple(map(self.path, self.state.effects))
+
+    @property
     def machine(self) -> Machine:
         """The machine, effects of one's own included."""
         return self.machine_of(self.state.machine)
 
     def machine_of(self, file: str) -> Machine:
-        """A machine file of the case with the effects of one's own; those that are not agreed to are left out of it.
+        """A machine file of the case with the effects of one's own.
 
         Examples
         --------
@@ -57,15 +68,7 @@ class Contents(History):
         ...     case.machine_of(case.state.machine)
         <Machine nist: 6 struts, no effects>
         """
-        path, files = self.path(file), tuple(map(self.path, self.state.effects))
-        if not self.not_agreed:
-            return Machine.load(path, effects=files)
-        given, known = load_machine(path), known_effects(files)
-        acting, reading = (tuple(e for e in some if e.name in known) for some in (given.effects, given.instruments))
-        left = {e.name for e in (*given.effects, *given.instruments)} | set(self.recorded.on)
-        model = build_model(given.with_changes(effects=acting, instruments=reading), files)
-        withheld = tuple(Idle(name, NOT_AGREED, waiting=True) for name in sorted(left - set(known)))
-        return Machine(replace(model, withheld=withheld), path, files)
+        return Machine.load(self.path(file), effects=self.effect_files)
 
     @property
     def data_files(self) -> tuple[str, ...]:
@@ -89,7 +92,7 @@ class Contents(History):
             self._preview = (key, preview(self.data, self.machine))
         return self._preview[1]
 
-    def machine_with(self, on: Mapping[str, Mapping[str, Any]]) -> Machine:
+    def machine_with(self, on: Mapping[str, Document]) -> Machine:
         """The machine with effects of these sizes; where there are readings, the strut law is refitted beside them.
 
         Examples
@@ -100,11 +103,9 @@ class Contents(History):
         ...     tps.Case.open(folder).machine_with({"weak_strut": {"strut": 4, "factor": 0.8}})
         <Machine nist: 6 struts, weak_strut>
         """
-        machine = self.machine
         if not on:
-            return machine
-        changed = self.preview.machine(on) if self.state.data else with_effects(machine, on)
-        return replace(changed, model=replace(changed.model, withheld=machine.model.withheld))
+            return self.machine
+        return self.preview.machine(on) if self.state.data else with_effects(self.machine, on)
 
     @property
     def program(self) -> Program:
@@ -113,30 +114,23 @@ class Contents(History):
             raise InputError("this case has no program", hint="add one with add_program")
         return self._program(self.state.program, self.state.reading)
 
-    def _program(self, name: str, reading: Mapping[str, Any]) -> Program:
+    def _program(self, name: str, reading: Document) -> Program:
         return Program.read(self.path(name), **reading_arguments(self.folder, reading))
 
     def latest(self, kind: str) -> str:
         """Folder of the latest result of a kind among the steps that hold; "" without one."""
         return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
 
-    def question(self, name: str, machine: str = "", **given: Any) -> str:
-        """The command line that asks this of the readings in use."""
-        return self._line(name, self.data_files, machine, **given)
+    def question(self, name: str, machine: str = "", *words: str, files: Sequence[str] | None = None) -> str:
+        """The command line that asks this of the readings in use, or of these files."""
+        common = options(machine=machine or self.state.machine, effects=list(self.state.effects))
+        return command_line(*name.split(), *(self.data_files if files is None else files), *common, *words)
 
-    def program_line(
-        self, name: str = "analyze", machine: str = "", change: Mapping[str, Any] = NO_CHANGE, **given: Any
-    ) -> str:
+    def program_line(self, name: str = "analyze", machine: str = "", change: Document = NO_CHANGE, **given: Any) -> str:
         """The command line that asks this of the program, after a change of the state; "" without a program."""
         state = replace(self.state, **change)
-        if not state.program:
-            return ""
         if name == "analyze":
-            given |= {"partial": True, "require": f"{state.require:g}" if state.require else None}
-        origin = ",".join(f"{value:.10g}" for value in state.origin) or None
-        reading = options(**{name.removesuffix("_mm_per_min"): value for name, value in state.reading.items()})
-        return self._line(name, [state.program], machine, *reading, origin=origin, **given)
-
-    def _line(self, name: str, files: Sequence[str], machine: str = "", *last: str, **given: Any) -> str:
-        words = options(machine=machine or self.state.machine, **given, effects=list(self.state.effects))
-        return command_line(*name.split(), *files, *words, *last)
+            given |= {"partial": True, "require_N_per_mm": state.require or None}
+        given |= {"origin_mm_deg": state.origin or None}
+        words = [*words_of(Program.read, state.reading), *words_of(getattr(tps, name), given)]
+        return self.question(name, machine, *words, files=[state.program]) if state.program else ""

@@ -12,7 +12,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import json_text
-from toolpath_stiff.rig.exercise import blind_case, measure_again, new_exercise, reveal
+from toolpath_stiff.rig.exercise import blind_case, measured_again, new_exercise, reveal
 
 
 class BlindExercise(Findings):
@@ -36,9 +36,9 @@ class BlindExercise(Findings):
         self.record(
             "exercise",
             f"blind exercise, seed {seed}",
+            command_line("rig", "new", *drawn),
             change={"machine": machine, "data": (data,), "aside": (), "on": {}, "exercise": folder},
             files=[machine, data],
-            command=command_line("rig", "new", *drawn),
         )
 
     @recorded
@@ -46,15 +46,11 @@ class BlindExercise(Findings):
         """Measure the exercise's machine at the poses of a plan; the readings are added."""
         name = free_name(self.folder, "data/measured.csv")
         visit = 1 + sum(step.kind == "measure" for step in self.history)
-        (self.folder / "data").mkdir(exist_ok=True)
-        count = measure_again(self.folder / self._exercise(), str(plan_file), str(self.folder / name), visit)
-        self.record(
-            "measure",
-            f"{counted(count, 'reading')} measured",
-            change={"data": (*self.state.data, name)},
-            files=[name],
-            command=command_line("rig", "measure", self._exercise(), *options(at=plan_file, out=name, visit=visit)),
-        )
+        text, count = measured_again(self.folder / self._exercise(), str(plan_file), visit)
+        write_files(self.folder, {name: text})
+        line = command_line("rig", "measure", self._exercise(), *options(at=plan_file, out=name, visit=visit))
+        change = {"data": (*self.state.data, name)}
+        self.record("measure", f"{counted(count, 'reading')} measured", line, change=change, files=[name])
 
     @recorded
     def claim(self, effects: str) -> dict[str, Any]:
@@ -62,12 +58,8 @@ class BlindExercise(Findings):
         score = reveal(self.folder / self._exercise(), effects)
         result = self.next_result("reveal")
         write_files(self.folder, {f"{result}/reveal.json": json_text(score)})
-        self.record(
-            "reveal",
-            f"claimed {effects}: {score['verdict']}",
-            result=result,
-            command=command_line("rig", "reveal", self._exercise(), *options(claim=effects)),
-        )
+        line = command_line("rig", "reveal", self._exercise(), *options(claim=effects))
+        self.record("reveal", f"claimed {effects}: {score['verdict']}", line, result=result)
         return score
 
     def _exercise(self) -> str:

@@ -16,12 +16,7 @@ from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.readings.measurements import NIST_TABLE_1
 
 UNSAFE = re.compile(r"[^\w.+-]+", re.ASCII)
-
-
 LONGEST_NAME = 80
-
-
-ENTRY = re.compile(r".+:[0-9]{1,9}")  # a reading that was set aside: file and line
 
 
 def free_name(folder: Path, name: str) -> str:

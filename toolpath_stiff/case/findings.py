@@ -2,38 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar, cast
 
 import toolpath_stiff as tps
 from toolpath_stiff.case.contents import Contents
 from toolpath_stiff.case.files import write_files
 from toolpath_stiff.case.history import recorded
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.options import arguments_of, low_high
+from toolpath_stiff.hints import options
+from toolpath_stiff.options import words_of
 from toolpath_stiff.results import Progress
 
-if TYPE_CHECKING:
-    from toolpath_stiff.analysis.results import Analysis
-    from toolpath_stiff.comparison.compare import Comparison
-    from toolpath_stiff.correction.result import Update
-    from toolpath_stiff.diagnosis.result import Diagnosis
-    from toolpath_stiff.placement.result import Placement
-    from toolpath_stiff.planning.result import Plan
-
+Made = TypeVar("Made")
 PLACE = ("x_mm", "y_mm", "z_mm", "tilt_a_deg", "tilt_b_deg", "rotate_deg")  # as of an origin
-
-
-def words_of(function: Any, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of a function as a command takes them: option -> value."""
-    words = {}
-    for name, value in given.items():
-        option, ends = arguments_of(function)[name].option, value if isinstance(value, list | tuple) else [value]
-        word = ":".join(f"{end:.10g}" for end in ends) if option.read is low_high else value
-        words[option.name.split()[-1].lstrip("-")] = word
-    return words
 
 
 class Findings(Contents):
@@ -49,83 +33,67 @@ class Findings(Contents):
 
     def find(self, kind: str, result: str, progress: Progress | None = None, **given: Any) -> tuple[Any, str]:
         """A result of this kind, kept in a folder of the case without a step; and the command that gives it."""
-        if kind in ("analyze", "draft", "set_up"):
+        if kind in ("analyze", "draft", "set_up", "place"):
             kept, command = getattr(self, f"_{kind}")(result, progress, **given)
             return kept, command
-        if kind == "place":
-            bounds: dict[str, Any] = {
-                name: tuple(bound) if isinstance(bound, list) else bound for name, bound in given.items()
-            }
-            origin = self.state.origin or None
-            kept = tps.place(self.program, self.machine, origin_mm_deg=origin, progress=progress, **bounds)
-            command = self.program_line(kind, **words_of(tps.place, bounds))
-        elif kind == "plan":
-            kept = tps.plan(self.data if self.state.data else None, self.machine, **given)
-            command = self.question(kind, **given)
-        else:
-            named = {"machine_file": self.path(f"{result}/machine.toml")} if kind == "update" else {}
-            kept = getattr(tps, kind)(self.data, self.machine, progress=progress, **named, **given)
-            command = self.question(kind, **given)
+        watched = {} if kind == "plan" else {"progress": progress}
+        named = {"machine_file": self.path(f"{result}/machine.toml")} if kind == "update" else {}
+        data = self.data if self.state.data or kind != "plan" else None
+        kept = getattr(tps, kind)(data, self.machine, **watched, **named, **given)
         kept.save(self.folder / result, plots=self.plots)
-        return kept, command
+        return kept, self.question(kind, "", *words_of(getattr(tps, kind), given))
 
-    def _step(self, kind: str, progress: Progress | None = None, **given: Any) -> Any:
+    def _step(self, kind: str, of: type[Made], progress: Progress | None = None, **given: Any) -> Made:
+        """A result of this class as a step."""
         result = self.next_result(kind)
         kept, command = self.find(kind, result, progress, **given)
-        self.record(kind, kept._short(), command=command, result=result)
-        return kept
+        self.record(kind, kept._short(), command, result=result)
+        return cast("Made", kept)
 
     @recorded
-    def compare(self, progress: Progress | None = None) -> Comparison:
+    def compare(self, progress: Progress | None = None) -> tps.Comparison:
         """Where the model fails, as `tps.compare`; kept in results/."""
-        comparison: Comparison = self._step("compare", progress)
-        return comparison
+        return self._step("compare", tps.Comparison, progress)
 
     @recorded
-    def diagnose(self, progress: Progress | None = None) -> Diagnosis:
+    def diagnose(self, progress: Progress | None = None) -> tps.Diagnosis:
         """Which effect is missing, as `tps.diagnose`; kept in results/."""
-        diagnosis: Diagnosis = self._step("diagnose", progress)
-        return diagnosis
+        return self._step("diagnose", tps.Diagnosis, progress)
 
     @recorded
-    def update(self, add: str | Iterable[str], progress: Progress | None = None) -> Update:
+    def update(self, add: str | Iterable[str], progress: Progress | None = None) -> tps.Update:
         """Fit effects, as `tps.update`; kept in results/, where `accept` takes machine.toml from."""
-        update: Update = self._step("update", progress, add=[add] if isinstance(add, str) else list(add))
-        return update
+        return self._step("update", tps.Update, progress, add=[add] if isinstance(add, str) else list(add))
 
     @recorded
-    def plan(self, n: int = 6) -> Plan:
+    def plan(self, n: int = 6) -> tps.Plan:
         """What to measure next, as `tps.plan`; kept in results/, plan.csv among it."""
-        plan: Plan = self._step("plan", n=n)
-        return plan
+        return self._step("plan", tps.Plan, n=n)
 
     @recorded
-    def analyze(self, machine: str = "", progress: Progress | None = None) -> Analysis:
+    def analyze(self, machine: str = "", progress: Progress | None = None) -> tps.Analysis:
         """The program on the machine with the effects that are switched on, as `tps.analyze`; kept in results/.
 
         `machine`: a file of the case in place of that, such as an update's.
         """
-        analysis: Analysis = self._step("analyze", progress, machine=machine)
-        return analysis
+        return self._step("analyze", tps.Analysis, progress, machine=machine)
 
     @recorded
-    def place(self, progress: Progress | None = None, **bounds: Any) -> Placement:
+    def place(self, progress: Progress | None = None, **bounds: Any) -> tps.Placement:
         """Where the work should sit, as `tps.place`; kept in results/."""
-        placement: Placement = self._step("place", progress, **bounds)
-        return placement
+        return self._step("place", tps.Placement, progress, **bounds)
 
     @recorded
-    def set_up(self, progress: Progress | None = None) -> Placement:
+    def set_up(self, progress: Progress | None = None) -> tps.Placement:
         """The program where it sits now, for the shop floor: offsets, set-up sheet and the program written for it.
 
         As `tps.place` with every bound fixed there; figures and warnings are against where the program sat at first.
         Kept in results/ with its pictures. A program that cannot be written for the place is not; not_written.txt says
         why.
         """
-        placement: Placement = self._step("set_up", progress)
-        return placement
+        return self._step("set_up", tps.Placement, progress)
 
-    def _analyze(self, result: str, progress: Progress | None, machine: str = "") -> tuple[Analysis, str]:
+    def _analyze(self, result: str, progress: Progress | None, machine: str = "") -> tuple[tps.Analysis, str]:
         state = self.state
         on = self.machine_of(machine) if machine else self.machine_with(state.on)
         analysis = tps.analyze(
@@ -138,29 +106,34 @@ class Findings(Contents):
             on.save(self.folder / machine)
         return analysis, self.program_line(machine=machine)
 
-    def _set_up(self, result: str, progress: Progress | None) -> tuple[Placement, str]:
+    def _place(self, result: str, progress: Progress | None, **bounds: Any) -> tuple[tps.Placement, str]:
+        origin = self.state.origin or None
+        placement = tps.place(self.program, self.machine, origin_mm_deg=origin, progress=progress, **bounds)
+        placement.save(self.folder / result, plots=self.plots)
+        return placement, self.program_line("place", **bounds)
+
+    def _set_up(self, result: str, progress: Progress | None) -> tuple[tps.Placement, str]:
         state = self.state
         if len(state.origin) < 3:
             raise InputError("the program sits where it always did", hint="put it somewhere with place_at first")
         place: dict[str, Any] = dict(zip(PLACE, (*state.origin, 0.0, 0.0, 0.0), strict=False))
-        name, written = Path(state.program).name, ""
+        name, written = Path(state.program).name, {}
         try:
             placement = tps.place(self.program, self.machine, write=name, progress=progress, **place)
-            beside, written = {name: placement.program_bytes}, f"{result}/{name}"
+            beside, written = {name: placement.program_bytes}, {"write": f"{result}/{name}"}
         except InputError as error:
             placement = tps.place(self.program, self.machine, progress=progress, **place)
             beside = {"not_written.txt": f"{error}\n".encode()}
         placement.save(self.folder / result)
         write_files(self.folder / result, beside)
-        words = {**words_of(tps.place, place), "out": result, "write": written or None}
-        return placement, self.program_line("place", change={"origin": ()}, **words)
+        line = self.program_line("place", change={"origin": ()}, **place, **written)
+        return placement, " ".join([line, *options(out=result)])
 
     def _draft(self, result: str, progress: Progress | None) -> tuple[tps.EffectDraft, str]:
-        taken = {effect.name for effect in tps.effects(map(self.path, self.state.effects)).effects}
+        taken = {effect.name for effect in tps.effects(self.effect_files).effects}
         name = next(name for n in count(1) if (name := f"missing_{n}" if n > 1 else "missing") not in taken)
         file = f"{result}/{name}.toml"
         draft = tps.draft_effect(self.data, self.machine, file, progress=progress)
-        (self.folder / result).mkdir(parents=True, exist_ok=True)
         if draft.text:
-            draft.save(self.folder / file)
-        return draft, self.question("effects draft", out=file)
+            write_files(self.folder, {file: draft.text})
+        return draft, self.question("effects draft", "", *options(output=file))

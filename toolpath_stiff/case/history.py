@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from toolpath_stiff.api.effects import effects
-from toolpath_stiff.api.trust import is_agreed
-from toolpath_stiff.case.files import (
-    free_name,
-    sha256,
-    used_name,
-    without_lines,
-    write_files,
-)
+from toolpath_stiff.case.files import free_name, sha256, used_name, without_lines, write_files
 from toolpath_stiff.case.steps import CASE_FILE, TABLES, CaseState, Step, case_text
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import is_file, write_atomically
+from toolpath_stiff.files import write_atomically
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
-def python_line(name: str, positional: Sequence[Any], named: Mapping[str, Any]) -> str:
+def python_line(name: str, positional: Sequence[Any], named: Document) -> str:
     """A call of a method of the case; without what only watches it."""
-    shown = [_python(value) for value in positional if not callable(value)]
-    shown += [f"{key}={_python(value)}" for key, value in named.items() if not callable(value) and key != "progress"]
+    words = {"": positional, **{f"{key}=": [value] for key, value in named.items() if key != "progress"}}
+    shown = [
+        f"{key}{str(value) if isinstance(value, Path) else value!r}"
+        for key, values in words.items()
+        for value in values
+        if not callable(value)
+    ]
     return f"case.{name}({', '.join(shown)})"
-
-
-def _python(value: Any) -> str:
-    return repr(str(value) if isinstance(value, Path) else value)
 
 
 def recorded(method: Method) -> Method:
@@ -77,32 +71,12 @@ class History:
         return self._steps[self._done :]
 
     @property
-    def recorded(self) -> CaseState:
-        """What holds now as the steps say it."""
+    def state(self) -> CaseState:
+        """What holds now."""
         state = CaseState()
         for step in self.history:
             state = replace(state, **step.change)
         return state
-
-    @property
-    def state(self) -> CaseState:
-        """What holds now: without the files of own effects that this user has not agreed to run, and their effects."""
-        state, off = self.recorded, self.not_agreed
-        if not off:
-            return state
-        kept = tuple(name for name in state.effects if name not in off)
-        return replace(state, effects=kept, on=self._known(state.on, kept))
-
-    def _known(self, on: Mapping[str, Mapping[str, Any]], files: Iterable[str]) -> dict[str, Mapping[str, Any]]:
-        """Those of the effects that are known with these files of own ones."""
-        known = {effect.name for effect in effects([self.path(name) for name in files]).effects}
-        return {name: keys for name, keys in on.items() if name in known}
-
-    @property
-    def not_agreed(self) -> tuple[str, ...]:
-        """The files of own effects whose code is not run: this user has not agreed to what they hold; see `trust`."""
-        files = {name: self.folder / name for name in self.recorded.effects}
-        return tuple(name for name, file in files.items() if not is_file(file) or not is_agreed(file.read_bytes()))
 
     def path(self, name: str) -> str:
         """A file of the case, as functions and commands take it."""
@@ -130,10 +104,10 @@ class History:
         self,
         kind: str,
         text: str,
-        *,
-        change: Mapping[str, Any] | None = None,
-        files: Sequence[str] = (),
         command: str = "",
+        *,
+        change: Document | None = None,
+        files: Sequence[str] = (),
         python: str = "",
         result: str = "",
     ) -> None:
@@ -147,7 +121,6 @@ class History:
         step = Step(kind, text, command, python, dict(change or {}), sums, result)
         self._steps = [*self.history, step, *(() if change else self.undone)]
         self._done += 1
-        self._rewrite_used()
         self._save()
 
     def next_result(self, kind: str) -> str:
@@ -156,18 +129,18 @@ class History:
 
     def check_files(self) -> None:
         """Raise `InputError` for a file of the case that is gone, or is not what its step wrote."""
-        state = self.recorded
+        state = self.state
         tables = {str(state.reading[name]) for name in TABLES if name in state.reading}
-        needed = {state.machine, state.program, *state.effects, *state.data, *tables} - {""}
-        for name, known in {n: s for step in self.history for n, s in step.files.items()}.items():
+        needed = {state.machine, state.program, *state.effects, *state.data, *tables}
+        for name, known in {name: known for step in self.history for name, known in step.files.items()}.items():
             file = self.folder / name
             if name in needed and (not file.is_file() or sha256(file.read_bytes()) != known):
                 what = "is not what was put into the case" if file.is_file() else "is gone"
                 raise InputError(f"{name} {what}", hint="bring the file back, or begin another case", file=str(file))
 
-    def _rewrite_used(self, state: CaseState | None = None) -> None:
+    def _rewrite_used(self, state: CaseState) -> None:
         """Files in used/ as the state has them: after undo and redo too."""
-        for file, lines in (state or self.state).lines_aside.items():
+        for file, lines in state.lines_aside.items():
             write_files(self.folder, {used_name(file): without_lines(self.folder / file, lines)})
 
     def _save(self) -> None:
@@ -176,6 +149,6 @@ class History:
             raise InputError(
                 f"{CASE_FILE} was changed by another program since it was opened", hint="open the case again"
             )
-        self._rewrite_used()
+        self._rewrite_used(self.state)
         self._written = case_text(self._steps, self._done)
         write_atomically(file, self._written)

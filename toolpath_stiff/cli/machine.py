@@ -97,11 +97,10 @@ def map(
 @command("machine list", JSON)
 def list_machines(args: Namespace) -> int:
     """Packaged machines."""
-    machines = [tps.Machine.load(name) for name in tps.Machine.names()]
-    text = "\n".join(f"{m.asked:<16} {m.title}\n{'':<16} {m.source}" for m in machines)
-    return show(
-        args, text, document=lambda: [{"name": m.asked, "title": m.title, "source": m.source} for m in machines]
-    )
+    machines = [tps.Machine.load(name).to_dict() for name in tps.Machine.names()]
+    listed = [{key: machine[key] for key in ("name", "title", "source")} for machine in machines]
+    text = "\n".join("{name:<16} {title}\n{0:<16} {source}".format("", **entry) for entry in listed)
+    return show(args, text, document=lambda: listed)
 
 
 def _pose(text: str) -> Sequence[float]:

@@ -8,11 +8,11 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from toolpath_stiff.defaults import THREADS, VERSION
 from toolpath_stiff.errors import FileError, InputError, TpsError, harmless
@@ -116,22 +116,13 @@ class Screen:
         return getattr(self.stream, name)
 
 
-@contextmanager
-def screens() -> Iterator[None]:
-    """Standard output and standard error as `Screen`; a closed one is a silent one."""
-    before = sys.stdout, sys.stderr
-    with Path(os.devnull).open("w", encoding="utf-8") as nothing:
-        out, error = (stream if stream is not None else nothing for stream in before)
-        sys.stdout, sys.stderr = Screen(out, "standard output"), Screen(error, "standard error")
-        try:
-            yield
-        finally:
-            sys.stdout, sys.stderr = before
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code (2 for wrong input and for whatever else went wrong, 130 for Ctrl-C)."""
-    with screens():
+    with (
+        Path(os.devnull).open("w", encoding="utf-8") as nothing,  # for one that is closed
+        redirect_stdout(cast("TextIO", Screen(sys.stdout or nothing, "standard output"))),
+        redirect_stderr(cast("TextIO", Screen(sys.stderr or nothing, "standard error"))),
+    ):
         try:
             try:
                 code = _run(list(sys.argv[1:] if argv is None else argv))
@@ -144,8 +135,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt:
             return _ended("", 130)
         except Exception as error:
-            if os.environ.get(TRACEBACK):
-                traceback.print_exc()
             return _ended(last_resort(error), 2)
 
 
@@ -193,8 +182,7 @@ def _ended(error: str, code: int) -> int:
     return code
 
 
-TRACEBACK = "TPS_TRACEBACK"  # set in the environment, it shows where in the code an unforeseen error came from
-REPORT = f"if that does not explain it, run the command again with {TRACEBACK}=1 and report what it prints"
+REPORT = "if that does not explain it, report this line"
 
 
 def last_resort(error: Exception) -> str:

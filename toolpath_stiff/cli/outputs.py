@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import accumulate
@@ -58,8 +59,10 @@ def inputs_of(args: Namespace) -> Iterator[str]:
 
 def tell_incomplete(args: Namespace) -> None:
     """Say which folders that a command reads from hold the results of a run that was stopped."""
-    paths = [Path(file) for file in inputs_of(args) if "\0" not in file]
-    folders = {path if path.is_dir() else path.parent: None for path in paths if is_file(path) or path.is_dir()}
+    folders: dict[Path, None] = {}
+    for path in map(Path, inputs_of(args)):
+        with suppress(OSError, ValueError):  # no file can have that name
+            folders |= {path if path.is_dir() else path.parent: None} if path.exists() else {}
     tell("warning", filter(None, map(incomplete, folders)))
 
 

@@ -35,7 +35,7 @@ def analyze(
     table: Table = "csv",
     show_plunges: ShowPlunges = False,
     jobs: Jobs = None,
-    cluster: Annotated[str | None, Option("--cluster", "ADDRESS")] = None,
+    cluster: Annotated[str | None, Option("--cluster", "ADDRESS", instead_of="jobs")] = None,
 ) -> int:
     """Stiffness along the path of NC programs.
 
@@ -74,6 +74,13 @@ def analyze(
     ----------
     programs
         NC program or cutter-location file, or a folder of them.
+    table
+        Format of the samples.
+    show_plunges
+        Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).
+    jobs
+        Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each
+        available CPU.
     cluster
         Hand the programs to the workers of a Dask cluster instead, one program a task; ADDRESS is its scheduler's, as
         tcp://10.0.0.5:8786. Workers must see the programs and --out by the same paths (pip install
@@ -133,23 +140,19 @@ def _executor(args: Namespace) -> Iterator[Executor | None]:
     if args.cluster is None:
         yield None
         return
-    if args.jobs is not None:
-        raise InputError("--jobs with --cluster", hint="the cluster's workers say how many programs analyze at a time")
     try:
         from distributed import Client
-
+    except ImportError:
+        hint = "run `pip install 'toolpath-stiff[cluster]'`"
+        raise InputError("--cluster needs the package distributed", hint=hint) from None
+    try:
         client: Any = Client(args.cluster, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError, ImportError) as error:  # ImportError: a protocol that is not installed, or all of it
-        if "distributed" not in sys.modules or sys.modules["distributed"] is None:
-            hint = "run `pip install 'toolpath-stiff[cluster]'`"
-            raise InputError("--cluster needs the package distributed", hint=hint) from None
+    except (OSError, ValueError, ImportError) as error:  # ImportError: a protocol that is not installed
         raise InputError(
             f"--cluster {args.cluster}: {' '.join(str(error).split())}",
             expected="the address of a Dask scheduler, as tcp://10.0.0.5:8786",
         ) from None
     with client:
-        if not client.scheduler_info()["workers"]:
-            tell("note", [f"{args.cluster} has no worker yet, the programs wait for one"])
         yield client.get_executor(pure=False)
 
 

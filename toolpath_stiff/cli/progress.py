@@ -13,9 +13,7 @@ from toolpath_stiff.errors import harmless
 if TYPE_CHECKING:
     from toolpath_stiff.results import Progress
 
-QUIET_SECONDS = 0.5  # work shorter than this shows no bar
-REDRAW_SECONDS = 0.1
-WIDTH = 30
+REDRAW_SECONDS = 0.5  # work shorter than this shows nothing
 
 
 def say(text: str) -> None:
@@ -31,28 +29,19 @@ def say(text: str) -> None:
 def progress_line(quiet: bool = False) -> Iterator[Progress | None]:
     """Yield what functions of the library call with (text, done, in all), or None where nobody watches.
 
-    What has a number is drawn as a bar, once it takes longer than a moment; the line is taken away at the end.
+    The line is taken away at the end.
     """
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    started: dict[str, float] = {}
-    last = 0.0
+    last = time.monotonic()
 
     def draw(text: str, done: int, total: int) -> None:
         nonlocal last
         now = time.monotonic()
-        start = started.setdefault(text, now)
-        if not total:
-            say(text)
-            return
-        if now - start < QUIET_SECONDS or now - last < REDRAW_SECONDS:
-            return
-        last = now
-        filled = WIDTH * done // total
-        bar = "#" * filled + "." * (WIDTH - filled)
-        left = (now - start) * (total - done) / max(done, 1)
-        say(f"{text} [{bar}] {done}/{total}, {left:.0f} s left ")
+        if not total or now - last > REDRAW_SECONDS:
+            last = now
+            say(f"{text} {done}/{total} " if total else text)
 
     try:
         yield draw

@@ -11,7 +11,7 @@ from toolpath_stiff.cli.calls import given
 from toolpath_stiff.cli.parser import FILES, command
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import Option, arguments_of
-from toolpath_stiff.studio.run import ask_for_effects, opened_case, serve
+from toolpath_stiff.studio.run import opened_case, serve
 
 
 @command(
@@ -68,5 +68,4 @@ def studio(
         opened.add_program(program, **cast("Reading", reading))
     elif reading:
         opened.read_programs(**cast("Reading", reading))
-    ask_for_effects(opened, case)
     return serve(opened, port, browser=not no_browser)

@@ -23,7 +23,7 @@ from toolpath_stiff.comparison.residuals import ReadingNames, Residuals, Variabl
 from toolpath_stiff.comparison.structure import Scattering, find_structure
 from toolpath_stiff.comparison.summary import Answer, ComparisonSummary, summary_of
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.documents import to_dict
+from toolpath_stiff.documents import certain, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Problem
@@ -34,7 +34,6 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
-from toolpath_stiff.units import certain
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -27,17 +27,16 @@ from toolpath_stiff.nc.findings import (
     findings_of,
     in_order,
 )
-from toolpath_stiff.nc.languages import foreign_program, refused_program
+from toolpath_stiff.nc.languages import foreign_program, looks_like_cutter_location, refused_program
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder
+from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
-from toolpath_stiff.nc.parametric.statements import uses_variables
 from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun, Tally
 from toolpath_stiff.nc.reader import INTERPRETERS, on_the_part, program_of, read
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import WORK_OFFSETS
-from toolpath_stiff.nc.words import looks_like_cutter_location
 
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
 
@@ -89,7 +88,11 @@ def _check_built_in(request: Request) -> Checked:
         program = on_the_part(program, request, state) if len(program.moves) else program
     except InputError as error:
         errors = [*errors, error]
-        program = replace(program, moves=Recorder().moves(), kinematics=request.posted.label if request.posted else "")
+        program = replace(
+            program,
+            moves=Recorder().moves(),
+            kinematics=request.controller.kinematics.label if request.controller.kinematics else "",
+        )
     return Checked(
         program=program,
         complete=not errors,
@@ -106,12 +109,11 @@ def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[Inp
 
     A program with variables is run again with their values, from the start.
     """
-    lines, name = request.lines, request.name
-    run = ProgramRun(request.start(), lines, name, request.switches, tally=Tally())
+    run = ProgramRun(request, Tally())
     start = modal_state(run.state)
     errors, warnings = _run_to_the_end(run)
-    if errors and uses_variables(lines):
-        run = ParametricRun(request.start(), lines, name, request.switches, request.controller.subprograms, Tally())
+    if errors and uses_variables(request.lines):
+        run = ParametricRun(request, Tally())
         errors, warnings = _run_to_the_end(run)
     return run, start, errors, warnings
 
@@ -142,7 +144,7 @@ def _used_codes(tally: Tally) -> tuple[UsedCode, ...]:
 
 
 def _check_cutter_location(request: Request) -> Checked:
-    state = CutterLocationState(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
+    state = CutterLocationState(request.name, copy.deepcopy(request.controller.tools), request.controller.feed)
     start, errors = cutter_location.in_force(state), cutter_location.run(state, request.lines, MOST_ERRORS)
     program = cutter_location.program_of(state, request)
     changes = {word: "what is not known" if noted.doubtful else NO_CHANGE for word, noted in state.noted.items()}

@@ -82,7 +82,7 @@ class Cutter:
     pending
         Moves since the last corner, the one in the plane first.
     straight
-        As Fanuc's and Haas' manuals have it (`enter_fanuc`, `go_on_fanuc`), not LinuxCNC's.
+        As Fanuc's and Haas' manuals have it (straight corners), not LinuxCNC's.
     entering
         The first move waits for the next one, which says where it ends.
     """
@@ -117,25 +117,34 @@ class CenterMove:
 
 
 def enter(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> tuple[CenterMove, Point2]:
-    """The first move, and its direction (Fanuc's and LinuxCNC's arcs have none). Raises `ArcError`."""
+    """The first move, and its direction (arcs have none). Raises `ArcError`.
+
+    LinuxCNC's, longer than the tool's radius, ends beside its end point; Fanuc's where the next one says.
+
+    Examples
+    --------
+    >>> step, _ = enter(Cutter(1, 3.0, (0, 1, 2), 1.0), (0.0, 0.0), (10.0, 0.0), None)
+    >>> [round(value, 9) for value in step.end]
+    [10.0, 3.0]
+    """
     if cutter.straight:
-        return enter_fanuc(cutter, target, arc), (0.0, 0.0)
+        if arc is not None:
+            raise ArcError("an arc as the first move of cutter compensation", "G0 or G1")
+        cutter.entering = True
+        return CenterMove(target), (0.0, 0.0)
+    if math.dist(start, target) <= cutter.radius:
+        problem = f"the entry move of cutter compensation is {math.dist(start, target):.4f} mm long in its plane"
+        raise ArcError(problem, f"more than the tool's radius of {cutter.radius:g} mm")
     if arc is not None:
-        return enter_arc(cutter, start, target, arc.center, arc.turn), (0.0, 0.0)
-    return enter_straight(cutter, start, target)
-
-
-def go_on(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> CenterMove:
-    """A further move. Raises `ArcError`."""
-    if cutter.straight:
-        return go_on_fanuc(cutter, start, target, arc)
-    return _go(cutter, start, target, arc, CORNER)
+        return _enter_arc(cutter, start, target, arc.center, arc.turn), (0.0, 0.0)
+    across = _angle(start, target) + cutter.side * math.pi / 2.0
+    return CenterMove(_beside(target, cutter.radius, across)), (math.cos(across), math.sin(across))
 
 
 def _go(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None, least: float) -> CenterMove:
     if arc is None:
-        return go_straight(cutter, start, target, least)
-    return go_round(cutter, start, target, arc.center, arc.turn, least)
+        return _go_straight(cutter, start, target, least)
+    return _go_round(cutter, start, target, arc.center, arc.turn, least)
 
 
 def _beside(point: Point2, length: float, angle: float) -> Point2:
@@ -146,28 +155,11 @@ def _angle(tail: Point2, head: Point2) -> float:
     return math.atan2(head[1] - tail[1], head[0] - tail[0])
 
 
-def enter_straight(cutter: Cutter, start: Point2, target: Point2) -> tuple[CenterMove, Point2]:
-    """The first move, straight: it ends beside its end point. Returns it and the direction across it.
-
-    Raises `ArcError` where it is not longer than the tool's radius.
-
-    Examples
-    --------
-    >>> step, _ = enter_straight(Cutter(1, 3.0, (0, 1, 2), 1.0), (0.0, 0.0), (10.0, 0.0))
-    >>> [round(value, 9) for value in step.end]
-    [10.0, 3.0]
-    """
-    _check_length(cutter, start, target)
-    across = _angle(start, target) + cutter.side * math.pi / 2.0
-    return CenterMove(_beside(target, cutter.radius, across)), (math.cos(across), math.sin(across))
-
-
-def enter_arc(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn: int) -> CenterMove:
+def _enter_arc(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn: int) -> CenterMove:
     """The first move, an arc: from the present point, tangent at its end to the programmed one. Raises `ArcError`."""
-    _check_length(cutter, start, target)
     inside = cutter.side * turn > 0
     if inside:
-        check_fits(cutter, math.dist(center, start) - TIGHT)
+        _check_fits(cutter, math.dist(center, start) - TIGHT)
     end = _beside(target, cutter.radius, _angle(target, center) if inside else _angle(center, target))
     inward = _angle(end, center)
     cosine = math.cos(_angle(end, start) - inward)
@@ -176,21 +168,13 @@ def enter_arc(cutter: Cutter, start: Point2, target: Point2, center: Point2, tur
     return CenterMove(end, center=_beside(end, math.dist(start, end) / 2.0 / cosine, inward))
 
 
-def _check_length(cutter: Cutter, start: Point2, target: Point2) -> None:
-    if math.dist(start, target) <= cutter.radius:
-        raise ArcError(
-            f"the entry move of cutter compensation is {math.dist(start, target):.4f} mm long in its plane",
-            f"more than the tool's radius of {cutter.radius:g} mm",
-        )
-
-
-def check_fits(cutter: Cutter, radius: float) -> None:
+def _check_fits(cutter: Cutter, radius: float) -> None:
     """Raise `ArcError` for an arc that the tool, inside it, cannot follow."""
     if radius <= cutter.radius:
         raise ArcError(f"an inside arc of radius {radius:.4f} mm", f"more than the tool's radius, {cutter.radius:g} mm")
 
 
-def go_straight(cutter: Cutter, start: Point2, target: Point2, least: float = CORNER) -> CenterMove:
+def _go_straight(cutter: Cutter, start: Point2, target: Point2, least: float = CORNER) -> CenterMove:
     """A straight move from one programmed point to another, after others; `least`: rad that make a corner.
 
     Raises `ArcError`.
@@ -213,7 +197,7 @@ def go_straight(cutter: Cutter, start: Point2, target: Point2, least: float = CO
     return CenterMove(end)
 
 
-def go_round(
+def _go_round(
     cutter: Cutter, start: Point2, target: Point2, center: Point2, turn: int, least: float = CORNER
 ) -> CenterMove:
     """An arc from one programmed point to another, after other moves; `least`: rad that make a corner.
@@ -230,7 +214,7 @@ def go_round(
     elif corner < -math.pi / 2.0:
         corner += math.tau
     if inside:
-        check_fits(cutter, radius)
+        _check_fits(cutter, radius)
     end = _beside(target, cutter.radius, _angle(target, center) if inside else _angle(center, target))
     straight_back = abs(corner - math.pi) < CORNER and not inside
     if corner < -least or corner > math.pi + least or straight_back:
@@ -284,16 +268,10 @@ def _arc_meets_arc(cutter: Cutter, arc: OffsetArc, center: Point2, turn: int, ra
     return _beside(arc.center, old, _angle(arc.center, center) + (turn if inside else -turn) * back)
 
 
-def enter_fanuc(cutter: Cutter, target: Point2, arc: OffsetArc | None) -> CenterMove:
-    """The first move: where it ends, the next one says. Raises `ArcError` for an arc."""
-    if arc is not None:
-        raise ArcError("an arc as the first move of cutter compensation", "G0 or G1")
-    cutter.entering = True
-    return CenterMove(target)
-
-
-def go_on_fanuc(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> CenterMove:
+def go_on(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> CenterMove:
     """A further move, straight or an arc. Raises `ArcError` where the tool cannot follow it, or controls differ."""
+    if not cutter.straight:
+        return _go(cutter, start, target, arc, CORNER)
     along = _heading(start, start, target, arc)
     beside = _beside_contour(start, cutter, along)
     if cutter.entering:
@@ -317,7 +295,7 @@ def go_on_fanuc(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | 
 def _end(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> Point2:
     """Where the tool centre is beside the end of a programmed move."""
     if arc is not None and cutter.side * arc.turn > 0:
-        check_fits(cutter, math.dist(arc.center, target))
+        _check_fits(cutter, math.dist(arc.center, target))
     return _beside_contour(target, cutter, _heading(target, start, target, arc))
 
 

@@ -75,10 +75,8 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
     """Sort the words; repeated words and two codes of one group are errors."""
     current = CurrentBlock(state.name, block)
     for word in block.words:
-        if word.letter == "G":
-            _sort_g(state, current, word)
-        elif word.letter == "M":
-            _sort_m(state, current, word)
+        if word.letter in "GM":
+            _sort_code(state, current, word)
         elif word.letter == "O":
             state.note(block.line, word, "program number")
         elif word.letter in current.values:
@@ -98,39 +96,19 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
     return current
 
 
-def _sort_g(state: State, block: CurrentBlock, word: Word) -> None:
-    name = code_name("G", word.value)
-    if name == state.dialect.holds_tip:
+def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
+    name, dialect = code_name(word.letter, word.value), state.dialect
+    if name == dialect.holds_tip:
         name = HOLDS_TIP
     if name in INCH_METRIC:
-        if not state.dialect.inch_metric:
-            raise block.fail(word, f"is {state.dialect.g70[0]}, which is not supported", hint=state.dialect.g70[1])
+        if not dialect.inch_metric:
+            raise block.fail(word, f"is {dialect.g70[0]}, which is not supported", hint=dialect.g70[1])
         name = INCH_METRIC[name]
-    _refuse(block, word, name)
+    if name in REFUSED:
+        raise block.fail(word, f"is {REFUSED[name].what}, which is not supported", hint=REFUSED[name].hint)
     code = CODES.get(name)
-    if code is not None and code.listed and state.dialect.name not in code.controls:
-        raise block.fail(word, f"is not a code of the dialect {state.dialect.name}", " or ".join(code.controls))
-    if code is None:
+    if code is None and word.letter == "G":
         raise block.fail(word, "is not a G code that is known", hint="check the program, or post it without it")
-    if code.listed:
-        state.note(block.line, word, code.listed)
-    other = block.groups.get(code.group)
-    if other is not None:
-        if code.group == "non-modal":  # LinuxCNC's modal group 0
-            raise block.fail(word, f"and {other} both act once, in this block", "one of them in a block")
-        # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
-        if name == "G80" and other != "G80":
-            return
-        if other != "G80" or name == "G80":
-            raise _same_group(block, word, other, code.group)
-    block.groups[code.group] = name
-    block.codes[name] = word
-
-
-def _sort_m(state: State, block: CurrentBlock, word: Word) -> None:
-    name = code_name("M", word.value)
-    _refuse(block, word, name)
-    code = CODES.get(name)
     if code is None:  # it may run anything, a change of kinematics included; its parameters go with it
         state.note(block.line, word, "an M code of one control, not acted upon")
         state.warnings.append(f"line {block.line}: what {word.text} does on its control is not known")
@@ -138,21 +116,21 @@ def _sort_m(state: State, block: CurrentBlock, word: Word) -> None:
             if other.letter in "PQE":
                 state.note(block.line, other, f"parameter of {word.text}")
         return
-    if code.group in block.groups:
-        raise _same_group(block, word, block.groups[code.group], code.group.removeprefix("M "))
-    block.groups[code.group] = name
-    block.codes[name] = word
+    if code.listed and word.letter == "G" and dialect.name not in code.controls:
+        raise block.fail(word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls))
     if code.listed:
         state.note(block.line, word, code.listed)
-
-
-def _refuse(block: CurrentBlock, word: Word, name: str) -> None:
-    if name in REFUSED:
-        raise block.fail(word, f"is {REFUSED[name].what}, which is not supported", hint=REFUSED[name].hint)
-
-
-def _same_group(block: CurrentBlock, word: Word, other: str, group: str) -> Exception:
-    return block.fail(word, f"and {other} are both of the modal group {group!r}", "one of them in a block")
+    before = block.groups.get(code.group)
+    if before is not None:
+        # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
+        if name == "G80" != before:
+            return
+        if before != "G80" or name == "G80":
+            group = code.group.removeprefix("M ")
+            problem = f"and {before} are both of the modal group {group!r}, or act once in their block"
+            raise block.fail(word, problem, "one of them in a block")
+    block.groups[code.group] = name
+    block.codes[name] = word
 
 
 def _check_axis_words(block: CurrentBlock) -> None:

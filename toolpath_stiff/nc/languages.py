@@ -1,15 +1,26 @@
-"""Languages of NC programs that are not G code, recognised by their lines and refused by name."""
+"""Files that are not G code, recognised by their lines: cutter-location files; other languages, refused by name."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import cache
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import Dialect
 from toolpath_stiff.nc.lathes import lathe_program
 from toolpath_stiff.nc.place import Place
-from toolpath_stiff.nc.words import HEAD_LINES
+
+# Of cutter-location files, which are not blocks of words: what tells them from G code is known here, their own
+# reader is loaded for them alone.
+EXTENSIONS = (".apt", ".aptsource", ".cl", ".cls", ".clsf", ".ncl")
+HEAD_LINES = 50  # a file says what it is at its beginning, comments and blank lines apart
+# What no line of G code looks like.
+STATEMENT = re.compile(
+    r"\s*(?:N?\d+\s+)?(?:(?:GOTO|FROM|FEDRAT|CUTTER|LOADTL|UNITS?|MACHIN|SPINDL|TLDATA|MSYS|TOOL\s+PATH|TLAXIS|TOOLNO"
+    r"|GODLTA|INTOL|OUTTOL)\s*/|PPRINT\b|PARTNO\b|MULTAX\s*(?:/|$)|(?:RAPID|FINI)\s*$)",
+    re.IGNORECASE,
+)
 
 _HEIDENHAIN = "Heidenhain's conversational language"
 _SIEMENS = "Siemens' own language (Sinumerik)"
@@ -84,3 +95,33 @@ def refused_program(lines: tuple[str, ...], name: str, dialect: Dialect) -> Inpu
     """The error for a program in another language, or for a lathe; LinuxCNC's lathes have X as a position."""
     foreign = foreign_program(lines, name)
     return foreign if foreign is not None or dialect.name == "linuxcnc" else lathe_program(lines, name)
+
+
+def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
+    """Whether a file is a cutter-location file, by its extension or by how it begins.
+
+    Examples
+    --------
+    >>> looks_like_cutter_location(("$$ part 7", "UNITS/MM", "GOTO/1,2,3"), "part.txt")
+    True
+    >>> looks_like_cutter_location(("G21", "G1 X1 F100"), "part.txt")
+    False
+    """
+    if name.lower().endswith(EXTENSIONS):
+        return True
+    seen = 0
+    for line in lines:
+        text = line.strip()
+        if not text or text.startswith("$$"):
+            continue
+        if STATEMENT.match(text):
+            return True
+        seen += 1
+        if seen >= HEAD_LINES:
+            break
+    return False
+
+
+def any_statement(lines: Iterable[str]) -> bool:
+    """Whether any of these lines is a statement that no other text looks like."""
+    return any(STATEMENT.match(line) for line in lines)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.moves import Moves
@@ -13,37 +12,19 @@ from toolpath_stiff.nc.state import LATHE_HINT
 
 HEAD = 2000  # lines: a lathe's program shows what it is at its beginning
 _NO_CODE = re.compile(r"\([^)]*\)?|;.*|<[^>]*>")  # comments, names
-_M6, _Y = re.compile(r"M0*6(?![\d.])"), re.compile(r"(?<![A-Z])Y[-+]?[\d.#\[]")
-_CYCLE = re.compile(r"G8[1-9](?![\d.])")  # of a mill, which G99 belongs to
-_OTHER_U = re.compile(r"G(?:0*(?:28|30)|6[56])(?![\d.])")  # homes, and gives arguments to a macro
-
-
-class Sign(NamedTuple):
-    """A sign: what it is, in which block (without blanks), and which blocks it is not in, or what the program has not.
-
-    `beside`: what the program has too.
-    """
-
-    what: str
-    pattern: re.Pattern[str]
-    nowhere: re.Pattern[str] | None = None
-    not_in: re.Pattern[str] | None = None
-    beside: re.Pattern[str] | None = None
-
-
+_M6, _Y = r"M0*6(?![\d.])", r"(?<![A-Z])Y[-+]?[\d.#\[]"
+_CYCLE = r"G8[1-9](?![\d.])"  # of a mill, which G99 belongs to
+_OTHER_U = r"^(?!.*G(?:0*(?:28|30)|6[56])(?![\d.])).*"  # not homes, nor arguments of a macro
 # Fanuc, operator's manuals of lathes, G-code system A: T has the tool and its offset, U and W are X and Z in steps,
-# G98 and G99 the feed per minute and per revolution.
+# G98 and G99 the feed per minute and per revolution. A sign, its pattern, what the program then has not, and has too.
 SIGNS = (
-    Sign("T with four digits and no M6", re.compile(r"T\d{4}(?![\d.])"), nowhere=_M6),
-    Sign("G18 and never Y", re.compile(r"G18(?![\d.])"), nowhere=_Y),
-    Sign("a U or W word", re.compile(r"(?<![A-Z])[UW][-+]?[\d.#\[]"), not_in=_OTHER_U),
-    Sign("G28 with U or W", re.compile(r"G0*(?:28|30)(?![\d.]).*[UW][-+]?[\d.]")),
-    Sign(
-        "G99 and a feed below 1 a revolution", re.compile(r"(?<![A-Z])F0*\.\d*[1-9]"), nowhere=_CYCLE,
-        beside=re.compile(r"G99(?![\d.])"),
-    ),
-    Sign("G96 and never Y", re.compile(r"G96(?![\d.])"), nowhere=_Y),
-)  # fmt: skip
+    ("T with four digits and no M6", r"T\d{4}(?![\d.])", _M6, ""),
+    ("G18 and never Y", r"G18(?![\d.])", _Y, ""),
+    ("a U or W word", _OTHER_U + r"(?<![A-Z])[UW][-+]?[\d.#\[]", "", ""),
+    ("G28 with U or W", r"G0*(?:28|30)(?![\d.]).*[UW][-+]?[\d.]", "", ""),
+    ("G99 and a feed below 1 a revolution", r"(?<![A-Z])F0*\.\d*[1-9]", _CYCLE, r"G99(?![\d.])"),
+    ("G96 and never Y", r"G96(?![\d.])", _Y, ""),
+)
 
 
 def lathe_program(lines: Sequence[str], name: str) -> InputError | None:
@@ -69,16 +50,12 @@ def lathe_program(lines: Sequence[str], name: str) -> InputError | None:
 
 def _signs(lines: Iterable[str]) -> list[tuple[int, str]]:
     """Line (from 1) and name of each sign, in the order of lines."""
-    blocks = ["".join(_NO_CODE.sub(" ", line).split()).upper() for line in lines]
-    text = "\n".join(blocks)
+    text = "\n".join("".join(_NO_CODE.sub(" ", line).split()).upper() for line in lines)
     signs = []
-    for sign in SIGNS:
-        if (sign.nowhere and sign.nowhere.search(text)) or (sign.beside and not sign.beside.search(text)):
-            continue
-        for number, block in enumerate(blocks, 1):
-            if sign.pattern.search(block) and not (sign.not_in and sign.not_in.search(block)):
-                signs.append((number, sign.what))
-                break
+    for what, pattern, nowhere, beside in SIGNS:
+        sign = re.search(pattern, text, re.MULTILINE)
+        if sign and not (nowhere and re.search(nowhere, text)) and re.search(beside, text):
+            signs.append((text.count("\n", 0, sign.start()) + 1, what))
     return sorted(signs)
 
 

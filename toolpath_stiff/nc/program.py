@@ -10,30 +10,34 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import options
-from toolpath_stiff.nc.words import read_lines, split_lines
+from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
+from toolpath_stiff.nc.lines import read_lines, split_lines
+from toolpath_stiff.nc.moves import ReadProgram, move_columns
+from toolpath_stiff.nc.reader import read
+from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.options import Option, arguments_of, checked, switches
 from toolpath_stiff.units import Pose
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from toolpath_stiff.nc.controller import Controller
-    from toolpath_stiff.nc.moves import ReadProgram
+File = str | Path
 
 
 class Reading(TypedDict, total=False):
     """Options of reading: the arguments of `Program.read`."""
 
-    dialect: str | None
-    controller: str | Path | None
-    offsets: str | Path | None
-    tools: str | Path | None
-    block_delete: bool | Iterable[int]
-    interpreter: str
-    rs274: str | None
-    feed_mm_per_min: float | None
-    subprograms: str | Path | None
-    unconfined: bool
+    dialect: Annotated[str | None, Option("--dialect", choices=("generic", "linuxcnc", "fanuc", "haas"))]
+    controller: Annotated[File | None, Option("--controller", "FILE")]
+    offsets: Annotated[File | None, Option("--offsets", "FILE")]
+    tools: Annotated[File | None, Option("--tools", "FILE")]
+    block_delete: Annotated[bool | Iterable[int], Option("--block-delete", "N,N", read=switches)]
+    interpreter: Annotated[str, Option("--interpreter", choices=("builtin", "linuxcnc", "auto"))]
+    rs274: Annotated[str | None, Option("--rs274", "PATH")]
+    feed_mm_per_min: Annotated[float | None, Option("--feed", "mm/min", above=0, at_most=1e6)]
+    subprograms: Annotated[File | None, Option("--subprograms", "FOLDER")]
+    unconfined: Annotated[bool, Option("--unconfined")]
 
 
 @dataclass(frozen=True)
@@ -57,29 +61,14 @@ class Program:
 
     name: str
     file: str | None
-    controller: Controller = field(repr=False)
-    options: dict[str, Any] = field(repr=False)
-    text: str | None = field(default=None, repr=False)
-    given: dict[str, Any] = field(default_factory=dict, repr=False)
-    _last: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    request: Request  # without lines, and not placed yet
+    text: str | None = None
+    given: Mapping[str, object] = field(default_factory=dict)
+    _last: list[tuple[object, ReadProgram]] = field(default_factory=list, compare=False)
 
     @classmethod
     @checked
-    def read(
-        cls,
-        file: str | Path,
-        *,
-        dialect: Annotated[str | None, Option("--dialect", choices=("generic", "linuxcnc", "fanuc", "haas"))] = None,
-        controller: Annotated[str | Path | None, Option("--controller", "FILE")] = None,
-        offsets: Annotated[str | Path | None, Option("--offsets", "FILE")] = None,
-        tools: Annotated[str | Path | None, Option("--tools", "FILE")] = None,
-        block_delete: Annotated[bool | Iterable[int], Option("--block-delete", "N,N", read=switches)] = False,
-        interpreter: Annotated[str, Option("--interpreter", choices=("builtin", "linuxcnc", "auto"))] = "builtin",
-        rs274: Annotated[str | None, Option("--rs274", "PATH")] = None,
-        feed_mm_per_min: Annotated[float | None, Option("--feed", "mm/min", above=0, at_most=1e6)] = None,
-        subprograms: Annotated[str | Path | None, Option("--subprograms", "FOLDER")] = None,
-        unconfined: Annotated[bool, Option("--unconfined")] = False,
-    ) -> Program:
+    def read(cls, file: File, **reading: Unpack[Reading]) -> Program:
         r"""A program in a file.
 
         Parameters
@@ -99,7 +88,7 @@ class Program:
         block_delete
             Leave out blocks that begin with a slash, or those of the switches that are on, 1 to 9 (/ is /1).
         interpreter
-            What reads the program: the built-in reader; LinuxCNC's rs274; auto: rs274 where the built-in one refuses.
+            What reads the program: the built-in reader, by default; LinuxCNC's rs274; auto: rs274 where that refuses.
         rs274
             LinuxCNC's interpreter, if it is not on PATH.
         feed_mm_per_min
@@ -127,7 +116,6 @@ class Program:
         >>> program.words
         ['--dialect', 'fanuc', '--block-delete']
         """
-        reading = {name: value for name, value in locals().items() if name not in ("cls", "file")}
         if not is_file(file):
             read_lines(file)  # says what is wrong with it
         return cls._of(Path(file).name, str(file), None, reading)
@@ -142,50 +130,51 @@ class Program:
         >>> tps.Program.from_text("G1 X40 F300\nM2", name="slot.nc", dialect="linuxcnc")
         <Program slot.nc: 2 lines>
         """
-        arguments = arguments_of(cls.read)
-        if not arguments.keys() >= reading.keys():
-            raise TypeError(f"Program.from_text does not know {', '.join(reading.keys() - arguments.keys())}")
-        if reading.get("feed_mm_per_min") is not None:
-            arguments["feed_mm_per_min"].check(reading["feed_mm_per_min"])
         return cls._of(name, None, text, reading)
 
     @classmethod
-    def _of(cls, name: str, file: str | None, text: str | None, reading: Mapping[str, Any]) -> Program:
+    def _of(cls, name: str, file: str | None, text: str | None, reading: Reading) -> Program:
         """A program whose options of reading are looked up, tables included."""
-        from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
-        from toolpath_stiff.nc.tables import read_offsets, read_tool_table
-
-        values = {option: reading.get(option) for option in Reading.__annotations__}
-        given = {option.removesuffix("_mm_per_min"): value for option, value in values.items() if value}
-        switches = values["block_delete"] or False
-        if not isinstance(switches, bool):
-            switches = frozenset(switches)
-            if not switches <= set(range(1, 10)):
-                raise InputError(f"block_delete {sorted(switches)}", expected="switches 1 to 9, True or False")
-            given["block_delete"] = ",".join(map(str, sorted(switches)))
-        if values["interpreter"] == "builtin":
-            del given["interpreter"]
-        controller = Controller(dialect_named(values["dialect"] or "generic"))
-        if values["controller"]:
-            controller = read_controller(values["controller"], values["dialect"])
-        tables = dict[str, Any]()
-        if values["offsets"]:
-            tables["offsets"] = read_offsets(values["offsets"])
-        if values["tools"]:
-            tables["tools"] = read_tool_table(values["tools"])
-        if values["feed_mm_per_min"]:
-            tables["feed"] = values["feed_mm_per_min"]
-        if values["subprograms"]:
-            tables["subprograms"] = str(values["subprograms"])
-            if not Path(tables["subprograms"]).is_dir():
-                raise InputError(f"{tables['subprograms']!r} is no folder", expected="the folder of subprograms")
-        options = {
-            "block_delete": switches,
-            "interpreter": values["interpreter"] or "builtin",
-            "rs274": values["rs274"],
-            "unconfined": bool(values["unconfined"]),
-        }
-        return cls(name, file, replace(controller, **tables), options, text, given)
+        arguments = arguments_of(cls.read)
+        if unknown := reading.keys() - arguments.keys():
+            raise TypeError(f"Program.read does not know {', '.join(unknown)}")
+        given: dict[str, object] = {}
+        for option in arguments:
+            value = reading.get(option)
+            if value and value != "builtin":
+                arguments[option].check(value)
+                given[option.removesuffix("_mm_per_min")] = value
+        on = reading.get("block_delete") or False
+        if not isinstance(on, bool):
+            on = frozenset(on)
+            given["block_delete"] = ",".join(map(str, sorted(on)))
+            if not on <= set(range(1, 10)):
+                raise InputError(f"block_delete {sorted(on)}", expected="switches 1 to 9, True or False")
+        file_of_controller, dialect = reading.get("controller"), reading.get("dialect")
+        controller = Controller(dialect_named(dialect or "generic"))
+        if file_of_controller:
+            controller = read_controller(file_of_controller, dialect)
+        if offsets := reading.get("offsets"):
+            controller = replace(controller, offsets=read_offsets(offsets))
+        if tools := reading.get("tools"):
+            controller = replace(controller, tools=read_tool_table(tools))
+        if feed := reading.get("feed_mm_per_min"):
+            controller = replace(controller, feed=feed)
+        if folder := reading.get("subprograms"):
+            if not Path(folder).is_dir():
+                raise InputError(f"{str(folder)!r} is no folder", expected="the folder of subprograms")
+            controller = replace(controller, subprograms=str(folder))
+        request = Request(
+            (),
+            name,
+            file or "",
+            controller=controller,
+            block_delete=on,
+            interpreter=reading.get("interpreter") or "builtin",
+            rs274=reading.get("rs274"),
+            unconfined=bool(reading.get("unconfined")),
+        )
+        return cls(name, file, request, text, given)
 
     def __repr__(self) -> str:
         count = "" if self.text is None else f": {len(self.text.splitlines())} lines"
@@ -199,8 +188,8 @@ class Program:
     @property
     def read_as(self) -> dict[str, Any]:
         """Arguments of the reader of its blocks beside the text: offsets, tools, block delete."""
-        control = self.controller
-        return {"offsets": control.offsets, "tools": control.tools, "block_delete": self.options["block_delete"]}
+        control = self.request.controller
+        return {"offsets": control.offsets, "tools": control.tools, "block_delete": self.request.block_delete}
 
     @property
     def words(self) -> list[str]:
@@ -225,15 +214,11 @@ class Program:
         >>> len(read.moves), read.unsupported
         (1, ())
         """
-        from toolpath_stiff.nc.reader import read
-        from toolpath_stiff.nc.request import Request
-
         key = (origin, tuple(default_origin))
-        if self._last.get("key") != key:
-            place = (self.lines, self.name, self.file or "", origin, default_origin)
-            self._last.update(key=key, program=read(Request(*place, controller=self.controller, **self.options)))
-        last: ReadProgram = self._last["program"]
-        return last
+        if not self._last or self._last[0][0] != key:
+            request = replace(self.request, lines=self.lines, origin=origin, default_origin=default_origin)
+            self._last[:] = [(key, read(request))]
+        return self._last[0][1]
 
     def to_frame(self) -> pd.DataFrame:
         r"""The moves, one a row: line, motion, tool, start and end in program coordinates of G54, feed.
@@ -246,8 +231,6 @@ class Program:
         [[2, 'rapid'], [3, 'feed'], [4, 'feed']]
         """
         import pandas as pd
-
-        from toolpath_stiff.nc.moves import move_columns
 
         return pd.DataFrame(move_columns(self.moves().moves))
 

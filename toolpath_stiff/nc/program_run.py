@@ -12,8 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
@@ -21,18 +20,16 @@ from toolpath_stiff.nc.codes.saved import leave_level
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.moves import Jump
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.plain_lines import PlainRun
+from toolpath_stiff.nc.plain_words import PlainWords
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import Call, Flow, GoTo, State, Then
-from toolpath_stiff.nc.words import Block, Word, leader, read_block
-
-if TYPE_CHECKING:
-    from toolpath_stiff.nc.plain_lines import PlainRun
-    from toolpath_stiff.nc.plain_words import PlainWords
+from toolpath_stiff.nc.words import Block, Word, read_block
 
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
 MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
 MOST_REPEATS = 9999
 MOST_ERRORS = 100  # beyond, a file is not a program for this reader
-FEWEST_LINES = 50  # of a program; below, loading what reads many lines at once costs more than it saves
 SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
 HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
 LABEL = re.compile(r"\s*(%\s*\d+)\s*", re.ASCII)
@@ -104,37 +101,19 @@ class ProgramRun:
 
     Parameters
     ----------
-    state
-        Of the control at the start; the blocks change it.
-    lines, name
-        The file.
-    switches
-        The block-delete switches that are on, 1 to 9: blocks that begin with their slash are left out.
-    fast
-        Whether plain lines are executed many at a time; the moves are the same.
+    request
+        The file, and what is known of its control at the start.
     tally
         Gathers errors and codes; the run then goes on after a block with an error.
+    fast
+        Whether plain lines are executed many at a time; the moves are the same.
     """
 
-    recursive = False  # whether a program may call itself
-    no_such_block = "and the file has no such block"
-
-    def __init__(
-        self,
-        state: State,
-        lines: tuple[str, ...],
-        name: str,
-        switches: frozenset[int],
-        fast: bool = True,
-        tally: Tally | None = None,
-    ) -> None:
+    def __init__(self, request: Request, tally: Tally | None = None, fast: bool = True) -> None:
+        state, lines, name = request.start(), request.lines, request.name
         self.state, self.lines, self.name = state, without_label(state, lines), name
-        self.switches, self.tally = switches, tally
-        self._plain: PlainRun | None = None
-        if fast and len(lines) >= FEWEST_LINES:
-            from toolpath_stiff.nc.plain_lines import PlainRun
-
-            self._plain = PlainRun(state, lines, name)
+        self.switches, self.tally = request.switches, tally
+        self._plain = PlainRun(state, lines, name) if fast else None
         self._levels: list[Subprogram] = []
         self._programs: dict[int, int] | None = None
         self._sequence: dict[int, list[int]] | None = None
@@ -144,9 +123,7 @@ class ProgramRun:
 
     def run(self) -> list[str]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
-        row, percent, numbered = leader(self.lines, self.name, self.state.dialect.semicolon), False, False
-        if row:
-            self.state.warnings.append(f"what stands before the tape mark (%) in line {row + 1} is not read")
+        row, percent, numbered = 0, False, False
         while row < len(self.lines):
             if self._plain is not None and not self._levels:
                 words = self._plain.execute(row)
@@ -281,17 +258,13 @@ class ProgramRun:
             code, name, first = "M98" if call.arguments is None else "a call", f"O{number}", self._heads()[number] + 1
         if not 1 <= repeats <= MOST_REPEATS:
             raise self._fail(row, f"{code} with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
-        if call.local or not self.recursive:
-            if any(level.name == name for level in self._levels):
-                raise self._fail(row, f"{code} calls {name}, which is running: it would never end", column=call.column)
-            if not call.local and first == self._main + 1:
-                raise self._fail(row, f"M98 calls {name}, the main program itself", column=call.column)
         self._begin(Subprogram(name, first, row + 1, repeats - 1, call.arguments, call.modal), row, call.column)
         return first
 
     def _begin(self, level: Subprogram, row: int, column: int) -> None:
         if len(self._levels) == DEEPEST:
-            raise self._fail(row, f"more than {DEEPEST} subprograms within each other", column=column)
+            problem = f"more than {DEEPEST} subprograms within each other, {level.name} the last one"
+            raise self._fail(row, problem, "calls that end", column=column)
         self._levels.append(level)
 
     def _jump(self, row: int, to: int) -> int:
@@ -313,7 +286,7 @@ class ProgramRun:
         rows = self._numbered(row, number)
         if len(rows) != 1:
             places = ", ".join(str(self._place(duplicate).line) for duplicate in rows)
-            other = f"which is in the lines {places}" if rows else self.no_such_block
+            other = f"which is in the lines {places}" if rows else "which no block has"
             raise self._fail(row, f"{what} N{number:g}, {other}", "one block with that number", column=column)
         return rows[0]
 
@@ -386,13 +359,3 @@ class ProgramRun:
                     raise self._fail(index, f"O{number} is in line {self._programs[number] + 1} already")
                 self._programs[number] = index
         return self._programs
-
-    @cached_property
-    def _main(self) -> int:
-        """The line of the main program's own number; -1 if it has none."""
-        for index, line in enumerate(self.lines):
-            if HEAD.match(line):
-                return index
-            if line.strip() not in ("", "%") and not line.lstrip().startswith("("):
-                break
-        return -1

@@ -3,42 +3,40 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.increments import increments_hint
-from toolpath_stiff.nc.controller import Controller, Switches, check_plain, plain
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
-from toolpath_stiff.nc.languages import foreign_program, refused_program
+from toolpath_stiff.nc.languages import foreign_program, looks_like_cutter_location, refused_program
 from toolpath_stiff.nc.lathes import lathe_warning
+from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
-from toolpath_stiff.nc.linuxcnc.runner import find_rs274
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.operations import split_comments
+from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
-from toolpath_stiff.nc.parametric.statements import uses_variables
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
 from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
-from toolpath_stiff.nc.words import looks_like_cutter_location, read_lines, split_lines
 from toolpath_stiff.units import Pose, mm_per_min_from_m_per_s, pose_in_si
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
 
 
 class Options(TypedDict, total=False):
-    """How a program is read; see `Request`."""
+    """How a program is read; see `Request` and `Controller`."""
 
     origin: Pose | None
     default_origin: Pose
-    offsets: Offsets | None
-    tools: dict[int, ToolEntry] | None
+    offsets: Offsets
+    tools: dict[int, ToolEntry]
     block_delete: Switches
     interpreter: str
     rs274: str | None
@@ -68,7 +66,7 @@ def read_program(
         options["offsets"] = read_offsets(offsets_file)
     if tool_table:
         options["tools"] = read_tool_table(tool_table)
-    return read(Request(read_lines(path), Path(path).name, str(path), **options))
+    return _read_lines(read_lines(path), Path(path).name, str(path), options)
 
 
 def parse_program(text: str, name: str = "program", **options: Unpack[Options]) -> ReadProgram:
@@ -89,7 +87,15 @@ def parse_program(text: str, name: str = "program", **options: Unpack[Options]) 
         ...
     toolpath_stiff.errors.ProgramError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0, ...
     """
-    return read(Request(split_lines(text, name), name, **options))
+    return _read_lines(split_lines(text, name), name, "", options)
+
+
+def _read_lines(lines: tuple[str, ...], name: str, path: str, options: Options) -> ReadProgram:
+    """A program, with tables in place of those of its control."""
+    values = dict[str, Any](options)
+    tables = {table: values.pop(table) for table in ("offsets", "tools") if table in values}
+    controller = replace(options.get("controller", UNKNOWN_CONTROL), **tables)
+    return read(Request(lines, name, path, **{**values, "controller": controller}))
 
 
 def read(request: Request) -> ReadProgram:
@@ -125,40 +131,25 @@ def read(request: Request) -> ReadProgram:
             raise foreign from None
         if request.interpreter == "builtin" or not plain(request.block_delete, request.controller):
             raise
-        _check_second(error, request)
-    return on_the_part(linuxcnc.read(request), request)
-
-
-def _check_second(error: InputError, request: Request) -> None:
-    """Raise what the built-in interpreter refused with, unless the second one is there and the program harmless."""
-    linuxcnc.fenced(request.lines, request.name)
-    try:
-        find_rs274(request.rs274, request.unconfined)
-    except InputError as missing:
-        raise ProgramError(
-            error.found,
-            expected=error.expected,
-            hint=f"LinuxCNC's interpreter may read it: {missing.hint}",
-            file=error.file,
-            line=error.line,
-            column=error.column,
-        ) from None
+        try:
+            return on_the_part(linuxcnc.read(request), request)
+        except InputError as second:
+            hint = f"LinuxCNC's interpreter does not read it either: {second}"
+            raise ProgramError(
+                error.found, expected=error.expected, hint=hint, file=error.file, line=error.line, column=error.column
+            ) from None
 
 
 def _read_built_in(request: Request) -> ReadProgram:
     try:
-        return _run_built_in(request, ProgramRun)
+        return _finished(request, ProgramRun(request))
     except InputError:
         if not uses_variables(request.lines):
             raise
-    run = partial(ParametricRun, folder=request.controller.subprograms)
-    return replace(_run_built_in(request, run), parametric=True)
+    return replace(_finished(request, ParametricRun(request)), parametric=True)
 
 
-def _run_built_in(
-    request: Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
-) -> ReadProgram:
-    run = begin(request.start(), request.lines, request.name, request.switches)
+def _finished(request: Request, run: ProgramRun) -> ReadProgram:
     ending = run.run()
     if not run.state.recorder.cuts:
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
@@ -195,14 +186,14 @@ def program_of(run: ProgramRun, request: Request, ending: Sequence[str]) -> Read
 def on_the_part(program: ReadProgram, request: Request, state: State | None = None) -> ReadProgram:
     """A program with the moves of the tool on the part, if it was posted for another machine; the state at its end."""
     program = _with_feed(program, request)
-    if request.posted is None:
+    if request.controller.kinematics is None:
         return program
     offsets = request.work_offsets if state is None else state.frames.offsets
-    check_rotary_offsets(offsets, request.posted, program.name)
+    check_rotary_offsets(offsets, request.controller.kinematics, program.name)
     tip_held = () if state is None else state.tip_held
     if request.origin is None:
-        return recovered(program, request.posted, tip_held, request.default_origin, "default")
-    return recovered(program, request.posted, tip_held, request.origin, "option")
+        return recovered(program, request.controller.kinematics, tip_held, request.default_origin, "default")
+    return recovered(program, request.controller.kinematics, tip_held, request.origin, "option")
 
 
 def _with_feed(program: ReadProgram, request: Request) -> ReadProgram:

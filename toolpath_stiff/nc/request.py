@@ -9,9 +9,8 @@ from functools import cached_property
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.tables import Offsets, ToolEntry
+from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import Pose, ShopPose, pose_in_mm
 
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -33,8 +32,6 @@ class Request:
         Where program zero (G54) sits in machine coordinates, x, y, z in m, A, B, C in rad: as asked for, and
         where neither the caller nor the program says so. Only moves in machine coordinates (G53, G28, G30) depend on
         it.
-    offsets, tools
-        Work offsets and tool table, instead of the controller's.
     block_delete
         Leave out blocks that begin with a slash: True, all of them; switches 1 to 9, those of theirs (`/` is `/1`);
         False, those of the controller file's.
@@ -54,8 +51,6 @@ class Request:
     path: str = ""
     origin: Pose | None = None
     default_origin: Pose = ZERO
-    offsets: Offsets | None = None
-    tools: dict[int, ToolEntry] | None = None
     block_delete: Switches = False
     interpreter: str = "builtin"
     rs274: str | None = None
@@ -65,17 +60,7 @@ class Request:
     @cached_property
     def work_offsets(self) -> Offsets:
         """Work offsets before the program sets any."""
-        return self.offsets or self.controller.offsets or Offsets()
-
-    @property
-    def tool_table(self) -> dict[int, ToolEntry] | None:
-        """The tools that are known; None: there is no table."""
-        return self.controller.tools if self.tools is None else self.tools
-
-    @property
-    def posted(self) -> PostedKinematics | None:
-        """The kinematics that the program was posted for; None: this machine's."""
-        return self.controller.kinematics
+        return self.controller.offsets or Offsets()
 
     @property
     def switches(self) -> frozenset[int]:
@@ -88,13 +73,13 @@ class Request:
 
         A program that was posted for another machine is read in that one's coordinates first.
         """
-        if self.posted is not None:
+        if self.controller.kinematics is not None:
             return None, ZERO
         return None if self.origin is None else pose_in_mm(self.origin), pose_in_mm(self.default_origin)
 
     def start(self) -> State:
         """The control as the program finds it."""
-        frames = Frames(copy.deepcopy(self.work_offsets), *self.zero, posted=self.posted)
-        state = State(self.name, frames, copy.deepcopy(self.tool_table), self.controller.dialect)
+        frames = Frames(copy.deepcopy(self.work_offsets), *self.zero, posted=self.controller.kinematics)
+        state = State(self.name, frames, copy.deepcopy(self.controller.tools), self.controller.dialect)
         state.feed = self.controller.feed
         return state

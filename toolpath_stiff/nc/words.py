@@ -1,4 +1,4 @@
-"""Program text to words: bytes to lines, lines to blocks, blocks to words. The only module that knows pygcode.
+"""Lines to blocks, blocks to words. The only module that knows pygcode.
 
 pygcode 0.2.1 (unmaintained since 2017) fails on comments of both styles in one line, on `X+1` and on spaces inside
 words, drops the E of `1.5E2`, and ignores what it does not know. So comments, spaces, signs, exponents and N words are
@@ -7,17 +7,17 @@ handled before it is called, each word keeps its true column, and every word tha
 
 from __future__ import annotations
 
-import codecs
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from pathlib import Path
 from typing import NamedTuple
 
-from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.files import check_regular
+from pygcode.exceptions import GCodeWordStrError
+from pygcode.words import text2words
+
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.place import Place
 
 NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails does not try shorter numbers
@@ -28,29 +28,14 @@ POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
 CORNERS = (",C", ",R")  # chamfer and rounding of the corner to the next block (Fanuc, Haas)
 NOT_PYGCODES = (*POLAR, *CORNERS)
 LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *POLAR, *CORNERS))
-# Statements of Fanuc's and Haas' macro language.
-MACRO = re.compile(r"IF(?=\[)|WHILE(?=\[)|GOTO|THEN|(?:DO|END)(?=\d)|POPEN|PCLOS|[BD]PRNT|SETVN")
 COMMENT = re.compile("[();]")
 EXPRESSION = re.compile(r"[#\[]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
-# Caps. Longer is no NC program, and what reads a line takes time by the square of its length.
-LARGEST_FILE = 512 << 20  # bytes: some ten million lines
-LONGEST_LINE = 10_000  # characters, comments included
+# Caps: longer is no block.
 LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
 LONGEST_NUMBER = 100  # characters
-LONGEST_LEADER = 50  # lines of text before the first tape mark
 MOST_DIGITS = 9  # of a program number, its O included
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
-# Of cutter-location files, which are not blocks of words: what tells them from G code is known here, their own
-# reader is loaded for them alone.
-EXTENSIONS = (".apt", ".aptsource", ".cl", ".cls", ".clsf", ".ncl")
-HEAD_LINES = 50  # a file says what it is at its beginning, comments and blank lines apart
-# What no line of G code looks like.
-STATEMENT = re.compile(
-    r"\s*(?:N?\d+\s+)?(?:(?:GOTO|FROM|FEDRAT|CUTTER|LOADTL|UNITS?|MACHIN|SPINDL|TLDATA|MSYS|TOOL\s+PATH|TLAXIS|TOOLNO"
-    r"|GODLTA|INTOL|OUTTOL)\s*/|PPRINT\b|PARTNO\b|MULTAX\s*(?:/|$)|(?:RAPID|FINI)\s*$)",
-    re.IGNORECASE,
-)
 
 
 class Word(NamedTuple):
@@ -228,59 +213,29 @@ def _tokens(
 
 
 def _unreadable(compact: str, position: int, column: int, place: Place) -> InputError:
-    """The error for text that is not a word, with the reason if it is a known one."""
-    character = compact[position]
-    tail = compact[position : position + 12]
-    follower = compact[position + 1 : position + 3].lstrip("+-")[:1]  # `X-[...]` and `X-#1` too
-    problem, expected, hint = f"{tail!r} is not a word", "a letter and a number", ""
-    if character.isalpha() and (not follower or follower.isalpha() or follower == "/"):
-        if compact.startswith(("NAN", "INF"), position + 1):
-            problem, expected = f"{tail!r} is not a finite number", "a decimal number"
-        else:
-            problem, expected = f"the word {character!r} has no number", f"a number after {character}"
-    word = MACRO.match(compact, position)
-    if word is not None:
-        problem, expected = f"{word[0]} is a statement of a control's macro language, which is not read", "plain blocks"
-        hint = "post the program without macros"
-    elif character == "#" or follower == "#" or character == "=":
-        problem, expected = "variables (#) are not supported", "numbers"
-        hint = "post the program without variables, or give --interpreter linuxcnc"
-    elif character == "[" or follower == "[":
-        problem, expected = "expressions ([...]) are not supported", "numbers"
-        hint = "post the program without expressions, or give --interpreter linuxcnc"
-    elif character in POLAR:
-        problem, expected = f"the polar word {character!r} has no number", f"a number after {character}"
-    elif character == "%":
-        problem, expected = "`%` among other words", "`%` alone on its line"
-        if compact[1:].isalnum() and not position:  # DIN 66025
-            problem = f"{compact[:20]!r} is a program's name behind `%`, as Siemens', NUM's and ISG's controls have it"
-            hint = "take the name away; a Fanuc's number is read past with --dialect fanuc"
-    return place.fail(problem, expected, hint, column=column)
+    """The error for text that is not a word."""
+    character, follower = compact[position], compact[position + 1 : position + 3].lstrip("+-")[:1]
+    if character == "%":
+        hint = "take the name behind it away; a Fanuc's number is read past with --dialect fanuc"
+        return place.fail("`%` among other words", "`%` alone on its line", hint, column)
+    if character in LETTERS and (not follower or follower in LETTERS or follower == "/"):
+        return place.fail(f"the word {character!r} has no number", f"a number after {character}", column=column)
+    return place.fail(f"{compact[position : position + 12]!r} is not a word", "a letter and a number", column=column)
 
 
-def through_pygcode(words: list[Word], place: Place) -> tuple[Word, ...]:
+def through_pygcode(words: Sequence[Word], place: Place) -> tuple[Word, ...]:
     """Let pygcode read the normalised words; what it does not return exactly is an error."""
-    if not words:
-        return ()
-    from pygcode.exceptions import GCodeWordStrError
-    from pygcode.words import text2words
-
-    all_words, words = words, [word for word in words if word.letter not in NOT_PYGCODES]
-
+    known = [word for word in words if word.letter not in NOT_PYGCODES]
+    returned: list[tuple[str, float]] = []
     try:
-        read = list(text2words(" ".join([_plain(word) for word in words])))
-    except GCodeWordStrError:
-        read = []
-    if [(got.letter, float(got.value)) for got in read] == [(word.letter, word.value) for word in words]:
-        return tuple(all_words)
-    for word in words:  # one at a time, to find the one that pygcode refuses
-        try:
-            (alone,) = text2words(_plain(word))
-        except (GCodeWordStrError, ValueError):
-            alone = None
-        if alone is None or float(alone.value) != word.value:
+        for word in text2words(" ".join([_plain(word) for word in known])):
+            returned.append((word.letter, float(word.value)))
+    except (GCodeWordStrError, ValueError):
+        returned.append(("", math.nan))
+    for word, read in zip(known, [*returned, ("", math.nan)], strict=False):
+        if read != (word.letter, word.value):
             raise place.fail(f"word {word.text!r} cannot be read", _expected(word.letter), column=word.column)
-    return tuple(all_words)
+    return tuple(words)
 
 
 def _plain(word: Word) -> str:
@@ -299,126 +254,3 @@ def _expected(letter: str) -> str:
     if letter in "LTN":
         return "a whole number that is not negative"
     return "a decimal number"
-
-
-def leader(lines: Sequence[str], name: str, semicolon: bool) -> int:
-    """The line (from 0) of the first tape mark, if what stands before it is text that no block reads; else the first.
-
-    Controls read nothing before the tape mark (Fanuc's operator's manuals, "Leader section").
-    """
-    mark = next((row for row, line in enumerate(lines[: LONGEST_LEADER + 1]) if line.strip() == "%"), 0)
-    texts = [(row, line) for row, line in enumerate(lines[:mark]) if line.strip()]
-    computed = any(EXPRESSION.search(line) for _, line in texts)
-    if not texts or computed or not any(line.strip() not in ("", "%") for line in lines[mark + 1 :]):
-        return 0
-    unread = 0
-    for row, line in texts:
-        try:
-            if read_block(line, row + 1, name, semicolon).words:
-                return 0
-        except InputError:
-            unread += 1
-    return mark if unread else 0
-
-
-# Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
-# end-of-file mark of CP/M and DOS (0x1A), which some posts still append.
-BINARY = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
-_BINARY_BYTES = bytes(code for code in range(128) if BINARY.match(chr(code)))
-
-
-def read_lines(path: str | Path) -> tuple[str, ...]:
-    """Lines of a program file, without line ends; LF, CRLF or CR.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, is larger than `LARGEST_FILE`, or is not text.
-    """
-    return split_lines(read_text(path)[0], Path(path).name)
-
-
-def read_text(path: str | Path) -> tuple[str, str]:
-    """Text of a program file with its line ends, and its encoding: UTF-8 (with or without BOM) or Latin-1.
-
-    Raises `InputError` where the file cannot be read or is larger than `LARGEST_FILE`.
-    """
-    try:
-        check_regular(Path(path))  # no pipe of the shell either: a program is read more than once
-        with Path(path).open("rb") as stream:
-            content = stream.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise ProgramError(f"cannot read {str(path)!r}: {error.strerror}") from None
-    except ValueError as error:  # a NUL in the name
-        raise ProgramError(f"cannot read {str(path)!r}: {error}") from None
-    if len(content) > LARGEST_FILE:
-        raise ProgramError(
-            "a file that is too large to be read",
-            expected=f"an NC program of at most {LARGEST_FILE >> 20} MB",
-            hint="split the program",
-            file=Path(path).name,
-        )
-    encoding = "utf-8-sig" if content.startswith(codecs.BOM_UTF8) else "utf-8"
-    try:
-        return content.decode(encoding), encoding
-    except UnicodeDecodeError:
-        return content.decode("latin-1"), "latin-1"
-
-
-def split_lines(text: str, name: str) -> tuple[str, ...]:
-    r"""Split into lines; a byte that no text holds is an error with its line and column.
-
-    Examples
-    --------
-    >>> split_lines("G0 X1\r\nM30\r\n", "part.nc")
-    ('G0 X1', 'M30')
-    """
-    joined = text.replace("\r\n", "\n").replace("\r", "\n")
-    binary = BINARY.search(joined) if _any_binary(joined) else None
-    if binary is not None:
-        offset = binary.start()
-        place = Place(name, joined.count("\n", 0, offset) + 1, offset - joined.rfind("\n", 0, offset))
-        raise place.fail(f"binary byte 0x{ord(binary[0]):02X}", "the text of an NC program")
-    lines = joined.replace("\x1a", "").replace("\x0c", " ").split("\n")
-    if not lines[-1]:
-        lines.pop()
-    if max(map(len, lines), default=0) > LONGEST_LINE:
-        row = next(row for row, line in enumerate(lines) if len(line) > LONGEST_LINE)
-        raise Place(name, row + 1).fail(f"a line of {len(lines[row])} characters", f"lines of at most {LONGEST_LINE}")
-    return tuple(lines)
-
-
-def _any_binary(text: str) -> bool:
-    """Whether a text holds anything of `BINARY`; a fifth of the time of a search, and UTF-8 has the same bytes."""
-    content = text.encode("utf-8", "surrogatepass")
-    return len(content.translate(None, _BINARY_BYTES)) != len(content)
-
-
-def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
-    """Whether a file is a cutter-location file, by its extension or by how it begins.
-
-    Examples
-    --------
-    >>> looks_like_cutter_location(("$$ part 7", "UNITS/MM", "GOTO/1,2,3"), "part.txt")
-    True
-    >>> looks_like_cutter_location(("G21", "G1 X1 F100"), "part.txt")
-    False
-    """
-    if name.lower().endswith(EXTENSIONS):
-        return True
-    seen = 0
-    for line in lines:
-        text = line.strip()
-        if not text or text.startswith("$$"):
-            continue
-        if STATEMENT.match(text):
-            return True
-        seen += 1
-        if seen >= HEAD_LINES:
-            break
-    return False
-
-
-def any_statement(lines: Iterable[str]) -> bool:
-    """Whether any of these lines is a statement that no other text looks like."""
-    return any(STATEMENT.match(line) for line in lines)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.documents import Document, to_dict
+from toolpath_stiff.documents import Document, certain, to_dict
 from toolpath_stiff.files import Content
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.doubts import question
@@ -27,7 +27,6 @@ from toolpath_stiff.planning.tables import TABLES
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.catalogue import known_effects
-from toolpath_stiff.units import certain
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -31,7 +31,7 @@ def text(reduction: Reduction) -> str:
 
 
 def _loops(entries: Sequence[Document]) -> list[str]:
-    """A line a loop, then what their shapes say."""
+    """A line a loop."""
     if not entries:
         return []
     names = ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")
@@ -44,5 +44,4 @@ def _loops(entries: Sequence[Document]) -> list[str]:
         )
         for entry in entries
     ]
-    shapes = [f"{entry['loop']}: {entry['shape']['text']}" for entry in entries if entry["shape"]["text"]]
-    return Table(HEAD, rows).lines(0, 0) + shapes
+    return Table(HEAD, rows).lines(0, 0)

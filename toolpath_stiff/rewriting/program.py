@@ -19,12 +19,13 @@ from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, switches_on
 from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.lines import read_text, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.reader import Options
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.nc.words import read_block, read_text, split_lines
+from toolpath_stiff.nc.words import read_block
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls

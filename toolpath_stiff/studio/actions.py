@@ -13,10 +13,9 @@ from toolpath_stiff.case.steps import TABLES
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.nc.controller import KEYS
 from toolpath_stiff.nc.program import Reading
-from toolpath_stiff.results import one_of
 from toolpath_stiff.studio.session import Session
 
-MOST_POSES, MOST_SEED = 60, 2**31 - 1
+MOST_POSES = 60
 SUFFIXES = {".csv": "data", ".xlsx": "data", ".py": "effects", ".toml": "machine", ".tbl": "tools", ".var": "offsets"}
 NOT_OURS = (TypeError, ValueError, KeyError, OverflowError, AttributeError)  # of arguments that no page of ours sends
 LONGEST_NAME = 200  # bytes: what a file system takes, and what is put before it
@@ -62,10 +61,10 @@ def _fit(session: Session) -> None:
 
 
 def _accept(session: Session) -> None:
-    entry = session.found("update")
-    if not entry or not entry.get("accepted"):
+    fit = session.found("update")
+    if not fit or not fit.accepted:
         raise InputError("there is no fit that the data support", hint="switch an effect on and press Fit")
-    session.case.accept(session.case.folder / entry["result"] / "machine.toml")
+    session.case.accept(session.case.folder / fit.result / "machine.toml")
 
 
 def _measure(session: Session) -> None:
@@ -80,17 +79,8 @@ def _claim(session: Session, effects: str) -> None:
 
 
 def _exercise(session: Session, seed: int, layout: str = "tilted") -> None:
-    if not isinstance(seed, int) or not 0 <= seed <= MOST_SEED:
-        raise InputError(f"seed {seed}", expected="a whole number, 0 or more")
-    session.case.start_exercise(seed, layout=one_of("layout", layout, ("tilted", "paper")))
+    session.case.start_exercise(seed, layout=layout)
     session.revealed = None
-
-
-def _place(session: Session, **bounds: Any) -> None:
-    allowed = ("x_mm", "y_mm", "z_mm", "rotate_deg")
-    if set(bounds) - set(allowed):
-        raise InputError(f"bounds {', '.join(bounds)}", expected=", ".join(allowed))
-    session.queue("place", **bounds)
 
 
 def _save_effect(session: Session, file: str, text: str) -> None:
@@ -157,7 +147,6 @@ ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {
     "hand": _by_hand,
     "at": lambda session, origin: session.trial().at(origin),
     "switch": lambda session, effect, values: session.case.switch(str(effect), values),
-    "trust": lambda session, file: session.case.trust(str(file)),
     "aside": _aside,
     "fit": _fit,
     "accept": _accept,
@@ -170,7 +159,7 @@ ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {
     "measure": _measure,
     "exercise": _exercise,
     "claim": _claim,
-    "place": _place,
+    "place": lambda session: session.queue("place"),
     "place_at": lambda session, origin: session.case.place_at(origin),
     "require": lambda session, value: session.case.require(float(value)),
     "undo": lambda session: None if session.case.undo() else {"message": "nothing to undo"},

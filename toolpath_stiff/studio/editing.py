@@ -74,17 +74,14 @@ class Editing:
         new = self.case.state.effects[-1]
         self._open[new], self.faults[new] = self._open[name], ""
 
-    def state(self) -> list[dict[str, str | bool]]:
-        """The own effects of the case with their text, as the page shows them; `copy`: "" where none is open.
-
-        `off`: its code is not run, as this user has not agreed to it.
-        """
-        files, off = list[dict[str, str | bool]](), self.case.not_agreed
-        for name in self.case.recorded.effects:
-            copy = None if name in off else self._open.get(name, (None, ""))[0]
+    def state(self) -> list[dict[str, str]]:
+        """The own effects of the case with their text, as the page shows them; `copy`: "" where none is open."""
+        files = []
+        for name in self.case.state.effects:
+            copy = self._open.get(name, (None, ""))[0]
             text = (copy or self.case.folder / name).read_text("utf-8", "replace")
-            fault, path = self.faults.get(name, ""), str(copy.resolve()) if copy else ""
-            files.append({"file": name, "text": text, "copy": path, "fault": fault, "off": name in off})
+            path = str(copy.resolve()) if copy else ""
+            files.append({"file": name, "text": text, "copy": path, "fault": self.faults.get(name, "")})
         return files
 
     def follow(self, looked: Callable[[], None]) -> None:

@@ -43,7 +43,7 @@ def _document(state: str, connect: str, title: str) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
-        f"<title>{html.escape(title)}</title>\n<style>\n{asset('page.css')}{_own('studio.css')}</style>\n</head>\n<body>\n"
+        f"<title>{html.escape(title)}</title>\n<style>\n{asset('page.css')}{asset('viewer.css')}{_own('studio.css')}</style>\n</head>\n<body>\n"
         f'{body}<script type="application/json" id="state">{state}</script>\n'
         f"<script>{script}</script>\n</body>\n</html>\n"
     )

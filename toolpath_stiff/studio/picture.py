@@ -61,7 +61,7 @@ def machine(session: Session) -> Picture:
     on = session.machine
     return {
         "name": on.name,
-        "title": on.title,
+        "title": on.model.machine.title,
         "effects": on.effects,
         "joints": on.joints_mm,
         "origin": list(on.origin_mm_deg),
@@ -128,34 +128,17 @@ def _values(candidate: Document) -> Picture:
     return {**candidate["choice"], **{key: size["value"] for key, size in candidate["parameters"].items()}}
 
 
-SENTENCES = {
-    "adequate": "Nothing is missing that these data could show",
-    "unexplained": "Something is missing that no effect describes",
-}
-
-
-ENDS = {"identified": "nothing else fits", "described": "described, not confirmed: new readings must tell"}
-
-
 def verdict(session: Session) -> Picture | None:
     """What the diagnosis says; None while there is none for these readings."""
     diagnosis = session.document("diagnose")
     if not diagnosis:
         return None
-    best = next((row for row in diagnosis["candidates"] if row["effect"] == diagnosis["best"]), None)
-    verdict, names = diagnosis["verdict"], diagnosis["plausible"]
-    if verdict in ENDS and best and best["finding"]:
-        sentence = f"{best['finding'][0].upper()}{best['finding'][1:]}; {ENDS[verdict]}"
-    elif verdict in SENTENCES:
-        sentence = SENTENCES[verdict]
-    else:
-        sentence = f"Several explain it: {', '.join(names)}" if len(names) > 1 else diagnosis["text"].split(". ")[0]
     kept = _of(
         diagnosis, "verdict", "text", "why", "plausible", "best", "gates", "detectable", "confounding", "assumptions",
         "warnings", "notes", "noise", "cannot_test", "readings", "portrait",
     )  # fmt: skip
     kept["gates"] = {name: value for name, value in kept["gates"].items() if name != "simulated_squares"}
-    return {"sentence": sentence, **kept}
+    return {"sentence": kept["text"].split(". ")[0].rstrip("."), **kept}
 
 
 def effects(session: Session) -> list[Picture]:
@@ -222,8 +205,8 @@ def fit(session: Session) -> Picture | None:
     latest = session.found("update")
     if not latest:
         return None
-    parts = _of(latest["document"], "verdict", "text", "steps", "support", "warnings")
-    return {**parts, "accepted": latest["accepted"], "holds": session.is_fitted, "result": latest["result"]}
+    parts = _of(latest.document, "verdict", "text", "steps", "support", "warnings")
+    return {**parts, "accepted": latest.accepted, "holds": session.is_fitted, "result": latest.result}
 
 
 def plan(session: Session) -> Picture | None:
@@ -232,7 +215,7 @@ def plan(session: Session) -> Picture | None:
     if not latest:
         return None
     names = ("text", "visits", "poses", "readings", "minutes", "notes")
-    return {**_of(latest["document"], *names), "file": f"{latest['result']}/plan.csv"}
+    return {**_of(latest.document, *names), "file": f"{latest.result}/plan.csv"}
 
 
 def compare(session: Session) -> Picture | None:
@@ -241,7 +224,7 @@ def compare(session: Session) -> Picture | None:
     if not latest:
         return None
     names = ("text", "by_plane_and_direction", "by_direction", "findings", "outliers", "warnings")
-    return {**_of(latest["document"], *names), "result": latest["result"]}
+    return {**_of(latest.document, *names), "result": latest.result}
 
 
 def program(session: Session) -> Picture | None:
@@ -261,10 +244,10 @@ def program(session: Session) -> Picture | None:
     if not analysis:
         return {**shown, "path": None, "error": error}
     summary = _of(
-        analysis["document"], "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "weakest", "plunges",
-        "warnings", "out_of_reach_samples", "per_operation", "required",
+        analysis.document, "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "weakest", "plunges",
+        "warnings", "out_of_reach_samples", "required",
     )  # fmt: skip
-    return {**shown, "path": analysis["path"], "summary": summary, "result": analysis["result"], "error": ""}
+    return {**shown, "path": analysis.path, "summary": summary, "result": analysis.result, "error": ""}
 
 
 def origin(session: Session) -> list[float]:
@@ -290,7 +273,7 @@ def placement(session: Session) -> Picture | None:
     if not entry:
         return {"now": now, "front": None, "set_up": sheet}
     names = ("front", "chosen", "before", "worse", "warnings", "offset_blocks")
-    return {"now": now, "set_up": sheet, "result": entry["result"], **_of(entry["document"], *names)}
+    return {"now": now, "set_up": sheet, "result": entry.result, **_of(entry.document, *names)}
 
 
 def set_up(session: Session) -> Picture | None:
@@ -298,6 +281,5 @@ def set_up(session: Session) -> Picture | None:
     entry = session.found("set_up")
     if not entry:
         return None
-    files = {"sheet": "setup.pdf", "written": entry["written"], "page": "report.html"}
-    parts = _of(entry["document"], "warnings", "offset_blocks", "chosen", "before", "worse")
-    return parts | {name: f"{entry['result']}/{file}" for name, file in files.items()}
+    files = {"sheet": f"{entry.result}/setup.pdf", "written": entry.file, "page": f"{entry.result}/report.html"}
+    return {**_of(entry.document, "warnings", "offset_blocks", "chosen", "before", "worse"), **files}

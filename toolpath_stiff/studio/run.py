@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO
 
 from toolpath_stiff.case.case import Case
 from toolpath_stiff.case.steps import CASE_FILE
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
-from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.studio.server import Studio
 from toolpath_stiff.studio.session import Session
-
-LOCK = ".studio.lock"
 
 
 def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise: int | None) -> Case:
@@ -35,53 +30,23 @@ def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise
     return case
 
 
-def ask_for_effects(case: Case, folder: str) -> None:
-    """Ask on the terminal, by file, whether code that came with the case may be run; say what is off without it."""
-    for name in case.not_agreed:
-        file = case.path(name)
-        print(f"{file} is code that came with the case, and you have not agreed to run it: its effects are off.")
-        if sys.stdin.isatty() and sys.stdout.isatty():
-            if input("Have you read it, and shall it be run? [y/N] ").strip().lower() in ("y", "yes"):
-                case.trust(name)
-        else:
-            print(f"When you have read it: {command_line('studio', *options(case=folder, trust=name))}")
-
-
-def locked(folder: Path) -> IO[str]:
-    """A lock on the case that ends with this process, however that ends. Raises `InputError` where one is held."""
-    stream = (folder / LOCK).open("w")
-    try:
-        import fcntl
-
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except ImportError:  # not on this system: two studios of one case are then noticed when the second one writes
-        pass
-    except OSError:
-        stream.close()
-        raise InputError(
-            f"the case {folder} is open in another studio", hint="use its page; several tabs show the same"
-        ) from None
-    return stream
-
-
 def serve(case: Case, port: int = 0, *, browser: bool = True) -> int:
     """Serve until Ctrl-C or a request to end; returns 0. Raises `InputError` where the port is taken."""
-    with locked(case.folder):
-        os.chdir(case.folder)  # so that files are named as the commands in the history name them
-        case.folder = Path()
-        session = Session(case)
-        try:
-            studio = Studio(session, port)
-        except OSError as error:
-            session.close()
-            raise InputError(f"port {port}: {error.strerror}", hint="leave --port out: a free one is taken") from None
-        print(f"case    {Path.cwd()}\nstudio  {studio.address}\nCtrl-C ends it", flush=True)
-        signal.signal(signal.SIGTERM, lambda *_: threading.Thread(target=studio.close).start())
-        if browser:
-            threading.Thread(target=webbrowser.open, args=(studio.address,), daemon=True).start()
-        try:
-            studio.serve_forever(poll_interval=0.2)
-        except KeyboardInterrupt:
-            session.close()
-            studio.server_close()
+    os.chdir(case.folder)  # so that files are named as the commands in the history name them
+    case.folder = Path()
+    session = Session(case)
+    try:
+        studio = Studio(session, port)
+    except OSError as error:
+        session.close()
+        raise InputError(f"port {port}: {error.strerror}", hint="leave --port out: a free one is taken") from None
+    print(f"case    {Path.cwd()}\nstudio  {studio.address}\nCtrl-C ends it", flush=True)
+    signal.signal(signal.SIGTERM, lambda *_: threading.Thread(target=studio.close).start())
+    if browser:
+        threading.Thread(target=webbrowser.open, args=(studio.address,), daemon=True).start()
+    try:
+        studio.serve_forever(poll_interval=0.2)
+    except KeyboardInterrupt:
+        session.close()
+        studio.server_close()
     return 0

@@ -9,9 +9,7 @@ from __future__ import annotations
 import hmac
 import json
 import secrets
-import socket
 import threading
-from contextlib import suppress
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -33,24 +31,17 @@ LARGEST_FILE = 64 * 1024 * 1024  # bytes of a dropped file
 LARGEST_QUESTION = 1024 * 1024
 
 
-MOST_SILENT = 32  # connections that have not shown the token yet, each with a thread
-
-
 BEAT = 15.0  # s between two signs of life of an event stream
 
 
 PLAIN = {
+    **dict.fromkeys((".toml", ".py", ".nc", ".ngc", ".txt"), "text/plain"),
     ".json": "application/json",
     ".csv": "text/csv",
     ".png": "image/png",
     ".html": "text/html",
-    ".toml": "text/plain",
     ".pdf": "application/pdf",
-    ".py": "text/plain",
-    ".nc": "text/plain",
-    ".txt": "text/plain",
     ".svg": "image/svg+xml",
-    ".ngc": "text/plain",
 }
 
 
@@ -78,29 +69,6 @@ class Studio(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", port), Handler)
         self.session, self.token = session, token or secrets.token_urlsafe(24)
         self.closing = threading.Event()
-        self._silent: dict[Any, None] = {}  # connections that have not shown the token, the oldest first
-        self._silent_lock = threading.Lock()
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Serve a connection in a thread; where too many say nothing, the one that did so longest is ended."""
-        with self._silent_lock:
-            self._silent[request] = None
-            if len(self._silent) > MOST_SILENT:
-                oldest = next(iter(self._silent))
-                del self._silent[oldest]
-                with suppress(OSError):
-                    oldest.shutdown(socket.SHUT_RDWR)
-        super().process_request(request, client_address)
-
-    def is_known(self, request: Any) -> None:
-        """Of a connection that has shown the token, or has ended."""
-        with self._silent_lock:
-            self._silent.pop(request, None)
-
-    def shutdown_request(self, request: Any) -> None:
-        """End a connection."""
-        self.is_known(request)
-        super().shutdown_request(request)
 
     @property
     def address(self) -> str:
@@ -139,7 +107,6 @@ class Handler(BaseHTTPRequestHandler):
             if self._refused():
                 self.close_connection = True
                 return self._send(HTTPStatus.FORBIDDEN, REFUSED, "text/plain")
-            self.server.is_known(self.request)
             answer()
         except TpsError as error:
             self._json({"error": str(error)})

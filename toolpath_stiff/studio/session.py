@@ -15,7 +15,7 @@ from toolpath_stiff.case.history import python_line
 from toolpath_stiff.case.steps import Step
 from toolpath_stiff.documents import Document
 from toolpath_stiff.studio.editing import Editing
-from toolpath_stiff.studio.work import Job
+from toolpath_stiff.studio.work import Answer, Job
 
 READING = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz", "stiffness_N_per_mm", "force_N")
 
@@ -49,7 +49,7 @@ class Session:
         self._version = self._beat = 0
         self._jobs: list[tuple[str, dict[str, Any]]] = []
         self._running: Job | None = None
-        self._found: dict[tuple[str, Any], dict[str, Any]] = {}  # kind and what it was found for -> what was found
+        self._found: dict[tuple[str, object], Answer] = {}  # kind and what it was found for -> what was found
         self._failed: dict[str, tuple[Any, str]] = {}
         self.message = ""
         self.revealed: dict[str, Any] | None = None
@@ -123,19 +123,19 @@ class Session:
         on = self.case.state.on
         return self.once("errors", (self.data_key, on), lambda: self.case.preview.at(on, strut_law=bool(on)))
 
-    def found(self, kind: str) -> dict[str, Any] | None:
+    def found(self, kind: str) -> Answer | None:
         """What was found last, if it still holds."""
         return self._found.get((kind, self.key(kind)))
 
     def document(self, kind: str) -> Document | None:
         """The document of what was found last, if it still holds."""
         latest = self.found(kind)
-        return latest["document"] if latest else None
+        return latest.document if latest else None
 
     def catalogue(self) -> tps.EffectCatalogue:
         """The effects that can be switched on."""
-        files = self.case.state.effects
-        return self.once("catalogue", files, lambda: tps.effects([self.case.path(name) for name in files]))
+        files = self.case.effect_files
+        return self.once("catalogue", files, lambda: tps.effects(files))
 
     def trial(self) -> tps.PlacementTrial:
         """The program that can be put anywhere."""
@@ -177,14 +177,14 @@ class Session:
         first: dict[str, str] = {}
         if kind == "analyze":
             fit = self.found("update")
-            fitted = fit["result"] if fit and fit["accepted"] and self.is_fitted else ""
+            fitted = fit.result if fit and fit.accepted and self.is_fitted else ""
             given = {"machine": f"{fitted}/machine.toml"} if fitted else {}
             first = {"first": self.first_machine}
         result = self.case.next_result(kind)
         self._running = Job(self.case.folder, kind, {"result": result, **first, **given}, given, self.key(kind))
         self._running.follow(lambda: self.tell(state=False), self._done)
 
-    def _done(self, job: Job, answer: dict[str, Any] | None, error: str) -> None:
+    def _done(self, job: Job, answer: Answer | None, error: str) -> None:
         with self.lock:
             self._running = None
             if job.key == self.key(job.kind):
@@ -196,21 +196,20 @@ class Session:
             self.follow_up()
         self.tell()
 
-    def _take(self, job: Job, answer: dict[str, Any]) -> None:
+    def _take(self, job: Job, answer: Answer) -> None:
         """An answer into the history; what was fitted or drafted acts from now on."""
-        result, document = job.options["result"], answer["document"]
-        self._found[job.kind, job.key] = {**answer, "result": result}
-        if not self._is_recorded(job.kind, answer["command"]):
-            line, text = python_line(job.kind, (), job.given), answer["text"].strip("<>")
-            self.case.record(job.kind, text, command=answer["command"], python=line, result=result)
+        self._found[job.kind, job.key] = answer
+        if not self._is_recorded(job.kind, answer.command):
+            line = python_line(job.kind, (), job.given)
+            self.case.record(job.kind, answer.text, answer.command, python=line, result=answer.result)
         if job.kind == "update":  # the fit holds for the sizes that the switches take over
-            for name, sizes in fitted_sizes(document).items():
+            for name, sizes in fitted_sizes(answer.document).items():
                 if name in self.case.state.on:
                     self.case.switch(name, {**self.case.state.on[name], **sizes})
         if job.kind == "draft":
-            self.message = document["reason"]
-            if document["file"]:  # written by the tool itself
-                self.case.add_effects(self.case.folder / document["file"])
+            self.message = answer.document["reason"]
+            if answer.file:  # written by the tool itself
+                self.case.add_effects(self.case.folder / answer.file)
 
     def _is_recorded(self, kind: str, command: str) -> bool:
         """True where the history has it since the last change: a studio that resumes works some things out again."""
@@ -221,7 +220,7 @@ class Session:
     def is_fitted(self) -> bool:
         """True where the switches stand as the last fit has them."""
         fit = self.found("update")
-        return fit is not None and {n: dict(k) for n, k in self.case.state.on.items()} == fitted_sizes(fit["document"])
+        return fit is not None and {n: dict(k) for n, k in self.case.state.on.items()} == fitted_sizes(fit.document)
 
     @property
     def first_machine(self) -> str:
@@ -252,8 +251,7 @@ class Session:
                     self.revealed = document
                     continue
                 accepted = (folder / "machine.toml").is_file()
-                entry = {"text": step.text, "document": document, "result": step.result, "accepted": accepted}
-                self._found[kind, self.data_key] = entry
+                self._found[kind, self.data_key] = Answer(step.text, step.command, document, step.result, accepted)
 
     def cancel(self) -> None:
         """End the work under way, and forget what waits."""

@@ -6,6 +6,7 @@ import multiprocessing
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 
 import toolpath_stiff as tps
 from toolpath_stiff.case.case import Case
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
 
 COARSE_SAMPLES = 6000  # of a path in the page; the statistics are those of all samples
@@ -97,32 +99,57 @@ def work(folder: str, kind: str, options: Mapping[str, Any], pipe: Connection) -
         pipe.send(("error", f"{type(error).__name__}: {error}"))
 
 
+@dataclass(frozen=True)
+class Answer:
+    """What the page needs of a result.
+
+    Attributes
+    ----------
+    text, command, document
+        In some words; the command that gives it; as plain data.
+    result
+        The folder of the case that it is kept in.
+    accepted
+        True for a fit that the data support.
+    file
+        What was drafted, or written for the shop floor, in that folder; "" where nothing was.
+    path
+        Of an analysis, column by column.
+    """
+
+    text: str
+    command: str
+    document: Document
+    result: str
+    accepted: bool = False
+    file: str = ""
+    path: Document = field(default_factory=dict)
+
+
 def answer(
     case: Case, kind: str, tell: Callable[[str, int, int], None], result: str, first: str = "", **given: Any
-) -> dict[str, Any]:
+) -> Answer:
     """What the page needs of a result that is kept in the case; `first`: the machine to hold an analysis against."""
     case.plots = kind == "compare"  # the only one whose page is opened from the studio
     tell(kind, 0, 0)
     kept, command = case.find(kind, result, tell, **given)
-    reply: dict[str, Any] = {"text": repr(kept), "command": command}
+    file = ""
+    path: Document = {}
     if kind == "draft":
         file = f"{result}/{kept.name}.toml" if kept.text else ""
-        return {**reply, "document": {"reason": kept.reason, "file": file}}
-    reply["document"] = kept.to_dict()
-    if kind == "update":
-        reply["accepted"] = kept.accepted
     elif kind == "set_up":
         names = (case.program.name, "not_written.txt")
-        reply["written"] = next(name for name in names if (case.folder / result / name).is_file())
+        file = next(f"{result}/{name}" for name in names if (case.folder / result / name).is_file())
     elif kind == "analyze":
         origin = case.state.origin or None
         given_machine = case.machine_of(first)
         before = tps.analyze(case.program, given_machine, origin_mm_deg=origin, partial=True, progress=tell)
-        reply["path"] = _columns(kept, before)
-    return reply
+        path = _columns(kept, before)
+    accepted = kind == "update" and kept.accepted
+    return Answer(repr(kept).strip("<>"), command, kept.to_dict(), result, accepted, file, path)
 
 
-def _columns(analysis: Any, before: Any) -> dict[str, Any]:
+def _columns(analysis: tps.Analysis, before: tps.Analysis) -> Document:
     """What the page draws of a path: at most so many samples, the lowest and the highest of every stretch."""
     frame, given = analysis.to_frame(), before.to_frame()["stiffness_N_per_mm"].to_numpy()
     stiffness = frame["stiffness_N_per_mm"].to_numpy()
@@ -137,7 +164,6 @@ def _columns(analysis: Any, before: Any) -> dict[str, Any]:
         "line": frame["line"].to_numpy()[rows].tolist(),
         "cut": (frame["motion"] != "rapid").to_numpy()[rows].tolist(),
         "plunge": (frame["cut"] == "plunge").to_numpy()[rows].tolist(),
-        "operation": frame["operation"].to_numpy()[rows].tolist(),
         "now": _plain(stiffness[rows], 1),
         "given": _plain(given[rows], 1) if len(given) == len(stiffness) else None,
         "sd": None if band is None else _plain(band[rows], 1),

@@ -13,16 +13,9 @@ from toolpath_stiff.nc.codes.center_path import offset_move
 from toolpath_stiff.nc.codes.code import FANUC, Code, g_codes
 from toolpath_stiff.nc.codes.corner import cut_corner
 from toolpath_stiff.nc.codes.feeds import feed_of_move
-from toolpath_stiff.nc.codes.points import (
-    XY,
-    axis_words,
-    cartesian,
-    control_point,
-    forget_polar,
-    know_place,
-    point_words,
-    refuse_while_rotated,
-)
+from toolpath_stiff.nc.codes.points import axis_words, cartesian, control_point, point_words
+from toolpath_stiff.nc.codes.polar import forget_polar
+from toolpath_stiff.nc.codes.unsettled import XY, know_place, refuse_while_rotated
 from toolpath_stiff.nc.frames import standing
 from toolpath_stiff.nc.moves import FEED, RAPID, Arc, Move
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Segment, State

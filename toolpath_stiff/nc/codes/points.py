@@ -1,17 +1,14 @@
-"""What the axis words of a block mean: points and steps, and what is refused where controls would take others. mm."""
+"""What the axis words of a block mean: points and steps. mm and degrees."""
 
 from __future__ import annotations
 
-import math
-
+from toolpath_stiff.nc.codes.polar import at_radius_and_angle, polar_point
+from toolpath_stiff.nc.codes.unsettled import settle
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.words import AXES, Word
+from toolpath_stiff.nc.words import AXES
 
 LINEAR = frozenset("XYZ")
-SAME_PLACE_MM = 1e-9
-XY = frozenset((0, 1))
-TURNED = "G10, or another work offset and M6, turned the coordinates: LinuxCNC's interpreter may have other ones"
 
 
 def axis_words(state: State, block: CurrentBlock) -> dict[int, float]:
@@ -28,11 +25,12 @@ def point_words(state: State, block: CurrentBlock) -> dict[int, float]:
     """As `axis_words`, of a block that moves in program coordinates: under G16 the second one is an angle."""
     block.polar_words = None
     if block.has("@") or block.has("^"):
-        return _at_radius_and_angle(state, block)
+        xy = at_radius_and_angle(state, block)
+        return {**axis_words(state, block), **xy}
     if state.polar is None:
         words = axis_words(state, block)
         if state.unsettled:
-            _settle(state, block, words)
+            settle(state, block, words)
         return words
     second = PLANES[state.plane][1]
     angle = block.take(AXES[second])
@@ -56,7 +54,7 @@ def destination(state: State, block: CurrentBlock, here: list[float], words: dic
     if state.polar is not None:
         first, second, _ = PLANES[state.plane]
         if first in words or second in words:
-            point[first], point[second] = _polar_point(state, block, words.get(first), words.get(second))
+            point[first], point[second] = polar_point(state, block, words.get(first), words.get(second))
     return point
 
 
@@ -75,88 +73,3 @@ def control_point(state: State, block: CurrentBlock, here: list[float], words: d
             elif not state.absolute:
                 point[axis] = present + words[axis]
     return point
-
-
-def _at_radius_and_angle(state: State, block: CurrentBlock) -> dict[int, float]:
-    """LinuxCNC's polar words: @ the radius, ^ the angle about the program zero, of the XY plane.
-
-    As measured on `rs274` 2.9: the one that is absent is that of the present point; in G91 both add to it.
-    """
-    word = block.values["@" if block.has("@") else "^"]
-    turned = state.polar is not None or state.unsettled or state.frames.rotation is not None
-    if state.dialect.increments or state.plane != "G17" or turned or block.has("X") or block.has("Y"):
-        problem = "is a polar word of LinuxCNC's, beside X or Y, outside of G17, or under G16 or a rotation"
-        raise block.fail(word, problem, "X and Y, or G16")
-    block.polar_words = (word, block.take("@"), block.take("^"))
-    return {**axis_words(state, block), **xy_of_polar_words(state, block)}
-
-
-def xy_of_polar_words(state: State, block: CurrentBlock) -> dict[int, float]:
-    """X and Y, as words in the distance mode in force, of the block's polar words at the present point."""
-    assert block.polar_words is not None
-    word, radius, angle = block.polar_words
-    here = state.frames.to_program(state.frames.position)
-    present, turn = math.hypot(here[0], here[1]), math.atan2(here[1], here[0])
-    if present < SAME_PLACE_MM and (radius is None or angle is None or not state.absolute):
-        raise block.fail(word, "counts from the present point, which is the program zero", "both @ and ^, in G90")
-    if radius is not None:
-        present = radius * state.length_scale + (0.0 if state.absolute else present)
-    if angle is not None:
-        turn = math.radians(angle) + (0.0 if state.absolute else turn)
-    point = (present * math.cos(turn), present * math.sin(turn))
-    return {axis: value if state.absolute else value - here[axis] for axis, value in enumerate(point)}
-
-
-def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle: float | None) -> tuple[float, float]:
-    """The point of G16's words, of which the last ones hold on."""
-    polar, letter = state.polar, AXES[PLANES[state.plane][0 if radius is not None else 1]]
-    assert polar is not None
-    if radius is not None:
-        if not state.absolute:
-            raise block.fail(
-                letter, "is a polar radius in incremental mode (G91)", "G90; the angle alone may be in G91"
-            )
-        polar[0] = radius
-    if angle is not None:
-        polar[1] = angle if state.absolute else polar[1] + angle
-    if math.isnan(polar[0]) or math.isnan(polar[1]):
-        raise block.fail(letter, "is half of a polar point, and nothing before it gives the other half", "both, in G90")
-    state.unsettled = None
-    turn = math.radians(polar[1])
-    return (polar[0] * math.cos(turn), polar[0] * math.sin(turn))
-
-
-def forget_polar(state: State) -> None:
-    """The tool or the zero moved by other than polar words: the next ones must name both."""
-    if state.polar is not None:
-        state.polar = [math.nan, math.nan]
-
-
-def refuse_while_rotated(state: State, block: CurrentBlock, word: Word | str, what: str) -> None:
-    """Refuse what Fanuc's controls forbid between G68 and G69."""
-    if state.frames.rotation is not None:
-        raise block.fail(word, f"{what} while the coordinate system is rotated (G68)", "G69 before it")
-
-
-def zero_moved(state: State) -> None:
-    """Note that the zero of turned coordinates moved: LinuxCNC's rs274 forgets it at the next M6."""
-    if state.frames.offsets.at(state.frames.active).rotation:
-        state.rotation_changed = True
-
-
-def know_place(state: State, block: CurrentBlock, word: Word) -> None:
-    """Refuse what depends on the present X and Y, after a G10 that turned the offset in force."""
-    if state.unsettled == "G10":
-        raise block.fail(word, f"depends on the present X and Y. {TURNED}", "a move with both X and Y before it")
-
-
-def _settle(state: State, block: CurrentBlock, words: dict[int, float]) -> None:
-    """Refuse what a control may read as another point: X and Y had other numbers before the rotation changed."""
-    named, complete = XY & words.keys(), state.absolute and words.keys() >= XY
-    if complete:
-        state.unsettled = None
-    elif state.unsettled == "G10":
-        raise block.fail(None, f"{TURNED}, and the next move does not name both X and Y", "both, in G90")
-    elif named and (state.absolute or state.unsettled == "G69"):
-        word = block.values[AXES[min(named)]]
-        raise block.fail(word, f"alone, or incremental, in the first move after {state.unsettled}", "X and Y, in G90")

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 from toolpath_stiff.nc.codes.arc import ARC_CODES
 from toolpath_stiff.nc.codes.code import Alias, Code
-from toolpath_stiff.nc.codes.coordinates import COORDINATE_CODES
 from toolpath_stiff.nc.codes.corner import CORNER_CODES
 from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
 from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
+from toolpath_stiff.nc.codes.dwell import DWELL_CODES
 from toolpath_stiff.nc.codes.feeds import FEED_CODES
 from toolpath_stiff.nc.codes.flow import FLOW_CODES
 from toolpath_stiff.nc.codes.modes import MODE_ALIASES, MODE_CODES
 from toolpath_stiff.nc.codes.motion import STRAIGHT_CODES
 from toolpath_stiff.nc.codes.passive import PASSIVE_CODES
+from toolpath_stiff.nc.codes.polar import POLAR_CODES
 from toolpath_stiff.nc.codes.refused import REFUSED
+from toolpath_stiff.nc.codes.rotation import ROTATION_CODES
 from toolpath_stiff.nc.codes.saved import SAVED_CODES
 from toolpath_stiff.nc.codes.set_offsets import SET_OFFSET_CODES
 from toolpath_stiff.nc.codes.shifts import SHIFT_CODES
@@ -27,9 +29,9 @@ from toolpath_stiff.nc.codes.tools import TOOL_CODES
 from toolpath_stiff.nc.codes.work_offsets import WORK_OFFSET_CODES
 
 UNDERSTOOD = (
-    *STRAIGHT_CODES, *ARC_CODES, *DRILLING_CODES, *MODE_CODES, *COORDINATE_CODES, *WORK_OFFSET_CODES,
-    *SET_OFFSET_CODES, *SHIFT_CODES, *FEED_CODES, *TOOL_CODES, *TOOL_LENGTH_CODES, *FLOW_CODES, *CUTTER_CODES,
-    *SAVED_CODES, *SYNCHRONISED_CODES, *PASSIVE_CODES, *CORNER_CODES,
+    *STRAIGHT_CODES, *ARC_CODES, *DRILLING_CODES, *MODE_CODES, *POLAR_CODES, *ROTATION_CODES, *WORK_OFFSET_CODES,
+    *SET_OFFSET_CODES, *SHIFT_CODES, *FEED_CODES, *DWELL_CODES, *TOOL_CODES, *TOOL_LENGTH_CODES, *FLOW_CODES,
+    *CUTTER_CODES, *SAVED_CODES, *SYNCHRONISED_CODES, *PASSIVE_CODES, *CORNER_CODES,
 )  # fmt: skip
 CODES: dict[str, Code] = {code.name: code for code in UNDERSTOOD}
 ALIASES: dict[str, Alias] = {alias.name: alias for alias in (*MODE_ALIASES, *TOOL_ALIASES)}

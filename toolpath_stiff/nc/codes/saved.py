@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from toolpath_stiff.nc.codes.code import family, m_codes
-from toolpath_stiff.nc.codes.points import forget_polar
+from toolpath_stiff.nc.codes.polar import forget_polar
 from toolpath_stiff.nc.codes.work_offsets import take_offset
 from toolpath_stiff.nc.state import CurrentBlock, SavedModes, State
 

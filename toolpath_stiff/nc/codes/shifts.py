@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from toolpath_stiff.nc.codes.code import Code, family, g_codes
 from toolpath_stiff.nc.codes.motion import know_position
-from toolpath_stiff.nc.codes.points import axis_words, forget_polar, refuse_while_rotated, zero_moved
+from toolpath_stiff.nc.codes.points import axis_words
+from toolpath_stiff.nc.codes.polar import forget_polar
+from toolpath_stiff.nc.codes.unsettled import refuse_while_rotated, zero_moved
 from toolpath_stiff.nc.state import CurrentBlock, State
 
 

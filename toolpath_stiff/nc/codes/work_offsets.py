@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, family, g_codes
-from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated, zero_moved
+from toolpath_stiff.nc.codes.polar import forget_polar
+from toolpath_stiff.nc.codes.unsettled import refuse_while_rotated, zero_moved
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
 from toolpath_stiff.nc.words import Word

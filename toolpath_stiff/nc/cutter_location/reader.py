@@ -19,9 +19,9 @@ from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, frame_in_comment, plain_point, read_statement
 from toolpath_stiff.nc.cutter_location.vocabulary import execute
 from toolpath_stiff.nc.geometry import ArcError
+from toolpath_stiff.nc.languages import any_statement
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Unsupported
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.words import any_statement
 
 NO_UNITS = "the file names no UNITS; its numbers are taken as mm"
 # CATIA's heading of an operation, a comment; NX and Autodesk's posts have TOOL PATH/ and CSI_TOOL_PATH/.
@@ -55,7 +55,7 @@ def read(request: Request) -> ReadProgram:
     >>> parse_program("UNITS/MM\nFEDRAT/600,MMPM\nFROM/0,0,50\nGOTO/0,0,0\nGOTO/40,0,0\nFINI\n", "part.apt")
     <ReadProgram part.apt: 2 moves, read as cutter-location file>
     """
-    state = CutterLocationState(request.name, copy.deepcopy(request.tool_table), request.controller.feed)
+    state = CutterLocationState(request.name, copy.deepcopy(request.controller.tools), request.controller.feed)
     for error in run(state, request.lines):
         raise error
     return program_of(state, request)

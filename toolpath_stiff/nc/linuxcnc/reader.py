@@ -63,7 +63,7 @@ class _Session:
         self.request, self.lines, self.limits = request, lines, limits
         self.rs274 = find_rs274(request.rs274, request.unconfined)
         self.offsets = copy.deepcopy(request.work_offsets)
-        self.tool_numbers = tool_numbers(request.tool_table, lines)
+        self.tool_numbers = tool_numbers(request.controller.tools, lines)
 
     def read(self) -> ReadProgram:
         request = self.request
@@ -94,7 +94,7 @@ class _Session:
             unsupported=tuple(self._unsupported()),
             warnings=(*self._warnings(source, given), *lathe_warning(self._turning(), moves)),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),
-            tools=tuple(tool_of(request.tool_table, number).in_use() for number in follower.used_tools),
+            tools=tuple(tool_of(request.controller.tools, number).in_use() for number in follower.used_tools),
             interpreter="linuxcnc",
             dialect="linuxcnc",
             jumps=tuple(follower.jumps),
@@ -144,14 +144,21 @@ class _Session:
         return run_rs274(
             numbered(lines, name, block_delete=bool(self.request.switches), prefix=prefix),
             parameter_file(self.offsets, shift, active),
-            tool_file(self.tool_numbers, self.request.tool_table),
+            tool_file(self.tool_numbers, self.request.controller.tools),
             rs274=self.rs274,
             limits=self.limits,
         )
 
     def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
         request = self.request
-        follower = Follower(request.name, self.lines, request.tool_table, request.posted, self.tool_numbers, reference)
+        follower = Follower(
+            request.name,
+            self.lines,
+            request.controller.tools,
+            request.controller.kinematics,
+            self.tool_numbers,
+            reference,
+        )
         follower.follow(run.canon)
         if run.refusal:
             raise ProgramError(run.refusal, file=request.name, line=run.line)

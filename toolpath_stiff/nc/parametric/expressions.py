@@ -17,29 +17,18 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from operator import and_, or_, xor
-from typing import Protocol
+from operator import add, and_, ge, gt, le, lt, mul, or_, sub, truediv, xor
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.place import Place
 
-NGC, MACRO_B, EITHER = "RS274/NGC", "Macro B", "either family"
+if TYPE_CHECKING:
+    from toolpath_stiff.nc.parametric.variables import Variables
 
 
-class VariableValues(Protocol):
-    """What expressions ask of the variables (`variables.Variables`)."""
-
-    def get(self, which: str | int, place: Place) -> float | None:
-        """The value of a variable; None: empty."""
-
-    def exists(self, name: str) -> bool:
-        """Whether a named variable has a value."""
-
-    def angle(self, y: float, x: float) -> float:
-        """ATAN[y]/[x], degrees."""
-
-
-Value = Callable[[VariableValues], float | None]  # None: an empty variable of Macro B
+Value = Callable[["Variables"], float | None]  # None: an empty variable of Macro B
 
 NUMBER = re.compile(r"\d+\.?\d*|\.\d+", re.ASCII)
 NAME = re.compile(r"<([^<>]*)>")
@@ -47,7 +36,7 @@ FUNCTION = re.compile(r"ABS|ACOS|ASIN|ATAN|COS|EXISTS|EXP|FIX|FUP|LN|POW|ROUND|S
 SHORT = {"RND": "ROUND", "SQR": "SQRT"}  # Fanuc's short forms
 OPERATOR = re.compile(r"\*\*|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE|[*/+-]")
 COMPARISONS = ("EQ", "NE", "GT", "GE", "LT", "LE")
-LOGIC = ("AND", "OR", "XOR")
+LOGIC: dict[str, Callable[[int, int], int]] = {"AND": and_, "OR": or_, "XOR": xor}
 # How tightly an operator binds. All are left-associative, `**` too (LinuxCNC: 2**3**2 is 64).
 _SHARED = {"*": 4, "/": 4, "MOD": 4, "+": 3, "-": 3, **dict.fromkeys(COMPARISONS, 2)}
 BINDS = {
@@ -127,10 +116,10 @@ class Scanner:
     def _missing(self, what: str, expected: str) -> InputError:
         return self.fail("the block ends here" if self.done else f"{self.rest()} is not {what}", expected)
 
-    def _worked_out(self, name: str, column: int, work: Callable[[VariableValues], float]) -> Value:
+    def _worked_out(self, name: str, column: int, work: Callable[[Variables], float]) -> Value:
         """A value whose result is a finite real number, or an error at `column`."""
 
-        def value(variables: VariableValues) -> float:
+        def value(variables: Variables) -> float:
             try:
                 return finite(work(variables))
             except (ArithmeticError, ValueError) as error:
@@ -191,34 +180,20 @@ class Scanner:
         where, which = self.place._replace(column=self.column), self.which()
         return lambda variables: variables.get(which(variables), where)
 
-    def which(self) -> Callable[[VariableValues], str | int]:
+    def which(self) -> Callable[[Variables], str | int]:
         """Which variable a `#` means: a number, the number that another one holds, an expression, a name."""
         column = self.column
         named = self.match(NAME)
         if named is not None:
             if self.family == MACRO_B:
-                raise self.fail(
-                    f"#<{named[1]}> is a named variable, which Macro B does not have", "#1 to #999", column=column
-                )
-            word = named[1]
-            return lambda variables: word
-        inner: Value
-        if self.next("#"):
-            self._deeper(column)
-            inner = self.variable()
-            self.depth -= 1
-        elif not self.done and self.text[self.position] == "[":
-            inner = self.bracket()
-        else:
-            literal = self.match(NUMBER)
-            if literal is None:
-                raise self.fail(
-                    f"# before {self.rest()}" if not self.done else "# at the end", "the number of a variable"
-                )
-            constant = float(literal[0])
-            inner = lambda variables: constant  # noqa: E731
+                problem = f"#<{named[1]}> is a named variable, which Macro B does not have"
+                raise self.fail(problem, "#1 to #999", column=column)
+            return lambda variables: named[1]
+        self._deeper(column)
+        inner = self._unsigned()
+        self.depth -= 1
 
-        def numbered(variables: VariableValues) -> int:
+        def numbered(variables: Variables) -> int:
             variable_number = number(inner(variables))
             if not abs(variable_number) < LARGEST_PLACE or abs(variable_number - round(variable_number)) > EQUAL:
                 raise self.fail(f"#{variable_number:g}", "a whole number", column=column)
@@ -238,13 +213,8 @@ class Scanner:
             operator = token[0]
             rank = BINDS[self.family].get(operator)
             if rank is None:
-                if operator in LOGIC:
-                    raise self.fail(
-                        f"{operator} works on truth values on LinuxCNC and on bits on Fanuc's and Haas' controls",
-                        hint="name the control with --dialect",
-                        column=column,
-                    )
-                raise self.fail(f"{operator} is no operator of {self.family}", column=column)
+                hint = "name the control with --dialect"
+                raise self.fail(f"{operator} is no operator of {self.family}", hint=hint, column=column)
             if rank <= tightest:
                 self.position = begin
                 return left
@@ -257,29 +227,28 @@ class Scanner:
         family = self.family
         if operator in ("EQ", "NE"):
             return lambda variables: equality(operator, left(variables), right(variables), family)
-        act = OPERATIONS[operator]
-        return self._worked_out(
-            operator, column, lambda variables: act(number(left(variables)), number(right(variables)), family)
-        )
+
+        def work(variables: Variables) -> float:
+            return operate(operator, number(left(variables)), number(right(variables)), family)
+
+        return self._worked_out(operator, column, work)
 
     def _function(self, name: str) -> Value:
         column, family = self.column, self.family
         if name == "EXISTS":
             return self._exists()
         if name == "ROUND" and self.of_word and family == MACRO_B:
-            raise self.fail(
-                "ROUND in a word, where it rounds to the least increment of the control", hint="round in an assignment"
-            )
+            raise self.fail("ROUND in a word, where it rounds to the least increment", "it in an assignment")
         if name in ("ATAN", "POW"):
             return self._of_two(name, column)
-        argument, act = self.bracket(), FUNCTIONS[name]
-        return self._worked_out(name, column, lambda variables: act(number(argument(variables)), family))
+        argument = self.bracket()
+        return self._worked_out(name, column, lambda variables: evaluate(name, number(argument(variables)), family))
 
     def _of_two(self, name: str, column: int) -> Value:
         """ATAN[y]/[x]; Macro B's ATAN[y,x] and POW[base,exponent] too."""
         start = self.position
         if not self.next("["):
-            raise self.fail(f"{name} without its bracket", "[", column=column)
+            raise self._missing("a bracket", "[")
         first = self.expression()
         if self.family != NGC and self.next(","):
             second = self.expression()
@@ -287,13 +256,11 @@ class Scanner:
         elif name == "ATAN" and self.next("]") and self.next("/"):
             second = self.bracket()
         else:
-            raise self.fail(
-                f"{name} with one value", "ATAN[y]/[x]" if name == "ATAN" else "POW[base,exponent]", column=column
-            )
+            raise self.fail(f"{name} with one value", "ATAN[y]/[x] or POW[base,exponent]", column=column)
         if name == "POW" and self.family == NGC:
             raise self.fail(f"POW is no function of {NGC}", column=column)
 
-        def work(variables: VariableValues) -> float:
+        def work(variables: Variables) -> float:
             left, right = number(first(variables)), number(second(variables))
             return left**right if name == "POW" else variables.angle(left, right)
 
@@ -327,95 +294,49 @@ def equality(operator: str, left: float | None, right: float | None, family: str
     return float(same == (operator == "EQ"))
 
 
-def modulo(left: float, right: float, family: str) -> float:
-    """MOD; never negative in NGC."""
-    if right == 0.0:
+def operate(operator: str, left: float, right: float, family: str) -> float:
+    """The value of an operator: logic of truth values in NGC, of bits in Macro B; MOD never negative in NGC."""
+    if operator in LOGIC:
+        if family == NGC:
+            return float(LOGIC[operator](left != 0.0, right != 0.0))
+        if any(value != round(value) or not 0 <= value < LARGEST_BITS for value in (left, right)):
+            raise ValueError("its values are not whole numbers from 0")
+        return float(LOGIC[operator](round(left), round(right)))
+    if operator in ("/", "MOD") and right == 0.0:
         raise ValueError("the divisor is 0")
+    if operator != "MOD":
+        return float(ARITHMETIC[operator](left, right))
     if family != NGC and (left < 0.0 or right < 0.0):
         raise ValueError("controls differ in the remainder of negative numbers")
     rest = math.fmod(left, right)
     return rest + abs(right) if rest < 0.0 else rest
 
 
-def divided(left: float, right: float, family: str) -> float:
-    """The quotient. Raises `ValueError` for a divisor of 0."""
-    if right == 0.0:
-        raise ValueError("the divisor is 0")
-    return left / right
+def evaluate(name: str, value: float, family: str) -> float:
+    """The value of a function: FIX and FUP go down and up in NGC, towards and from zero in Macro B.
 
-
-def logical(operator: str) -> Callable[[float, float, str], float]:
-    """AND, OR, XOR: of truth values in NGC, of bits in Macro B."""
-    combine: Callable[[int, int], int] = {"AND": and_, "OR": or_, "XOR": xor}[operator]
-
-    def act(left: float, right: float, family: str) -> float:
-        if family == NGC:
-            return float(combine(left != 0.0, right != 0.0))
-        if any(value != round(value) or not 0 <= value < LARGEST_BITS for value in (left, right)):
-            raise ValueError("its values are not whole numbers from 0")
-        return float(combine(round(left), round(right)))
-
-    return act
-
-
-OPERATIONS: dict[str, Callable[[float, float, str], float]] = {
-    "**": lambda left, right, family: left**right,
-    "*": lambda left, right, family: left * right,
-    "/": divided,
-    "+": lambda left, right, family: left + right,
-    "-": lambda left, right, family: left - right,
-    "MOD": modulo,
-    "GT": lambda left, right, family: float(left > right),
-    "GE": lambda left, right, family: float(left >= right),
-    "LT": lambda left, right, family: float(left < right),
-    "LE": lambda left, right, family: float(left <= right),
-    **{operator: logical(operator) for operator in LOGIC},
-}
-
-
-def whole(name: str, ngc: Callable[[float], float], macro: Callable[[float], float]) -> Callable[[float, str], float]:
-    """FIX and FUP: down and up in NGC, towards and from zero in Macro B."""
-
-    def act(value: float, family: str) -> float:
+    Angles are in degrees, to 14 digits: LinuxCNC works them out in long double, where ASIN[0.5] is 30, exactly; MOD and
+    FIX make something else of 30.000000000000004.
+    """
+    if name in ("FIX", "FUP"):
         if family == EITHER and value < 0.0:
             raise ValueError(f"controls differ in {name} of a negative number")
-        return float((ngc if family == NGC else macro)(value))
-
-    return act
-
-
-def trimmed(function: Callable[[float], float], degrees: bool = False) -> Callable[[float, str], float]:
-    """A function of angles in degrees (or, `degrees`, to them), to 14 digits.
-
-    LinuxCNC works these out in long double: ASIN[0.5] is 30 there, exactly; MOD and FIX make something else of
-    30.000000000000004.
-    """
-
-    def act(value: float, family: str) -> float:
-        result = math.degrees(function(value)) if degrees else function(math.radians(value))
-        return float(f"{result:.14g}")
-
-    return act
+        up = (name == "FUP") != (family == MACRO_B and value < 0.0)
+        return float(math.ceil(value) if up else math.floor(value))
+    if name == "TAN" and abs(abs(math.fmod(value, 180.0)) - 90.0) < NO_TANGENT_DEGREES:
+        raise ValueError("the angle is 90 degrees")  # digits that no control shares decide
+    if name in OF_ANGLES:
+        return float(f"{OF_ANGLES[name](math.radians(value)):.14g}")
+    if name in TO_ANGLES:
+        return float(f"{math.degrees(TO_ANGLES[name](value)):.14g}")
+    if name == "ROUND":  # half away from zero
+        return math.copysign(math.floor(abs(value) + 0.5), value)
+    return OF_NUMBERS[name](value)
 
 
-def tangent(value: float, family: str) -> float:
-    """TAN, refused where it is infinite and digits that no control shares decide."""
-    if abs(abs(math.fmod(value, 180.0)) - 90.0) < NO_TANGENT_DEGREES:
-        raise ValueError("the angle is 90 degrees")
-    return trimmed(math.tan)(value, family)
-
-
-FUNCTIONS: dict[str, Callable[[float, str], float]] = {
-    "ABS": lambda value, family: abs(value),
-    "ACOS": trimmed(math.acos, degrees=True),
-    "ASIN": trimmed(math.asin, degrees=True),
-    "COS": trimmed(math.cos),
-    "EXP": lambda value, family: math.exp(value),
-    "FIX": whole("FIX", math.floor, math.trunc),
-    "FUP": whole("FUP", math.ceil, lambda value: math.copysign(math.ceil(abs(value)), value)),
-    "LN": lambda value, family: math.log(value),
-    "ROUND": lambda value, family: math.copysign(math.floor(abs(value) + 0.5), value),  # half away from zero
-    "SIN": trimmed(math.sin),
-    "SQRT": lambda value, family: math.sqrt(value),
-    "TAN": tangent,
-}
+OF_NUMBERS: dict[str, Callable[[float], float]] = {"ABS": abs, "EXP": math.exp, "LN": math.log, "SQRT": math.sqrt}
+OF_ANGLES = {"SIN": math.sin, "COS": math.cos, "TAN": math.tan}
+TO_ANGLES = {"ACOS": math.acos, "ASIN": math.asin}
+ARITHMETIC: dict[str, Callable[[float, float], float]] = {
+    "**": pow, "*": mul, "/": truediv, "+": add, "-": sub, "GT": gt, "GE": ge, "LT": lt, "LE": le,
+}  # fmt: skip

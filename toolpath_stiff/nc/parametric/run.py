@@ -10,35 +10,30 @@ from bisect import bisect_right
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.parametric.endless import LoopGuard
-from toolpath_stiff.nc.parametric.expressions import EQUAL, NGC, number
+from toolpath_stiff.nc.parametric.expressions import EQUAL, number
+from toolpath_stiff.nc.parametric.families import NGC
 from toolpath_stiff.nc.parametric.statements import Steering
-from toolpath_stiff.nc.parametric.structure import Structure, loops_of, structure_of
-from toolpath_stiff.nc.parametric.values import SHOWN, ValuesRun
+from toolpath_stiff.nc.parametric.structure import Structure, loops_of, shown, structure_of
+from toolpath_stiff.nc.parametric.values import ValuesRun
 from toolpath_stiff.nc.program_run import HEAD, Subprogram, Tally, beyond_the_end
-from toolpath_stiff.nc.state import Flow, GoTo, State
+from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.state import Flow, GoTo
 
 MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
+MOST_IDLE = 100_000  # blocks of loops that run without a move between; a program that works out values needs far fewer
 
 
 class ParametricRun(ValuesRun):
     """A run of a program with variables, and with what steers it."""
 
-    def __init__(
-        self,
-        state: State,
-        lines: tuple[str, ...],
-        name: str,
-        switches: frozenset[int],
-        folder: str | Path | None,
-        tally: Tally | None = None,
-    ) -> None:
-        super().__init__(state, lines, name, switches, folder, tally)
+    def __init__(self, request: Request, tally: Tally | None = None) -> None:
+        super().__init__(request, tally)
         self._structure: Structure | None = None
         self._loops: dict[int, int] | None = None
         self._counts: dict[int, int] = {}  # repeats left in the main program, by line
         self._steps = 0
-        self._guard = LoopGuard(state)
+        self._passes: dict[int, str] = {}  # by the line that jumps back: what changes often, as it was there
+        self._moved = (0, 0)  # moves at the last jump back after a move, and the blocks that had run by then
         self._began = False  # a variable was set, or the flow steered
 
     def _load(self, names: tuple[str, ...]) -> None:
@@ -73,20 +68,15 @@ class ParametricRun(ValuesRun):
         return super()._jump(row, to) if max(row, to) < self._main_lines else to
 
     def _check_loop(self, row: int, to: int) -> None:
-        """Refuse a loop that cannot end, or makes no move in very many blocks, where it goes back."""
-        known = self.variables
-        often: list[object] = [
-            row,
-            [*self.state.frames.position],
-            [(dict(level.numbered), dict(level.named)) for level in known.levels],
-            dict(known.common),
-            dict(known.named),
-            dict(self._counts),
-            [(level.first, level.back, level.again, dict(level.counts)) for level in self._levels],
-        ]
-        problem, expected = self._guard.fault(self._steps, often, (self._modal, self._began))
-        if problem:
-            raise self._fail(row, problem.format(self._place(to).line), expected)
+        """Refuse a loop in which nothing changes, or that makes no move in very many blocks, where it goes back."""
+        state, known = self.state, self.variables
+        kept = repr((state.frames.position, known.levels, known.common, known.named, self._counts, self._levels))
+        if len(state.recorder) != self._moved[0]:
+            self._moved = (len(state.recorder), self._steps)
+        if kept == self._passes.get(row) or self._steps - self._moved[1] > MOST_IDLE:
+            problem = f"the loop back to line {self._place(to).line} never ends"
+            raise self._fail(row, f"{problem}: no variable or position changes, or nothing moves", "a loop that ends")
+        self._passes[row] = kept
 
     def _return(self, row: int, flow: Flow | GoTo) -> int | None:
         """M99; with P it goes on at that block of the caller, wherever that is."""
@@ -102,8 +92,11 @@ class ParametricRun(ValuesRun):
         act = (NGC_STEPS if self.family == NGC else MACRO_STEPS).get(steering.kind)
         return None if act is None else act(self, row, steering)
 
+    def _value(self, steering: Steering, which: int = 0) -> float:
+        return number(steering.values[which](self.variables))
+
     def _true(self, steering: Steering) -> bool:
-        return number(steering.values[0](self.variables)) != 0.0
+        return self._value(steering) != 0.0
 
     def _if(self, row: int, steering: Steering) -> int | None:
         if self._true(steering):
@@ -129,7 +122,7 @@ class ParametricRun(ValuesRun):
         return self._ngc().start[row]
 
     def _repeat(self, row: int, steering: Steering) -> int | None:
-        count = number(steering.values[0](self.variables))
+        count = self._value(steering)
         if abs(count - round(count)) > EQUAL:
             raise self._fail(row, f"repeat [{count:g}]", "a whole number", column=steering.column)
         if round(count) <= 0:
@@ -163,35 +156,27 @@ class ParametricRun(ValuesRun):
     def _return_sub(self, row: int, steering: Steering) -> int | None:
         if not self._levels:
             raise self._fail(row, f"{steering.kind.lower()} outside any subprogram", column=steering.column)
-        value = number(steering.values[0](self.variables)) if steering.values else None
-        self.variables.named["_VALUE_RETURNED"] = float(value is not None)
-        self.variables.named["_VALUE"] = 0.0 if value is None else value
+        self.variables.named["_VALUE_RETURNED"] = float(bool(steering.values))
+        self.variables.named["_VALUE"] = self._value(steering) if steering.values else 0.0
         return self._leave(row)
 
     def _call_sub(self, row: int, steering: Steering) -> int | None:
-        label = steering.label.known(self.variables)
+        label = steering.label
         structure = self._ngc()
-        if label not in structure.subs and self.folder is not None:
-            name = label.strip("<>")
-            if Path(name).name != name:
-                raise self._fail(row, f"o{label.lower()[:SHOWN]} is not the name of a file", column=steering.column)
+        name = label.strip("<>")
+        if label not in structure.subs and self.folder is not None and Path(name).name == name:
             self._load((name.lower(), name, *(() if label.startswith("<") else (f"o{name}",))))
             structure = self._ngc()
         if label not in structure.subs:
-            where = "" if self.folder is None else f", and {str(self.folder)!r} has no file of it"
-            raise self._fail(
-                row,
-                f"o{label.lower()[:SHOWN]} call: the program has no such sub{where}",
-                hint="" if self.folder else "name the folder of its subprograms with --subprograms FOLDER",
-                column=steering.column,
-            )
+            problem = f"{shown(steering)}: the program, or the folder of its subprograms, has no such sub"
+            raise self._fail(row, problem, "--subprograms FOLDER, with that name", column=steering.column)
         first = structure.subs[label] + 1
         values = {place: number(value(self.variables)) for place, value in enumerate(steering.values, 1)}
-        self._begin(Subprogram(f"o{label.lower()[:SHOWN]}", first, row + 1, 0, dict(values)), row, steering.column)
+        self._begin(Subprogram(f"o{name.lower()}", first, row + 1, 0, dict(values)), row, steering.column)
         return first
 
     def _goto(self, row: int, steering: Steering) -> int | None:
-        return self._go_on(row, number(steering.values[-1](self.variables)), steering.column)
+        return self._go_on(row, self._value(steering, -1), steering.column)
 
     def _if_goto(self, row: int, steering: Steering) -> int | None:
         return self._goto(row, steering) if self._true(steering) else None
@@ -211,7 +196,7 @@ class ParametricRun(ValuesRun):
     def _end_do(self, row: int, steering: Steering) -> int | None:
         loops = self._macro_loops()
         if row not in loops:
-            raise self._fail(row, f"END{steering.label.text} without DO{steering.label.text}", column=steering.column)
+            raise self._fail(row, f"END{steering.label} without DO{steering.label}", column=steering.column)
         return loops[row]
 
     def _numbered(self, row: int, number: float) -> list[int]:

@@ -1,4 +1,4 @@
-"""The blocks of parametric programs: which family they show, their words, assignments and control of the flow.
+"""The blocks of parametric programs: their words, assignments and control of the flow.
 
 RS274/NGC: LinuxCNC's manual, "O Codes". Macro B: Fanuc's operator's manuals, "Custom macro" ("Branch and repetition").
 A block is read once, to a `Statement`; running it works out its values.
@@ -7,12 +7,13 @@ A block is read once, to a `Statement`; running it works out its values.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.nc.controller import Dialect
-from toolpath_stiff.nc.parametric.expressions import EITHER, MACRO_B, NGC, Scanner, Value
+from toolpath_stiff.nc.parametric.expressions import Scanner, Value
+from toolpath_stiff.nc.parametric.families import MACRO_B, NGC, NGC_WORDS
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.words import (
     LETTERS,
@@ -29,102 +30,10 @@ if TYPE_CHECKING:
     from toolpath_stiff.nc.parametric.variables import Variables
 
 
-NGC_WORDS = (
-    "SUB", "ENDSUB", "CALL", "RETURN", "IF", "ELSEIF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "DO", "REPEAT",
-    "ENDREPEAT", "BREAK", "CONTINUE",
-)  # fmt: skip
-
-
 _NGC_WORD = re.compile("|".join(sorted(NGC_WORDS, key=len, reverse=True)))
-
-
-_NUMBERED = re.compile(r"\d+", re.ASCII)
-
-
+_O_LABEL = re.compile(r"\d+|<[^>]*>", re.ASCII)
 _N_WORD = re.compile(r"N\d+(?:\.\d+)?", re.ASCII)
-
-
 _LABEL = re.compile(r"(?:DO|END)(\d+)", re.ASCII)
-
-
-# What only one family has, in a line without comments and blanks, in upper case.
-_BEGIN = r"^(?:/\d?)?(?:N\d+)?"
-
-
-_NGC_SIGN = re.compile(
-    rf"{_BEGIN}O(?:<|\[|#|\d+(?:{'|'.join(NGC_WORDS)}))|#<|\*\*|EXISTS\["  # o<x> sub, #<name>
-)
-
-
-_MACRO_SIGN = re.compile(rf"{_BEGIN}(?:IF\[|WHILE\[|GOTO[\d#\[]|DO\d|END\d)|G6[5-7](?!\d)|POW\[")
-
-
-_ANY_SIGN = re.compile(r"[#\[]")
-
-
-_COMMENT = re.compile(r"\([^)]*\)|;.*")
-
-
-_SUSPECT = re.compile(r"[#\[oOiIwWdD]|[gG]\s*0*6")
-
-
-def uses_variables(lines: tuple[str, ...]) -> bool:
-    """Whether any line holds a variable, an expression, or control of the flow.
-
-    Examples
-    --------
-    >>> uses_variables(("G1 X10 (#1)",)), uses_variables(("#1 = 5", "G1 X#1"))
-    (False, True)
-    """
-    return any(sign.search(text) for _, text in _bare(lines) for sign in (_ANY_SIGN, _NGC_SIGN, _MACRO_SIGN))
-
-
-def _bare(lines: tuple[str, ...]) -> Iterator[tuple[int, str]]:
-    """Number and text of lines that may matter, without comments and blanks, in upper case."""
-    for number, line in enumerate(lines, 1):
-        if _SUSPECT.search(line):
-            yield number, "".join(_COMMENT.sub(" ", line).split()).upper()
-
-
-def family_of(lines: tuple[str, ...], dialect: Dialect, name: str) -> str:
-    """The family of a program: the dialect's or, for `generic`, that of which the program shows signs.
-
-    Raises
-    ------
-    ProgramError
-        It shows signs of both.
-    """
-    if dialect.name == "linuxcnc":
-        return NGC
-    if dialect.name in ("fanuc", "haas"):
-        return MACRO_B
-    signs = {}
-    for family, sign in ((NGC, _NGC_SIGN), (MACRO_B, _MACRO_SIGN)):
-        first = next((number for number, text in _bare(lines) if sign.search(text)), None)
-        if first is not None:
-            signs[family] = first
-    if len(signs) == 2:
-        raise Place(name, max(signs.values())).fail(
-            f"line {signs[NGC]} is of LinuxCNC's language (O words, #<name>, **), line {signs[MACRO_B]} of Macro B "
-            "(IF GOTO, WHILE DO, G65)",
-            hint="name the control with --dialect",
-        )
-    return next(iter(signs), EITHER)
-
-
-@dataclass(frozen=True)
-class Label:
-    """The label of an O word: its text, or the value that gives it."""
-
-    text: str
-    number: Value | None = None
-
-    def known(self, variables: Variables) -> str:
-        """The label when the block runs."""
-        if self.number is None:
-            return self.text
-        value = self.number(variables)
-        return f"{0 if value is None else round(value)}"
 
 
 @dataclass(frozen=True)
@@ -155,7 +64,7 @@ class Steering:
     """
 
     kind: str
-    label: Label
+    label: str
     values: tuple[Value, ...] = ()
     then: tuple[Assignment, ...] = ()
     column: int = 1
@@ -226,7 +135,7 @@ def _steering(block: Scanner) -> Steering | None:
     if label is not None:
         kind = "DO" if label[0].startswith("DO") else "END"
         _check_loop(block, label[1], column)
-        steering = Steering(kind, Label(label[1]), column=column)
+        steering = Steering(kind, label[1], column=column)
     elif block.text.startswith("IF[", block.position):
         steering = _if(block, column)
     elif block.text.startswith("WHILE[", block.position):
@@ -236,9 +145,9 @@ def _steering(block: Scanner) -> Steering | None:
         if label is None or not label[0].startswith("DO"):
             raise block.fail("WHILE without its DO", "WHILE[...]DO1", column=column)
         _check_loop(block, label[1], column)
-        steering = Steering("WHILE", Label(label[1]), (condition,), column=column)
+        steering = Steering("WHILE", label[1], (condition,), column=column)
     elif block.next("GOTO"):
-        steering = Steering("GOTO", Label(""), (block.value(),), column=column)
+        steering = Steering("GOTO", "", (block.value(),), column=column)
     else:
         return None
     return _alone(block, steering)
@@ -253,13 +162,13 @@ def _if(block: Scanner, column: int) -> Steering:
     block.next("IF")
     condition = block.bracket()
     if block.next("GOTO"):
-        return Steering("IF", Label(""), (condition, block.value()), column=column)
+        return Steering("IF", "", (condition, block.value()), column=column)
     if block.next("THEN"):
         assignments = []
         while not block.done:
             assignments.append(_assignment(block))
         if assignments:
-            return Steering("THEN", Label(""), (condition,), tuple(assignments), column=column)
+            return Steering("THEN", "", (condition,), tuple(assignments), column=column)
     raise block.fail("IF without GOTO or an assignment after THEN", "IF[...]GOTO10 or IF[...]THEN #1=0", column=column)
 
 
@@ -275,13 +184,11 @@ def _o_word(block: Scanner) -> Steering:
     if block.family == MACRO_B:
         raise block.fail(f"{block.rest()} is no program number", "O and digits, or --dialect linuxcnc")
     block.position += 1
-    label = _label(block, column)
+    label = _label(block)
     kind = block.match(_NGC_WORD)
     if kind is None:
-        raise block.fail(
-            f"the O word {label.text or 'of a value'} without what it does: {block.rest()}",
-            ", ".join(NGC_WORDS).lower(),
-        )
+        problem = f"the O word {label} without what it does: {block.rest()}"
+        raise block.fail(problem, ", ".join(NGC_WORDS).lower())
     values = []
     if kind[0] == "CALL":
         while not block.done and block.text[block.position] == "[":
@@ -294,18 +201,12 @@ def _o_word(block: Scanner) -> Steering:
     return _alone(block, Steering(kind[0], label, tuple(values), column=column))
 
 
-def _label(block: Scanner, column: int) -> Label:
-    digits = block.match(_NUMBERED)
-    if digits is not None:
-        return Label(digits[0].lstrip("0") or "0")
-    if block.next("<"):
-        end = block.text.find(">", block.position)
-        if end < 0:
-            raise block.fail("an O word whose name is not closed", ">", column=column)
-        name = block.text[block.position - 1 : end + 1]
-        block.position = end + 1
-        return Label(name)
-    return Label("", block.value())
+def _label(block: Scanner) -> str:
+    """The number or the name in angle brackets after an O."""
+    label = block.match(_O_LABEL)
+    if label is None:
+        raise block.fail(f"{block.rest()} is no label of an O word", "O with a number, or a name as <name>")
+    return label[0] if label[0][0] == "<" else label[0].lstrip("0") or "0"
 
 
 def _contents(block: Scanner, text: str) -> tuple[list[tuple[str, Value | float, int, str]], list[Assignment]]:

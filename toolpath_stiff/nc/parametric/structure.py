@@ -17,15 +17,10 @@ if TYPE_CHECKING:
 
 
 Fail = Callable[..., InputError]  # (line from 0, found, expected, hint, column)
-
-
 OPENERS = {"ENDSUB": "SUB", "ENDIF": "IF", "ENDWHILE": "WHILE", "ENDREPEAT": "REPEAT"}
-
-
 SHOWN = 40  # characters of a label in a message
-
-
 LOOPS = ("WHILE", "DO", "REPEAT")
+UNPAIRED = "does not belong to what is open before it"
 
 
 # Macro B, argument specification I and II ("Macro call", "Argument specification").
@@ -33,14 +28,8 @@ ARGUMENTS = {
     "A": 1, "B": 2, "C": 3, "D": 7, "E": 8, "F": 9, "H": 11, "I": 4, "J": 5, "K": 6, "M": 13, "Q": 17, "R": 18, "S": 19,
     "T": 20, "U": 21, "V": 22, "W": 23, "X": 24, "Y": 25, "Z": 26,
 }  # fmt: skip
-
-
 SECOND_KIND = {"A": 1, "B": 2, "C": 3}  # then I, J, K up to ten times, from #4
-
-
 LAST_LOCAL = 33
-
-
 WHOLE_ARGUMENTS = frozenset("DHMST")  # numbers of tools, offsets and speeds: no decimal point belongs to them
 
 
@@ -73,13 +62,7 @@ class Structure:
     faults: dict[int, InputError] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class _Opened:
-    """A structure that is not closed yet."""
-
-    kind: str
-    label: str
-    row: int
+Opened = list[tuple[int, "Steering"]]  # lines and O words that nothing has closed yet
 
 
 def structure_of(steerings: Iterable[tuple[int, Steering]], firsts: set[int], fail: Fail) -> Structure:
@@ -94,72 +77,60 @@ def structure_of(steerings: Iterable[tuple[int, Steering]], firsts: set[int], fa
     fail
         Makes the error of a line.
     """
-    structure = Structure()
-    opened: list[_Opened] = []
-    labels: list[dict[str, int]] = [{}]  # of the file, and of the sub that is open
+    structure, opened = Structure(), Opened()
+    labels: list[set[str]] = [set()]  # of the file, and of the sub that is open
     for row, steering in steerings:
         if row in firsts:
-            labels = [{}]
+            labels = [set()]
         fault = _pair(structure, opened, labels, row, steering)
         if fault:
-            structure.faults[row] = fail(row, *fault, column=steering.column)
-    endless = {start.row: f"o{start.label.lower()[:SHOWN]} {start.kind.lower()} has no end" for start in opened}
-    # `break` and `continue` go to that end.
-    leaving = {row: f"{endless[loop]} (line {loop + 1})" for row, loop in structure.inside.items() if loop in endless}
-    for row, text in (endless | leaving).items():
-        structure.faults[row] = fail(row, text)
+            structure.faults[row] = fail(row, f"{shown(steering)} {fault}", column=steering.column)
+    for start, steering in opened:
+        for row in (start, *(row for row, loop in structure.inside.items() if loop == start)):
+            structure.faults[row] = fail(row, f"{shown(steering)} (line {start + 1}) has no end")
     return structure
 
 
-def _pair(
-    structure: Structure, opened: list[_Opened], labels: list[dict[str, int]], row: int, steering: Steering
-) -> tuple[str, ...]:
-    """Add one O word; returns what is wrong with it and what was expected, nothing if it fits."""
-    kind, label = steering.kind, steering.label.text
-    last = opened[-1] if opened else _Opened("", "", 0)
-    closes_do = kind == "WHILE" and (last.kind, last.label) == ("DO", label)
+def shown(steering: Steering) -> str:
+    """An O word as messages have it."""
+    return f"o{steering.label.lower()[:SHOWN]} {steering.kind.lower()}"
+
+
+def _pair(structure: Structure, opened: Opened, labels: list[set[str]], row: int, steering: Steering) -> str:
+    """Add one O word; returns what is wrong with it, "" if it fits."""
+    kind, label = steering.kind, steering.label
+    start, last = (opened[-1][0], (opened[-1][1].kind, opened[-1][1].label)) if opened else (0, ("", ""))
+    closes_do = kind == "WHILE" and last == ("DO", label)
     if kind in ("SUB", "IF", "DO", "REPEAT") or (kind == "WHILE" and not closes_do):
-        return _open(structure, opened, labels, _Opened(kind, label, row))
-    if kind in OPENERS or closes_do:
-        if last.label != label or not (closes_do or last.kind == OPENERS[kind]):
-            return _unpaired(steering)
+        if label in labels[-1]:
+            return "has a label that is there already"
+        labels[-1].add(label)
+        opened.append((row, steering))
+        if kind == "SUB":
+            structure.subs[label] = row
+            labels.append(set())
+        elif kind == "IF":
+            structure.branches[row] = []
+    elif kind in OPENERS or closes_do:
+        if not closes_do and last != (OPENERS[kind], label):
+            return UNPAIRED
         opened.pop()
         if kind == "ENDSUB":
             labels.pop()
-        structure.end[last.row], structure.start[row] = row, last.row
+        structure.end[start], structure.start[row] = row, start
         if kind == "ENDIF":
-            structure.branches[last.row].append(row)
+            structure.branches[start].append(row)
     elif kind in ("ELSE", "ELSEIF"):
-        if (last.kind, last.label) != ("IF", label):
-            return _unpaired(steering)
-        structure.branches[last.row].append(row)
-        structure.branch_of[row] = last.row
+        if last != ("IF", label):
+            return UNPAIRED
+        structure.branches[start].append(row)
+        structure.branch_of[row] = start
     elif kind in ("BREAK", "CONTINUE"):
-        loops = [start.row for start in opened if start.label == label and start.kind in LOOPS]
+        loops = [first for first, word in opened if word.label == label and word.kind in LOOPS]
         if not loops:
-            return _unpaired(steering)
+            return UNPAIRED
         structure.inside[row] = loops[-1]
-    return ()
-
-
-def _open(structure: Structure, opened: list[_Opened], labels: list[dict[str, int]], start: _Opened) -> tuple[str, ...]:
-    if start.label in labels[-1] or not start.label:
-        place = f"is in line {labels[-1][start.label] + 1} already" if start.label else "is not known before it runs"
-        return (f"the label o{start.label.lower()[:SHOWN]} {place}", "each label once")
-    labels[-1][start.label] = start.row
-    opened.append(start)
-    if start.kind == "SUB":
-        structure.subs[start.label] = start.row
-        labels.append({})
-    elif start.kind == "IF":
-        structure.branches[start.row] = []
-    return ()
-
-
-def _unpaired(steering: Steering) -> tuple[str, ...]:
-    return (
-        f"o{steering.label.text.lower()[:SHOWN]} {steering.kind.lower()} does not belong to what is open before it",
-    )
+    return ""
 
 
 def loops_of(steerings: Iterable[tuple[int, Steering]], fail: Fail) -> dict[int, int]:
@@ -167,7 +138,7 @@ def loops_of(steerings: Iterable[tuple[int, Steering]], fail: Fail) -> dict[int,
     loops: dict[int, int] = {}
     opened: list[tuple[str, int]] = []
     for row, steering in steerings:
-        label = steering.label.text
+        label = steering.label
         if steering.kind in ("WHILE", "DO"):
             opened.append((label, row))
         elif steering.kind == "END":

@@ -12,20 +12,17 @@ from pathlib import Path
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.interpreter import execute
-from toolpath_stiff.nc.parametric.expressions import EQUAL, NGC
-from toolpath_stiff.nc.parametric.statements import (
-    Assignment,
-    Statement,
-    family_of,
-    plain_word,
-    read_statement,
-)
+from toolpath_stiff.nc.lines import read_lines
+from toolpath_stiff.nc.parametric.expressions import EQUAL
+from toolpath_stiff.nc.parametric.families import NGC, family_of
+from toolpath_stiff.nc.parametric.statements import Assignment, Statement, plain_word, read_statement
 from toolpath_stiff.nc.parametric.structure import arguments_of
 from toolpath_stiff.nc.parametric.variables import Level, Variables
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.program_run import ProgramRun, Subprogram, Tally
-from toolpath_stiff.nc.state import Call, Flow, State, Then
-from toolpath_stiff.nc.words import Block, Word, read_lines
+from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.state import Call, Flow, Then
+from toolpath_stiff.nc.words import Block, Word
 
 SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
 SHOWN = 40  # characters of the program in a message
@@ -35,32 +32,18 @@ MACRO_CALLS = ("G65", "G66", "G67")
 
 
 class ValuesRun(ProgramRun):
-    """A run whose blocks have values that variables give; parameters as in `ProgramRun`.
+    """A run whose blocks have values that variables give; parameters as of `ProgramRun`.
 
-    Parameters
-    ----------
-    folder
-        Where files of subprograms are: `name.ngc` for `o<name> call`, `O1234.nc` or `1234.nc` for M98 and G65 P1234.
-        None: there are none.
+    Files of subprograms are looked for in the folder of the controller: `name.ngc` for `o<name> call`, `O1234.nc` or
+    `1234.nc` for M98 and G65 P1234.
     """
 
-    recursive = True
-    no_such_block = "which no block has"  # of the program that runs: a file may hold several
-
-    def __init__(
-        self,
-        state: State,
-        lines: tuple[str, ...],
-        name: str,
-        switches: frozenset[int],
-        folder: str | Path | None,
-        tally: Tally | None = None,
-    ) -> None:
-        super().__init__(state, lines, name, switches, fast=False, tally=tally)
-        self.family = family_of(lines, state.dialect, name)
-        self.variables = Variables(self.family, state)
-        self.folder = None if folder is None else Path(folder)
-        self._main_lines = len(lines)
+    def __init__(self, request: Request, tally: Tally | None = None) -> None:
+        super().__init__(request, tally, fast=False)
+        self.family = family_of(self.lines, self.state.dialect, self.name)
+        self.variables = Variables(self.family, self.state)
+        self.folder = None if request.controller.subprograms is None else Path(request.controller.subprograms)
+        self._main_lines = len(self.lines)
         self._files: list[tuple[int, int, str]] = []  # first line, line after the last, name
         self._statements: dict[int, Statement] = {}
         self._modal: Call | None = None

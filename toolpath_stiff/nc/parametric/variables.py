@@ -13,11 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.nc.codes.motion import know_height
-from toolpath_stiff.nc.codes.points import know_place
-from toolpath_stiff.nc.parametric.expressions import EITHER, MACRO_B, NGC
+from toolpath_stiff.nc.codes.unsettled import know_place
+from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, ToolEntry
+from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, ToolEntry, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
 
 # What a program may set: NGC's numbered parameters below those of the control; Macro B's locals and commons.
@@ -67,33 +67,21 @@ class Variables:
 
     def get(self, which: str | int, place: Place) -> float | None:
         """The value of a variable; None: empty. Raises `InputError` for one that is not known."""
-        try:
-            return self._named(which) if isinstance(which, str) else self._numbered(which, place)
-        except LookupError as error:
-            problem, hint = error.args
-            raise place.fail(problem, hint=hint) from None
+        if isinstance(which, int):
+            return self._numbered(which, place)
+        value = self._named(which)
+        if value is None:
+            problem = f"the variable #<{which.lower()}> is read before it is set"
+            raise place.fail(problem, "it in the same subprogram before; not #<_task>, which a preview has otherwise")
+        return value
 
     def exists(self, name: str) -> bool:
         """Whether a named variable has a value."""
-        try:
-            self._named(name)
-        except LookupError:
-            return False
-        return True
+        return self._named(name) is not None
 
-    def _named(self, name: str) -> float:
+    def _named(self, name: str) -> float | None:
         scope = self.named if name.startswith("_") else self.levels[-1].named
-        if name in scope:
-            return scope[name]
-        if name in PREDEFINED:
-            return PREDEFINED[name](self)
-        if name == "_TASK":
-            raise LookupError(
-                "#<_task> is 1 on the machine and 0 in a preview: the path would depend on it", "write one of them"
-            )
-        raise LookupError(
-            f"the variable #<{name.lower()}> is read before it is set", "set it before, in the same subprogram"
-        )
+        return PREDEFINED[name](self) if name in PREDEFINED and name not in scope else scope.get(name)
 
     def _numbered(self, number: int, place: Place) -> float | None:
         if number == 0 and self.family != NGC:
@@ -103,16 +91,26 @@ class Variables:
         elif self._settable(number):
             values = self.common
         elif self.family == EITHER:
-            raise LookupError(
-                f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls",
-                "name it with --dialect",
-            )
+            problem = f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls"
+            raise place.fail(problem, hint="name it with --dialect")
         else:
-            system = self._ngc_system if self.family == NGC else self._macro_system
-            return system(number, place)
+            value = (self._ngc_system if self.family == NGC else self._macro_system)(number, place)
+            if value is None:
+                problem = (
+                    f"#{number} is a parameter of the control that is not known here, or in a unit of the machine's"
+                )
+                raise place.fail(problem, hint="put the number into the program")
+            return value
         if number in values:
             return values[number]
-        return self._unset(number)
+        if self.family == NGC:
+            if number > LOCALS[NGC]:
+                self.state.assume(f"#{number} is read before it is set: 0, as in an empty parameter file")
+            return 0.0
+        if self.family == EITHER or number in COMMON[1]:  # beyond #500 a control keeps values from earlier programs
+            reason = "0 on LinuxCNC and empty on Fanuc's and Haas' controls, which keep those from #500 on"
+            raise place.fail(f"#{number} is read before it is set: {reason}", f"#{number}=... before, or --dialect")
+        return None
 
     def _settable(self, number: int) -> bool:
         """Whether a program may set a numbered variable beyond the local ones."""
@@ -121,24 +119,6 @@ class Variables:
         if self.family == EITHER:
             return (ngc and macro) or number == DEBUG_SWITCH
         return ngc if self.family == NGC else macro
-
-    def _unset(self, number: int) -> float | None:
-        """A variable that nothing has set: 0 in NGC, empty in Macro B, where those from #500 keep their values."""
-        if self.family == EITHER:
-            raise LookupError(
-                f"#{number} is read before it is set: it is 0 on LinuxCNC and empty on Fanuc's and Haas' controls",
-                "set it before, or name the control with --dialect",
-            )
-        if self.family == NGC:
-            if number > LOCALS[NGC]:
-                self.state.assume(f"#{number} is read before it is set: 0, as in an empty parameter file")
-            return 0.0
-        if number in COMMON[1]:
-            raise LookupError(
-                f"#{number} is read before it is set: the control keeps its value from earlier programs",
-                f"set it at the beginning of the program: #{number}=...",
-            )
-        return None
 
     def set(self, which: str | int, value: float | None, place: Place) -> None:
         """Set a variable. Raises `InputError` for one that a program cannot set."""
@@ -177,58 +157,40 @@ class Variables:
         if state.cutter is not None:
             raise block.fail(word, "depends on the present point while cutter compensation is on", "G40 before it")
         if frames.from_machine[axis]:
-            raise block.fail(
-                word, "depends on where program zero sits on the machine", "a move to program coordinates before"
-            )
+            problem = "depends on where program zero sits on the machine"
+            raise block.fail(word, problem, "a move to program coordinates before")
         value = frames.to_program(frames.position)[axis]
         return value / state.length_scale if axis < 3 else value
 
-    def _ngc_system(self, number: int, place: Place) -> float:
+    def _ngc_system(self, number: int, place: Place) -> float | None:
         if NGC_POSITION <= number < NGC_POSITION + 6:
             return self.position(number - NGC_POSITION, f"#{number}", place)
         if NGC_POSITION + 6 <= number < NGC_POSITION + 9:
             return 0.0  # U, V, W, which this machine does not have
-        if number == NGC_TOOL:
-            return float(self.state.tool)
-        if number == NGC_OFFSET:
-            return float(self.state.frames.active + 1)
-        raise LookupError(
-            f"#{number} is a parameter of the control that is not read here: its unit or its value is the machine's",
-            "put the number into the program",
-        )
+        return {NGC_TOOL: float(self.state.tool), NGC_OFFSET: float(self.state.frames.active + 1)}.get(number)
 
-    def _macro_system(self, number: int, place: Place) -> float:
-        state = self.state
-        for first in MACRO_POSITIONS:
-            axis = number - first
-            if 0 <= axis < 6:
-                if first != MACRO_POSITIONS[0] and axis == 2 and state.frames.tool:
-                    raise LookupError(
-                        f"#{number} under a tool length, where controls differ", f"#{MACRO_POSITIONS[0] + axis}"
-                    )
-                return self.position(axis, f"#{number}", place)
+    def _macro_system(self, number: int, place: Place) -> float | None:
+        state, (end, present) = self.state, MACRO_POSITIONS
+        if end <= number < end + 6:
+            return self.position(number - end, f"#{number}", place)
+        if present <= number < present + 6 and (number != present + 2 or not state.frames.tool):
+            return self.position(number - present, f"#{number}", place)
         if number in TOOL_LENGTHS:
-            tool = (state.tools or {}).get(number - TOOL_LENGTHS.start + 1)
-            if tool is None or math.isnan(tool.length):
-                raise LookupError(f"#{number} is the length of a tool that no table has", "give one with --tools FILE")
-            return tool.length / state.length_scale
+            length = tool_of(state.tools, number - TOOL_LENGTHS.start + 1).length
+            return None if math.isnan(length) else length / state.length_scale
         offset = self._offset_place(number)
         if offset is not None:
             index, axis = offset
-            if not state.frames.offsets.table[index].given:
-                raise LookupError(f"#{number} is of a work offset that nothing sets", "give it with --offsets FILE")
-            value = state.frames.offsets.table[index].axes[axis]
-            return value / state.length_scale if axis < 3 else value
-        if number in MODAL:
-            return self._modal(number)
-        raise LookupError(f"the system variable #{number} is not read here", "put the number into the program")
+            value = state.frames.offsets.table[index].axes[axis] / (state.length_scale if axis < 3 else 1.0)
+            return value if state.frames.offsets.table[index].given else None
+        return self._modal(number) if number in MODAL else None
 
     def _offset_place(self, number: int) -> tuple[int, int] | None:
         """The work offset (from 0) and axis of #5221 to #5326."""
         index, axis = divmod(number - FIRST_OFFSET, OFFSET_STRIDE)
         return (index, axis) if 0 <= index < LAST_WORK_OFFSET and axis < len(AXES) else None
 
-    def _modal(self, number: int) -> float:
+    def _modal(self, number: int) -> float | None:
         """#4001 to #4120: what was in force before this block, by Fanuc's groups of G codes; then by letters."""
         state = self.state
         cycle = state.motion is not None and state.motion not in ("G0", "G1", "G2", "G3")
@@ -246,10 +208,7 @@ class Variables:
             119: state.speed,
             120: float(state.selected),
         }
-        value = group_values.get(number - 4000)
-        if value is None:
-            raise LookupError(f"the modal state #{number} is not known here", "put the number into the program")
-        return value
+        return group_values.get(number - 4000)
 
     def _set_macro_system(self, number: int, value: float, place: Place) -> bool:
         """Set a system variable of Macro B; whether it is one."""

@@ -178,10 +178,8 @@ const scene = {
         g.moveTo(...path.at(i - 1));
         g.lineTo(...path.at(i));
       }
-      g.strokeStyle = ink.accent;
-      g.lineWidth = 4;
       g.globalAlpha = 0.75;
-      g.stroke();
+      stroke(g, ink.accent, 4);
       g.globalAlpha = 1;
     }
     if (here < 0) return;
@@ -317,9 +315,7 @@ function showLegend() {
 plungesBox.addEventListener("change", () => {
   classify();
   split();
-  view.redraw();
-  profile.redraw();
-  drawListing();
+  retheme();
   showLegend();
 });
 const key = document.getElementById("profile-key");

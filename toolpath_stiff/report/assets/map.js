@@ -59,7 +59,7 @@ const scene = {
       at.forEach(([x, y], i) => g[i ? "lineTo" : "moveTo"](x, y));
       g.closePath();
       g.globalAlpha = 0.45;
-      viewer.finish(g, ink.ink, 1, []);
+      stroke(g, ink.ink, 1);
       g.globalAlpha = 1;
       const right = at.reduce((a, b) => (b[0] > a[0] ? b : a)), left = at.reduce((a, b) => (b[0] < a[0] ? b : a));
       const behind = at.reduce((a, b) => (b[2] < a[2] ? b : a));

@@ -1,5 +1,4 @@
-// Placements: where the work sits, and what that.
-// brings
+// Placements: where the work sits, and what that brings.
 const d = JSON.parse(document.getElementById("data").textContent), $ = (id) => document.getElementById(id);
 const coloursNow = () => (theme.dark ? d.colours_dark : d.colours), CLASSES = d.colours.length;
 function make(parent, name, attributes, text) {
@@ -98,7 +97,7 @@ function sceneOf(placeNow) {
         g.moveTo(...path.at(i));
         g.lineTo(tip[0], tip[1]);
       }
-      viewer.finish(g, ink.muted, 1, []);
+      stroke(g, ink.muted, 1);
     },
     keepOut(g, viewer, name, box) {
       viewer.edges(g, box, ink.bad, 1.5);

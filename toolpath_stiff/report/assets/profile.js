@@ -176,13 +176,9 @@ class Profile extends Stage {
   }
   level(g, value, colour, dash) {
     g.beginPath();
-    g.setLineDash(dash);
     g.moveTo(this.pad.left, this.y(value));
     g.lineTo(this.width - this.pad.right, this.y(value));
-    g.strokeStyle = colour;
-    g.lineWidth = 1.1;
-    g.stroke();
-    g.setLineDash([]);
+    stroke(g, colour, 1.1, dash);
   }
   // Of the rows in one column of pixels the first, lowest, highest and last are drawn: no extreme is lost.
   curve(g, at, k, colour) {
@@ -204,9 +200,7 @@ class Profile extends Stage {
       }
       i = j + 1;
     }
-    g.strokeStyle = colour;
-    g.lineWidth = 1.5;
-    g.stroke();
+    stroke(g, colour, 1.5);
   }
   drawOverlay() {
     const g = this.clear(this.overlay), bottom = this.height - this.pad.bottom, marked = this.model.marked?.(),

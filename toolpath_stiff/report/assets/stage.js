@@ -33,9 +33,13 @@ function fitting(g, text, least, room) {
 function ring(g, x, y, radius, colour, width) {
   g.beginPath();
   g.arc(x, y, radius, 0, 2 * Math.PI);
-  g.strokeStyle = colour;
-  g.lineWidth = width;
+  stroke(g, colour, width);
+}
+function stroke(g, colour, width, dash = []) {
+  g.setLineDash(dash);
+  Object.assign(g, { strokeStyle: colour, lineWidth: width });
   g.stroke();
+  g.setLineDash([]);
 }
 // The colours of the page, light, dark or on paper.
 const INKS = { panel: "card", ink: "ink", muted: "muted", line: "line", soft: "soft", accent: "pink", curve: "blue",

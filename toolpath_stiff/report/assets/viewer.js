@@ -112,21 +112,14 @@ class Viewer extends Stage {
       g.moveTo(corners[c][0], corners[c][1]);
       g.lineTo(corners[c | bit][0], corners[c | bit][1]);
     }
-    this.finish(g, colour, width, dash);
+    stroke(g, colour, width, dash);
   }
   segment(g, from, to, colour, width, dash = []) {
     const [a, b] = [this.project(from), this.project(to)];
     g.beginPath();
     g.moveTo(a[0], a[1]);
     g.lineTo(b[0], b[1]);
-    this.finish(g, colour, width, dash);
-  }
-  finish(g, colour, width, dash) {
-    g.setLineDash(dash);
-    g.strokeStyle = colour;
-    g.lineWidth = width;
-    g.stroke();
-    g.setLineDash([]);
+    stroke(g, colour, width, dash);
   }
   drawTriad(g) {
     const [r, u] = this.axes(), x0 = 46, y0 = this.height - 46;
@@ -296,9 +289,7 @@ class Path {
       } else pending = i;
     }
     if (pending >= 0) g.lineTo(sx[pending], sy[pending]);
-    g.strokeStyle = colour;
-    g.lineWidth = width;
-    g.stroke();
+    stroke(g, colour, width);
   }
   // The point within 15 pixels of a place, -1 where there is none; `seen` says which points there are.
   nearest(x, y, seen = () => true) {

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.words import EXTENSIONS
+from toolpath_stiff.nc.languages import EXTENSIONS
 from toolpath_stiff.report.words import counted
 
 # Endings of the files that a folder stands for: `.txt` is as often a note or a tool list.

@@ -63,17 +63,14 @@ class MachineScene {
     this.drawReach(g, view);
     this.drawFrame(g, view);
     this.drawPath(g, view);
-    const items = [...this.solids(view), ...this.dots(view)];
-    items.sort((a, b) => a.depth - b.depth);
+    const items = [...this.solids(view), ...this.dots(view)].sort((a, b) => a.depth - b.depth);
     for (const item of items) item.paint(g);
   }
   polyline(g, view, points, colour, width, close = false) {
     g.beginPath();
     points.forEach((p, i) => { const [x, y] = view.project(p); if (i) g.lineTo(x, y); else g.moveTo(x, y); });
     if (close) g.closePath();
-    g.strokeStyle = colour;
-    g.lineWidth = width;
-    g.stroke();
+    stroke(g, colour, width);
   }
   drawReach(g, view) {
     if (!this.showReach) return;
@@ -117,8 +114,7 @@ class MachineScene {
       items.push({ depth: (p[2] + q[2]) / 2, paint: (g) => {
         const wide = width(mm, low, high);
         for (const [c, w] of [[ink.panel, wide + 2], [colour, wide], [core, wide * 0.35]]) {
-          g.beginPath(); g.moveTo(p[0], p[1]); g.lineTo(q[0], q[1]); g.strokeStyle = c; g.lineWidth = w;
-            g.lineCap = "butt"; g.stroke();
+          g.lineCap = "butt"; g.beginPath(); g.moveTo(p[0], p[1]); g.lineTo(q[0], q[1]); stroke(g, c, w);
         }
       } });
     };
@@ -146,7 +142,7 @@ class MachineScene {
       g.closePath();
       g.globalAlpha = 0.82; g.fillStyle = this.islit("platform") || this.islit("geometry") ? ink.accent
         : mix(ink.plunge, ink.panel, 0.35); g.fill(); g.globalAlpha = 1;
-      g.strokeStyle = ink.ink; g.lineWidth = 1.2; g.stroke();
+      stroke(g, ink.ink, 1.2);
     } });
     const tool = this.islit("tool") ? ink.accent : ink.plunge;
     bar(middle, nose, 130, tool, mix(ink.rapid, ink.panel, 0.5), 4, 16);
@@ -168,10 +164,9 @@ class MachineScene {
       this.spots.push([px, py, i]);
       items.push({ depth: depth + 60 + (chosen ? 1e5 : 0), paint: (g) => {
         const colour = gone ? ink.line : errorColour(percent, this.scale);
-        g.beginPath(); g.moveTo(x, y); g.lineTo(px, py); g.strokeStyle = colour; g.lineWidth = 1.3; g.stroke();
+        g.beginPath(); g.moveTo(x, y); g.lineTo(px, py); stroke(g, colour, 1.3);
         g.beginPath(); g.arc(px, py, big, 0, 7);
-        if (gone) { g.strokeStyle = ink.muted; g.lineWidth = 1.4; g.stroke(); } else { g.fillStyle = colour; g.fill();
-          g.strokeStyle = ink.panel; g.lineWidth = 0.8; g.stroke(); }
+        if (gone) stroke(g, ink.muted, 1.4); else { g.fillStyle = colour; g.fill(); stroke(g, ink.panel, 0.8); }
         if (chosen) ring(g, px, py, big + 4, ink.ink, 2);
       } });
     }
@@ -198,7 +193,7 @@ class MachineScene {
     return { depth: 1e5, paint: (g) => {
       for (const { spots, percent } of paths) { trace(g, spots, this.radius(false, percent));
         g.fillStyle = errorColour(percent, this.scale); g.fill(); }
-      trace(g, gone, this.radius(true, 0)); g.strokeStyle = ink.muted; g.lineWidth = 1.4; g.stroke();
+      trace(g, gone, this.radius(true, 0)); stroke(g, ink.muted, 1.4);
       const chosen = this.spots[this.selected];
       if (chosen) ring(g, chosen[0], chosen[1], this.radius(r.aside[this.selected], this.deviation[this.selected] ?? 0)
         + 4, ink.ink, 2);
@@ -209,7 +204,7 @@ class MachineScene {
       const [x, y, depth] = view.project([v.x_mm, v.y_mm, v.z_mm]);
       return { depth: depth + 80, paint: (g) => {
         g.beginPath(); g.moveTo(x, y - 8); g.lineTo(x + 8, y); g.lineTo(x, y + 8); g.lineTo(x - 8, y); g.closePath();
-        g.strokeStyle = ink.accent; g.lineWidth = 2.2; g.stroke();
+        stroke(g, ink.accent, 2.2);
       } };
     });
   }

@@ -36,14 +36,10 @@ function gaugeOf(state) {
     `${100 * Math.min(1, v / most)}%`;
   return h("dl", { class: "gauge", "aria-label": "Mean error of the model" }, STAGES.map(([key, label]) => {
     const note = key === "left_out" && g[key] === null ? "Fit tells" : percent(g[key]);
-    const rises = key === "refitted" && percent(g.refitted) !== percent(g.as_given) && g.refitted > g.as_given;
     return [h("dt", {}, label), h("dd", { class: "track", "aria-hidden": "true" },
       h("span", { class: `fill ${key}`, style: `width:${width(g[key] ?? 0)}` }),
       g.floor === null ? null : h("span", { class: "floor", style: `left:${width(g.floor)}` })),
-        h("dd", { class: "number", id: `g-${key}` }, note),
-      rises ? h("dd", { class: "muted", id: "g-rises", style: "grid-column: 1 / -1" },
-        "likelier, not closer: it trusts those readings less that scatter more or lie far off; "
-        + "this mean counts all alike") : null];
+        h("dd", { class: "number", id: `g-${key}` }, note)];
   }), h("dt", {}, "noise floor"), h("dd", { class: "muted" }, "dashed: no model can be better"),
     h("dd", { class: "number", id: "g-floor" }, percent(g.floor)));
 }
@@ -102,13 +98,6 @@ function ownEffects(state, act) {
     const area = h("textarea", { id: `own-${k}`, rows: 16, spellcheck: "false", "aria-label": `Text of ${own.file}`,
       "aria-describedby": `own-fault-${k}` });
     area.value = drafts.get(own.file) ?? own.text;
-    if (own.off) {
-      Object.assign(area, { value: own.text, readOnly: true });
-      return h("div", { class: "own" }, h("p", { class: "warning", id: `own-off-${k}` }, h("code", {}, own.file),
-        " is code that came with the case, and you have not agreed to run it: its effects are off."), area,
-        h("div", { class: "actions live" }, button("I have read it: run it", () => act({ do: "trust", file: own.file }),
-          { id: `own-trust-${k}` })));
-    }
     area.addEventListener("input", () => drafts.set(own.file, area.value));
     const save = () => { drafts.delete(own.file); act({ do: "save_effect", file: own.file, text: area.value }); };
     return h("div", { class: "own" }, h("code", {}, own.file), own.copy
@@ -184,8 +173,6 @@ function whyPanel(state, act) {
     table(["effect", "parameter", "smallest size shown", "change of readings (rms)"], v.detectable
       .map((d) => [d.effect, d.parameter, d.detectable ? `${short(d.size)} ${d.unit}` : "none", percent(d.rms_percent,
       1)])),
-    v.confounding.sets.length ? [h("h3", {}, "Cannot be told apart"),
-      list(v.confounding.sets.map((names) => names.join(", ")))] : null,
     h("h3", {}, "Assumed"), list(v.assumptions), v.notes.length ? [h("h3", {}, "Notes"), list(v.notes)] : null,
   ];
 }
@@ -230,11 +217,6 @@ function nextPanel(state, act) {
       table(["clamping", "X mm", "Y mm", "Z mm", "A deg", "B deg", "C deg", "forces N", "why"], p.visits
         .map((v) => [v.clamp, v.x_mm, v.y_mm, v.z_mm, v.a_deg, v.b_deg, v.c_deg, v.forces_N.join(", "), v.why]
         .map(String)))] : null,
-    (state.readings?.aside ?? []).some(Boolean) ? [h("h3", {}, "Set aside"), state.readings.aside
-      .map((gone, i) => (gone ? h("div", { class: "actions" },
-      `${state.readings.file[i]} line ${state.readings.line[i]}`, button("Use again",
-      () => act({ do: "aside", file: state.readings.file[i], line: state.readings.line[i] }), { id: `again-${i}` }))
-      : null))] : null,
   ];
 }
 // The program.
@@ -261,10 +243,6 @@ function programPanel(state, act) {
       ? h("span", { id: "below", class: s.required.lines?.length ? "bad" : "good" }, s.required.lines?.length
       ? `${s.required.lines.length} lines are below` : "every cut has it") : null),
     h("div", { class: "text", id: "text", role: "group", "aria-label": "Program text" }),
-    p.path && s.per_operation?.length > 1 ? [h("h3", {}, "Operations"), table(["", "mean N/mm", "min N/mm", ""],
-      s.per_operation.map((o, k) => [o.name ?? o.title ?? `operation ${k + 1}`, n(o.mean_N_per_mm), n(o.min_N_per_mm),
-      button(act.operation === k + 1 ? "all" : "only this", () => act.only(k + 1), { id: `only-${k + 1}`,
-      class: "" })]))] : null,
   ];
 }
 // The placement.
@@ -293,9 +271,7 @@ function placementPanel(state, act) {
       "searches the whole workspace; none of mean, range and weakest gets worse where that can be avoided")),
     setUp(p, state, act),
     p.front ? [(p.warnings ?? []).map((text) => h("p", { class: "warning" }, text)), h("h3", {}, "Front"),
-      Object.entries(p.offset_blocks ?? {}).filter(([name]) => !name.endsWith("_reason"))
-        .map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" },
-        p.offset_blocks[`${name}_reason`] ?? "no block can say it"))),
+      offsets(p.offset_blocks),
       table(["", "mean", "range", "weakest N/mm", "X", "Y", "Z mm", "C deg", ""], p.front
         .map((row) => [`${row.number}${row.number === p.chosen?.number ? " recommended" : ""}`,
         group(row.mean_N_per_mm), group(row.range_N_per_mm), group(row.min_N_per_mm), ...["x_mm", "y_mm", "z_mm",
@@ -304,12 +280,12 @@ function placementPanel(state, act) {
           row.rotation_deg] }), { id: `use-${row.number}`, "aria-label": `use point ${row.number}` })]))] : null,
   ];
 }
+const offsets = (blocks) => Object.entries(blocks ?? {}).filter(([name]) => !name.endsWith("_reason"))
+  .map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" },
+  blocks[`${name}_reason`] ?? "no block can say it")));
 // For the shop floor, of the placement as it stands: offsets, set-up sheet, the program written for it, every warning.
 function setUp(p, state, act) {
   const made = p.set_up, moved = state.program.placed;
-  const offsets = (blocks) => Object.entries(blocks ?? {}).filter(([name]) => !name.endsWith("_reason"))
-    .map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" },
-    blocks[`${name}_reason`] ?? "no block can say it")));
   return [
     h("div", { class: "actions live" }, button("Offsets, set-up sheet, program", () => act({ do: "set_up" }),
       { id: "set-up", disabled: !moved }), h("span", { class: "muted" }, moved ? "for this placement, as files"
@@ -409,11 +385,10 @@ function exercisePanel(state, act) {
       : null,
     r ? [h("p", { id: "revealed", class: r.verdict === "wrong" ? "bad" : "good" },
       `claim ${r.claim.join(", ")}: ${r.verdict}`),
-      r.effects.length
-        ? list(r.effects
-        .map((e) => `hidden: ${e.effect} `
-          + `(${Object.entries(e.parameters).map(([k, v]) => `${k} ${short(v)}`).join(", ")}); `
-          + `changes the readings by ${percent(100 * e.size, 1)} (rms)`)) : h("p", {}, "nothing was hidden")] : null,
+      r.effects.length ? list(r.effects
+        .map((e) => `hidden: ${e.effect} (${Object.entries(e.parameters).map(([k, v]) => `${k} ${short(v)}`)
+          .join(", ")}); changes the readings by ${percent(100 * e.size, 1)} (rms)`))
+        : h("p", {}, "nothing was hidden")] : null,
   ];
 }
 function historyPanel(state, act) {

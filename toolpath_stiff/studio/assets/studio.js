@@ -1,8 +1,7 @@
 // The page: it asks for the state, draws it, posts what is to be done, and hears of every change.
 const $ = (id) => document.getElementById(id);
 const scene = new MachineScene();
-let state = JSON.parse($("state").textContent), panel = "effects", here = -1, which = "now", operation = 0, playing = 0,
-  version = -1;
+let state = JSON.parse($("state").textContent), panel = "effects", here = -1, which = "now", playing = 0, version = -1;
 const readonly = state !== null;
 document.body.classList.toggle("readonly", readonly);
 if (readonly) for (const id of ["tools", "drop"]) $(id).remove();
@@ -59,11 +58,9 @@ const placed = latest((origin) => post("/do", JSON.stringify({ do: "at", origin 
   $("pl")?.replaceWith(placementFigures(found, state, "pl"));
 });
 Object.assign(act, {
-  scene, readonly, operation, origin: [0, 0, 0, 0, 0, 0], redraw: () => drawPanel(), put: () => {},
+  scene, readonly, origin: [0, 0, 0, 0, 0, 0], redraw: () => drawPanel(), put: () => {},
   hand: (name, values) => hand({ ...Object.fromEntries(state.effects.filter((one) => one.on)
     .map((one) => [one.name, one.on])), [name]: values }),
-  only: (number) => { operation = act.operation = act.operation === number ? 0 : number; classify(); view.redraw();
-    drawPanel(); },
   shift: (axis, by) => act.move(axis, act.origin[axis] + by, false),
   move: (axis, value, done) => {
     if (!Number.isFinite(value)) return;
@@ -128,7 +125,6 @@ function classify() {
   const count = COLOURS.light.length;
   scene.ends = [low, high];
   lines.classify((i) => {
-    if (operation && path.operation[i] !== operation) return -1;
     if (!path.cut[i]) return count;
     if (shown[i] === null) return count + 2;
     return path.plunge[i] ? count + 1
@@ -285,12 +281,8 @@ function draw() {
   document.title = `${state.case}: toolpath_stiff studio`;
   const waiting = r && !v ? "Judging the readings" : r ? "" : "What does the machine do, and does the model say so?";
   $("sentence").classList.toggle("waiting", Boolean(waiting));
-  $("sentence").replaceChildren(waiting || `${v.sentence}.`, v ? h("small", {}, v.text) : "");
+  $("sentence").replaceChildren(waiting || `${v.sentence}.`, v ? h("small", {}, v.text.slice(v.sentence.length + 2)) : "");
   $("gauge").replaceChildren(gaugeOf(state));
-  const off = state.own_effects.filter((one) => one.off).map((one) => one.file);
-  $("off").hidden = !off.length;
-  $("off").textContent =
-    `Off, as it is code that you have not agreed to run: ${off.join(", ")}. It stands under Effects.`;
   for (const [id, many] of [["undo", state.history.length > 1], ["redo", state.undone.length]]) if ($(id)) $(
     id).disabled = !many;
   scene.paths = [];

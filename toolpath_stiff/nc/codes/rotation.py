@@ -1,16 +1,15 @@
-"""Rotated and polar coordinates: G68 G69, G15 G16.
+"""Rotated coordinates: G68, G69.
 
-G68 and G69 follow Fanuc's milling controls (operator's manuals of the series 16 and 15i, "Coordinate system
-rotation"), and so does G16 ("Polar coordinate command"). Where these manuals leave the point to parameters or forbid
-the block, it is refused. mm and degrees.
+They follow Fanuc's milling controls (operator's manuals of the series 16 and 15i, "Coordinate system rotation"). Where
+these manuals leave the point to parameters or forbid the block, it is refused. mm and degrees.
 """
 
 from __future__ import annotations
 
 import math
 
-from toolpath_stiff.nc.codes.code import FANUC, Code, family
-from toolpath_stiff.nc.codes.points import SAME_PLACE_MM
+from toolpath_stiff.nc.codes.code import FANUC, Code
+from toolpath_stiff.nc.codes.polar import SAME_PLACE_MM
 from toolpath_stiff.nc.frames import Rotation
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import Word
@@ -54,16 +53,8 @@ def _rotation_of(state: State, block: CurrentBlock, word: Word, here: list[float
     )
 
 
-def polar_mode(state: State, block: CurrentBlock, code: str) -> None:
-    """G16: the plane's first axis word is a radius, the second an angle. G15: they are Cartesian."""
-    state.polar = [math.nan, math.nan] if code == "G16" else None
-
-
-_MANUALS = f"{FANUC} of the series 16 and 15i"
-_ROTATION = f"{_MANUALS}, Coordinate system rotation (G68, G69)"
-_POLAR = f"{_MANUALS}, Polar coordinate command (G15, G16)"
-COORDINATE_CODES = (
+_ROTATION = f"{FANUC} of the series 16 and 15i, Coordinate system rotation (G68, G69)"
+ROTATION_CODES = (
     Code("G68", "rotation", rotation, "rotated coordinates", _ROTATION, takes_axes=True),
     Code("G69", "rotation", rotation, "rotation off", _ROTATION),
-    *family({"G15": "Cartesian words", "G16": "polar words"}, "polar", polar_mode, _POLAR),
 )

@@ -1,0 +1,86 @@
+"""A program file to lines: bytes to text, text to lines."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from pathlib import Path
+
+from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.files import check_regular
+from toolpath_stiff.nc.place import Place
+
+# Caps. Longer is no NC program, and what reads a line takes time by the square of its length.
+LARGEST_FILE = 512 << 20  # bytes: some ten million lines
+LONGEST_LINE = 10_000  # characters, comments included
+# Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
+# end-of-file mark of CP/M and DOS (0x1A), which some posts still append.
+BINARY = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
+_BINARY_BYTES = bytes(code for code in range(128) if BINARY.match(chr(code)))
+
+
+def read_lines(path: str | Path) -> tuple[str, ...]:
+    """Lines of a program file, without line ends; LF, CRLF or CR.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is larger than `LARGEST_FILE`, or is not text.
+    """
+    return split_lines(read_text(path)[0], Path(path).name)
+
+
+def read_text(path: str | Path) -> tuple[str, str]:
+    """Text of a program file with its line ends, and its encoding: UTF-8 (with or without BOM) or Latin-1.
+
+    Raises `InputError` where the file cannot be read or is larger than `LARGEST_FILE`.
+    """
+    try:
+        check_regular(Path(path))  # no pipe of the shell either: a program is read more than once
+        with Path(path).open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise ProgramError(f"cannot read {str(path)!r}: {error.strerror}") from None
+    except ValueError as error:  # a NUL in the name
+        raise ProgramError(f"cannot read {str(path)!r}: {error}") from None
+    if len(content) > LARGEST_FILE:
+        raise ProgramError(
+            "a file that is too large to be read",
+            expected=f"an NC program of at most {LARGEST_FILE >> 20} MB",
+            hint="split the program",
+            file=Path(path).name,
+        )
+    encoding = "utf-8-sig" if content.startswith(codecs.BOM_UTF8) else "utf-8"
+    try:
+        return content.decode(encoding), encoding
+    except UnicodeDecodeError:
+        return content.decode("latin-1"), "latin-1"
+
+
+def split_lines(text: str, name: str) -> tuple[str, ...]:
+    r"""Split into lines; a byte that no text holds is an error with its line and column.
+
+    Examples
+    --------
+    >>> split_lines("G0 X1\r\nM30\r\n", "part.nc")
+    ('G0 X1', 'M30')
+    """
+    joined = text.replace("\r\n", "\n").replace("\r", "\n")
+    binary = BINARY.search(joined) if _any_binary(joined) else None
+    if binary is not None:
+        offset = binary.start()
+        place = Place(name, joined.count("\n", 0, offset) + 1, offset - joined.rfind("\n", 0, offset))
+        raise place.fail(f"binary byte 0x{ord(binary[0]):02X}", "the text of an NC program")
+    lines = joined.replace("\x1a", "").replace("\x0c", " ").split("\n")
+    if not lines[-1]:
+        lines.pop()
+    if max(map(len, lines), default=0) > LONGEST_LINE:
+        row = next(row for row, line in enumerate(lines) if len(line) > LONGEST_LINE)
+        raise Place(name, row + 1).fail(f"a line of {len(lines[row])} characters", f"lines of at most {LONGEST_LINE}")
+    return tuple(lines)
+
+
+def _any_binary(text: str) -> bool:
+    """Whether a text holds anything of `BINARY`; a fifth of the time of a search, and UTF-8 has the same bytes."""
+    content = text.encode("utf-8", "surrogatepass")
+    return len(content.translate(None, _BINARY_BYTES)) != len(content)

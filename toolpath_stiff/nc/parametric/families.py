@@ -1,0 +1,68 @@
+"""The family of a parametric program: RS274/NGC or Macro B, by its dialect or by its signs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from toolpath_stiff.nc.controller import Dialect
+from toolpath_stiff.nc.place import Place
+
+NGC, MACRO_B, EITHER = "RS274/NGC", "Macro B", "either family"
+NGC_WORDS = (
+    "SUB", "ENDSUB", "CALL", "RETURN", "IF", "ELSEIF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "DO", "REPEAT",
+    "ENDREPEAT", "BREAK", "CONTINUE",
+)  # fmt: skip
+# What only one family has, in a line without comments and blanks, in upper case.
+_BEGIN = r"^(?:/\d?)?(?:N\d+)?"
+_NGC_SIGN = re.compile(
+    rf"{_BEGIN}O(?:<|\[|#|\d+(?:{'|'.join(NGC_WORDS)}))|#<|\*\*|EXISTS\["  # o<x> sub, #<name>
+)
+_MACRO_SIGN = re.compile(rf"{_BEGIN}(?:IF\[|WHILE\[|GOTO[\d#\[]|DO\d|END\d)|G6[5-7](?!\d)|POW\[")
+_ANY_SIGN = re.compile(r"[#\[]")
+_COMMENT = re.compile(r"\([^)]*\)|;.*")
+_SUSPECT = re.compile(r"[#\[oOiIwWdD]|[gG]\s*0*6")
+
+
+def uses_variables(lines: tuple[str, ...]) -> bool:
+    """Whether any line holds a variable, an expression, or control of the flow.
+
+    Examples
+    --------
+    >>> uses_variables(("G1 X10 (#1)",)), uses_variables(("#1 = 5", "G1 X#1"))
+    (False, True)
+    """
+    return any(sign.search(text) for _, text in _bare(lines) for sign in (_ANY_SIGN, _NGC_SIGN, _MACRO_SIGN))
+
+
+def _bare(lines: tuple[str, ...]) -> Iterator[tuple[int, str]]:
+    """Number and text of lines that may matter, without comments and blanks, in upper case."""
+    for number, line in enumerate(lines, 1):
+        if _SUSPECT.search(line):
+            yield number, "".join(_COMMENT.sub(" ", line).split()).upper()
+
+
+def family_of(lines: tuple[str, ...], dialect: Dialect, name: str) -> str:
+    """The family of a program: the dialect's or, for `generic`, that of which the program shows signs.
+
+    Raises
+    ------
+    ProgramError
+        It shows signs of both.
+    """
+    if dialect.name == "linuxcnc":
+        return NGC
+    if dialect.name in ("fanuc", "haas"):
+        return MACRO_B
+    signs = {}
+    for family, sign in ((NGC, _NGC_SIGN), (MACRO_B, _MACRO_SIGN)):
+        first = next((number for number, text in _bare(lines) if sign.search(text)), None)
+        if first is not None:
+            signs[family] = first
+    if len(signs) == 2:
+        raise Place(name, max(signs.values())).fail(
+            f"line {signs[NGC]} is of LinuxCNC's language (O words, #<name>, **), line {signs[MACRO_B]} of Macro B "
+            "(IF GOTO, WHILE DO, G65)",
+            hint="name the control with --dialect",
+        )
+    return next(iter(signs), EITHER)
