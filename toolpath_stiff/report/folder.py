@@ -73,6 +73,6 @@ def picture(result: Any, **look: Any) -> bytes:
 
 def figure(result: Any, name: str = "", **look: Any) -> Figure | None:
     """A picture of a result as a figure, the first that shows something unless named; None where none does."""
-    with _writer().house_writer():
+    with _writer().house_style():
         draws = (draw for file, draw in pictures_of(result.shown_by).items() if name in ("", file))
         return next(filter(None, (draw(result, **look) for draw in draws)), None)
