@@ -320,7 +320,7 @@ def test_programs_may_be_given_as_objects_and_read_their_own_way(shop):
     read = tps.Program.read("jobs/a/part.nc")
     found = tps.analyze_many([inch, read, Path("jobs/b")], "nist", "out", plots=False, jobs=2, step_mm=20)
     assert [(one.name, one.status) for one in found.outcomes] == [
-        ("inch.nc", "done"), ("a/part.nc", "done"), ("b/part.nc", "done"),
+        ("inch.nc", "done"), ("jobs/a/part.nc", "done"), ("jobs/b/part.nc", "done"),
     ]  # fmt: skip
     alone = tps.analyze(inch, "nist", step_mm=20)
     assert found.to_dict()[0] == {**alone.to_dict(), "file": "inch.nc", "report": "out/inch/summary.json"}

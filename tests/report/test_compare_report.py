@@ -24,7 +24,7 @@ from toolpath_stiff.report.compare import page as compare_html
 from toolpath_stiff.report.compare import residuals_csv
 from toolpath_stiff.report.compare import text as terminal_text
 from toolpath_stiff.report.pictures.compare import PICTURES
-from toolpath_stiff.report.pictures.style import drawing
+from toolpath_stiff.report.pictures.files import SHARP, picture_file
 
 NASTY = '<script>alert("1")</script>$x^2$'
 
@@ -57,8 +57,8 @@ DATA = {"paper": table_1, "one": one_reading, "oblique": oblique, "wild": with_a
 def compared(name: str) -> tuple[Comparison, dict[str, bytes]]:
     """The comparison and its pictures; of the paper's readings with the draws that the command takes."""
     found = compare(nist(), table_1()) if name == "paper" else quick(DATA[name]())
-    drawn = {name: drawing(draw, found) for name, draw in PICTURES.items()}
-    return found, {name: picture for name, picture in drawn.items() if picture is not None}
+    drawn = {name: picture_file(name, draw, found, SHARP) for name, draw in PICTURES.items()}
+    return found, {name: picture for name, picture in drawn.items() if picture}
 
 
 @pytest.mark.parametrize("name", DATA)
@@ -67,12 +67,12 @@ def test_pictures_and_page_for_any_data(name):
     assert set(PICTURES) - set(pictures) == {"history.png"}
     for picture in pictures.values():
         height, width = imread(io.BytesIO(picture), format="png").shape[:2]
-        assert 700 <= width <= 1700
+        assert 1000 <= width <= 2500
         assert height >= 200
     page = compare_html(found, pictures)
     assert "<script" not in page
     assert not re.search(r'(src|href)="(?!data:|#)', page)
-    assert page.count("<svg viewBox=") == len(pictures)
+    assert page.count("<img ") == len(pictures)
     assert "{{" not in page
 
 
@@ -169,5 +169,5 @@ def test_a_machine_with_effects_shows_them_in_the_load_path():
     assert len(found.shares.links) == 8
     # The table is 5, 4, 3 nm/N soft along X, Y, Z whatever the pose, the upright spindle 8, 8, 2.
     assert found.shares.compliance[:, 6:] * 1e9 == pytest.approx(np.array([[5.0, 8.0], [4.0, 8.0], [3.0, 2.0]]))
-    picture = drawing(PICTURES["load_path.png"], found)
+    picture = picture_file("load_path.png", PICTURES["load_path.png"], found)
     assert imread(io.BytesIO(picture), format="png").shape[1] >= 1000

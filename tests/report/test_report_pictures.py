@@ -17,17 +17,18 @@ from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.report.colours import CLASSES, SLATE
 from toolpath_stiff.report.curves import extremes_by_column, scale_limits
 from toolpath_stiff.report.pictures import path as path_module
+from toolpath_stiff.report.pictures.files import picture_file
 from toolpath_stiff.report.pictures.path import UNREACHABLE, path, segment_classes
 from toolpath_stiff.report.pictures.profile import MOST_OPERATIONS, _set_limits, profile
-from toolpath_stiff.report.pictures.style import new_figure, picture_file
+from toolpath_stiff.report.pictures.style import new_figure
 
 
 def path_picture(analysis, **look) -> bytes:
-    return picture_file("path.png", path, analysis, look)
+    return picture_file("path.png", path, analysis, **look)
 
 
 def profile_picture(analysis, **look) -> bytes:
-    return picture_file("profile.png", profile, analysis, look)
+    return picture_file("profile.png", profile, analysis, **look)
 
 
 def pixels(png: bytes) -> np.ndarray:

@@ -38,7 +38,6 @@ from toolpath_stiff.report import update as update_report
 from toolpath_stiff.report.compare import page as compare_html
 from toolpath_stiff.report.diagnose import page as diagnose_html
 from toolpath_stiff.report.explanations import headline
-from toolpath_stiff.report.pages import Drawing
 from toolpath_stiff.report.pictures.load_path import stiffness_deviation_percent
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect, Parameter
@@ -176,7 +175,7 @@ def test_pages_say_which_sign_they_have():
     assert rule in compare_html(found, {})
     assert rule in compare_report.text(found)
     found = diagnosed(*CASES["identified"])
-    assert rule in diagnose_html(found, {"before_after.png": Drawing(b"png")})
+    assert rule in diagnose_html(found, {"before_after.png": b"\x89PNG" + bytes(20)})
 
 
 # -- verdict, table and picture ----------------------------------------------------------------------------------------

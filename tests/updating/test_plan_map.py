@@ -10,8 +10,8 @@ from tests.updating.planning import rivals, table_1_design
 from toolpath_stiff.planning.gap_map import gap_map, top_pair
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import plan_measurements
+from toolpath_stiff.report.pictures.files import picture_file
 from toolpath_stiff.report.pictures.plan import visits_drawn
-from toolpath_stiff.report.pictures.style import picture_file
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +55,6 @@ def test_the_same_picture_every_time(mapped):
     def drawn(of):
         return visits_drawn(of.visits, of.chosen, of.kinds, found, ("a $title", "b"))
 
-    first, again = (picture_file("plan.png", drawn, plan, {}) for _ in range(2))
+    first, again = (picture_file("plan.png", drawn, plan) for _ in range(2))
     assert first == again and first.startswith(b"\x89PNG")
     assert visits_drawn(plan.visits, plan.chosen, plan.kinds, None, ("a", "b")).axes

@@ -30,7 +30,7 @@ from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model, condition_warnings
-from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -141,7 +141,7 @@ class Analysis(EvaluatedPath, FolderResult):
         return finite
 
     def _short(self) -> str:
-        mean, low = (self.view.number(self.to_dict()[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))
+        mean, low = (number(self.to_dict()[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))
         return f"{self.program.name} on {self.machine.name}, mean {mean} N/mm, min {low} N/mm"
 
     def plot(self, *, show_plunges: bool = False) -> Figure:

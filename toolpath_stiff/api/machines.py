@@ -277,7 +277,7 @@ class Machine(Result):
         >>> type(machine.plot((0, 0, 800))).__name__
         'Figure'
         """
-        return self._figure(pose_mm_deg=pose_mm_deg)
+        return self._figure(machine=self.model.machine, pose=self.standing(pose_mm_deg)[0])
 
     def standing(self, pose_mm_deg: Sequence[float] | None = None) -> tuple[FloatArray, Struts, Reach]:
         """A pose (6,) in SI (unless given, the paper's Figure 2 or the default origin), struts and reach there.
@@ -325,7 +325,7 @@ class Machine(Result):
 
     def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
         """What `plot` draws as a PNG."""
-        return self._picture(pose_mm_deg=pose_mm_deg)
+        return self._picture(machine=self.model.machine, pose=self.standing(pose_mm_deg)[0])
 
     def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
         """Its figures with their origin, and how far the limits are at a pose.

@@ -93,7 +93,7 @@ def diagnose(args: Namespace) -> int:
     The verdict: adequate (nothing is missing that these data could show), identified, described (by an effect whose
     form was read off these very readings), ambiguous (several explain the data equally well), unexplained (something is
     missing that no effect of the catalogue describes). Files written to --out: diagnose.json, residuals.csv,
-    ladder.png, portrait.png, confounding.png, detectable.png, before_after.png, envelope.png, report.html.
+    ladder.png, portrait.png, before_after.png, report.html.
     """
     return run_to_folder(args, tps.diagnose, tps.Diagnosis, args.data)
 

@@ -1,7 +1,4 @@
-"""The colours of pictures and pages.
-
-Those that a picture is drawn in stand for colours of `page.css`, light or dark; those that show data stay as they are.
-"""
+"""The colours of pictures, and of the scale of stiffness on pages."""
 
 from __future__ import annotations
 
@@ -15,11 +12,6 @@ NOWHERE = "#eceff3"  # out of reach, on a map
 STIFFNESS, RESIDUAL = "viridis", "RdBu"  # scales; red: measured softer than modelled, blue: stiffer
 DIRECTIONS = {"X": BLUE, "Y": ORANGE, "Z": GREEN, "oblique": PURPLE}  # of a reading
 CLASSES = 32  # colours; more cannot be told apart along a line, and each costs a drawing call
-ON_PAGE = {
-    "#ffffff": "card", INK: "ink", MUTED: "muted", GRID: "line", GREY: "grey", FAINT: "grey", WITHIN: "soft",
-    CHOSEN: "chosen", BLUE: "blue", LIGHT_BLUE: "pale-blue", ORANGE: "orange", GREEN: "green", PURPLE: "purple",
-    RED: "red", PALE_RED: "pale-red",
-}  # fmt: skip
 
 
 def page_colours() -> dict[str, list[str]]:

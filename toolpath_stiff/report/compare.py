@@ -14,7 +14,7 @@ from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report import history
 from toolpath_stiff.report.history import history_section, history_text
 from toolpath_stiff.report.loops import loops_section, loops_text
-from toolpath_stiff.report.pages import Drawing, Section, markup, page_of, part, readings_head
+from toolpath_stiff.report.pages import Section, page_of, readings_head
 from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -54,12 +54,11 @@ QUESTIONS = {
 }
 
 PAGE = "report.html"
-MOST_ROWS = 40  # of patterns; all are in compare.json
 MOST_FAR_OFF, MOST_NAMED = 20, 5  # readings far off, on the page and on the terminal
 BIAS = f"mean of {DEVIATION}, {MINUS_IS_SOFTER}"
 
 
-def page(comparison: Comparison, drawn: Mapping[str, Drawing]) -> str:
+def page(comparison: Comparison, drawn: Mapping[str, bytes]) -> str:
     """The page, the pictures within."""
     summary = comparison.summary
     base, refit = summary.baseline, summary.baseline.strut_law_refitted
@@ -87,7 +86,6 @@ def page(comparison: Comparison, drawn: Mapping[str, Drawing]) -> str:
         "variables.png",
         ("Checks without a model", _model_free(summary)),
         "load_path.png",
-        ("All patterns looked for", *_tests(summary)),
         ("How much readings scatter", _noise(summary)),
         ("Not tested", summary.not_tested),
         ("Assumptions", [*summary.assumptions, *summary.notes]),
@@ -165,19 +163,6 @@ def _model_free(summary: ComparisonSummary) -> Table:
     return Table(("principle", "result", ">t", ">p, corrected"), rows, kinds)
 
 
-def _tests(summary: ComparisonSummary) -> list[str]:
-    """The strongest patterns, each on its own, to unfold."""
-    count = len(summary.tests)
-    rows = [
-        (test.pattern, test.kind, test.readings, f"{test.statistic:+.1f}", f"{test.p_adjusted:.2g}")
-        for test in summary.tests[:MOST_ROWS]
-    ]
-    remark = f"{count} patterns were looked for, each on its own here"
-    remark += f"; the strongest {MOST_ROWS} are shown, all are in compare.json." if count > MOST_ROWS else "."
-    listed = part(Table(("pattern", "kind", ">readings", ">t", ">p, corrected"), rows))
-    return [markup("<details><summary>{}</summary>{}</details>", remark, listed)] if rows else []
-
-
 def _noise(summary: ComparisonSummary) -> Table:
     base = summary.baseline
     rows = [
@@ -200,7 +185,7 @@ def text(comparison: Comparison) -> str:
     """Errors, findings, checks, in lines, and the commands that go on from here."""
     summary = comparison.summary
     lines = [summary.text, "", f"machine file as given; bias: {BIAS}", *errors(summary).lines()]
-    lines += [*_refitted(summary), "", "findings"]
+    lines += ["", "findings"]
     if not summary.findings:
         lines.append("  none: no pattern stands out from scatter")
     lines += [f"  {plain(finding.text)} (p = {finding.p_adjusted:.2g})" for finding in summary.findings]
@@ -219,20 +204,6 @@ def text(comparison: Comparison) -> str:
     lines += [f"note: {plain(text)}" for text in summary.notes]
     shown = [line for i, line in enumerate(lines) if line or lines[i - 1 : i] != [""]]
     return "\n".join(["\n".join(shown).rstrip(), "", *summary.next])
-
-
-def _refitted(summary: ComparisonSummary) -> list[str]:
-    """What refitting the strut law leaves."""
-    base, refit = summary.baseline, summary.baseline.strut_law_refitted
-    if refit is None:
-        return []
-    gain = round(base.mean_abs_error_percent - refit.mean_abs_error_percent, 2)
-    law = " / ".join(f"{stiffness:.1f}" for stiffness in refit.N_per_um)
-    return [
-        "",
-        f"strut law refitted: {refit.mean_abs_error_percent:.2f} % mean error, {refit.bias_percent:+.1f} % bias, rms "
-        f"{refit.rms_percent:.1f} % ({law} N/um)" + ("" if gain > 0.0 else ": nothing gained"),
-    ]
 
 
 def _with_unit(variable: Variable) -> str:

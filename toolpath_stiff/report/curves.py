@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from toolpath_stiff import defaults
+from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
-
-if TYPE_CHECKING:
-    from toolpath_stiff.analysis.results import Analysis
-    from toolpath_stiff.path.sampling import Samples
 
 
 def profile_curve(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray]:

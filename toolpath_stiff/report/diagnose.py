@@ -16,13 +16,14 @@ from toolpath_stiff.portrait.portrait import Portrait, Sized
 from toolpath_stiff.portrait.words import portrait_text, term_words
 from toolpath_stiff.report import explanations as words
 from toolpath_stiff.report.loops import loops_section
-from toolpath_stiff.report.pages import Drawing, Head, Hints, Part, Section, markup, page_of
+from toolpath_stiff.report.pages import Head, Hints, Part, Section, markup, page_of
 from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, significant
 from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, number
 
 text = words.text  # what a terminal shows
 PAGE = "report.html"
+ALIKE, MOST_PAIRS = 0.5, 12  # of effects; the whole matrix is in diagnose.json
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
     "ladder.png": (
@@ -40,15 +41,10 @@ QUESTIONS = {
         f"{DEVIATION}, {MINUS_IS_SOFTER} (red); blue: stiffer. A pattern points to physics, colours sprinkled at "
         "random to scatter.",
     ),
-    "confounding.png": (
-        "What can these data not tell apart?",
-        "How alike two effects make these readings change, the strut law refitted: near 1 no fit can tell which of the "
-        "two it is, whatever the noise. Other poses, loads or tools can.",
-    ),
 }
 
 
-def page(diagnosis: Diagnosis, drawn: Mapping[str, Drawing]) -> str:
+def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
     """The page, the pictures within."""
     about, beside = words.data_text(diagnosis), beside_text(diagnosis.unexcluded)
     head = Head(
@@ -69,13 +65,12 @@ def page(diagnosis: Diagnosis, drawn: Mapping[str, Drawing]) -> str:
         "portrait.png",
         ("What the fits say", _candidates(diagnosis)),
         "before_after.png",
-        "confounding.png",
+        ("What can these data not tell apart?", *_alike(diagnosis)),
         ("What could be there unseen?", *_unseen(diagnosis)),
         loops_section(diagnosis.loops),
         ("What to measure or do next", Hints(next_steps(diagnosis)), _next_readings(diagnosis)),
         ("What these data cannot test", _cannot_test(diagnosis)),
         ("How much the choice matters on the tool path", *_path(diagnosis)),
-        ("Is the model good enough as it is?", *_gate(diagnosis)),
         ("How much readings scatter", *_noise(diagnosis)),
         ("Assumptions", [*assumptions(diagnosis), *diagnosis.data.notes, *doubts(diagnosis)]),
     ]
@@ -144,6 +139,26 @@ def _sized(sized: Sized, part: str) -> list[str]:
     return [term_words(term), term.link, kind, f"{size} {term.unit} ({low} to {high})", change, part]
 
 
+def _alike(diagnosis: Diagnosis) -> list[Part]:
+    """Sets of effects that no fit can tell apart, and the pairs that are most alike."""
+    given = diagnosis.confounding
+    pairs = sorted(
+        (
+            (float(given.matrix[i, j]), f"{first}, {given.names[j]}")
+            for i, first in enumerate(given.names)
+            for j in range(i)
+        ),
+        reverse=True,
+    )
+    rows = [(names, f"{alike:.2f}") for alike, names in pairs[:MOST_PAIRS] if alike > ALIKE]
+    remark = (
+        "How alike two effects make these readings change, the strut law refitted: near 1 no fit can tell which of the "
+        "two it is, whatever the noise. Other poses, loads or tools can."
+    )
+    sets = [f"one set: {', '.join(members)}" for members in given.sets]
+    return [sets, Table(("effects", ">alike"), rows), remark if rows else ""]
+
+
 def _unseen(diagnosis: Diagnosis) -> list[Part]:
     """The smallest size of each effect that these data would show, and the change of stiffness that it makes."""
     rows = [
@@ -154,9 +169,7 @@ def _unseen(diagnosis: Diagnosis) -> list[Part]:
         )
         for smallest in sorted(diagnosis.detectable, key=lambda smallest: (not smallest.seen, smallest.rms))
     ]
-    remark = (
-        "Seen with 80 % power at 5 % family-wise; a smaller effect could be there, and these data would not show it."
-    )
+    remark = "Seen with 80 % power at 5 % family-wise; a smaller effect could be there unseen."
     return [Table(("effect", ">smallest size seen", ">change of stiffness, rms"), rows), remark if rows else ""]
 
 
@@ -192,20 +205,6 @@ def _path(diagnosis: Diagnosis) -> list[Part]:
     rows = [(name, *(number(figures[key]) for key in keys)) for name, figures in explanations.items()]
     listed = Table(("explanation", ">mean N/mm", ">range N/mm", ">weakest N/mm"), rows)
     return [markup("<p>{}.</p>", text[0].upper() + text[1:]), listed]
-
-
-def _gate(diagnosis: Diagnosis) -> list[Part]:
-    """The probabilities of residuals like these if the model without a further effect were right."""
-    gate = diagnosis.main.base_gate
-    chances = {
-        "all together": gate.probability,
-        "weighted sum of squares": gate.squares_probability,
-        "structure": gate.structure_probability,
-        "gain of the best candidate": gate.gain_probability,
-    }
-    rows = [(name, significant(json_number(value, 3), 2)) for name, value in chances.items()]
-    remark = "Readings were simulated from the noise alone and went through the same fit."
-    return [Table(("what is as large as this by chance", ">p"), rows), remark]
 
 
 def _noise(diagnosis: Diagnosis) -> list[Part]:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from toolpath_stiff.report.tables import Table
-
-if TYPE_CHECKING:
-    from toolpath_stiff.stiffness.catalogue import EffectCatalogue
-    from toolpath_stiff.stiffness.contract import Effect, Parameter
-    from toolpath_stiff.stiffness.trial import EffectCheck
+from toolpath_stiff.stiffness.catalogue import EffectCatalogue
+from toolpath_stiff.stiffness.contract import Effect, Parameter
+from toolpath_stiff.stiffness.trial import EffectCheck
 
 WIDE = 1000  # columns: names of parameters are not cut
 TRIAL_WORDS = {True: "good", False: "FAILS", None: "note"}

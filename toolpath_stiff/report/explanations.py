@@ -13,6 +13,7 @@ from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.errors import scatter_text
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.portrait.words import portrait_text
+from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, percent, plain, shortened, significant
 from toolpath_stiff.units import json_number, number
 
@@ -193,28 +194,23 @@ def _table(diagnosis: Diagnosis) -> list[str]:
     every = diagnosis.rows
     shown = [every.as_given, every.refitted, *every.pairs[:MOST_PAIRS], *every.candidates[:MOST_CANDIDATES]]
     shown += [row for row in every.candidates[MOST_CANDIDATES:] if row.standing]
-    cells = [["", "probab.", "error %", "left out %", "gain/SE", "", ""], *map(_cells, shown)]
-    widths = [max(len(row[i]) for row in cells) for i in range(5)]
-    lines = []
-    for name, *figures, words, below in cells:
-        aligned = "  ".join(f"{cell:>{width}}" for cell, width in zip(figures, widths[1:], strict=True))
-        left = f"{name:<{widths[0]}}  {aligned}  "
-        lines.append((left + shortened(words, WIDTH - len(left))).rstrip())
-        lines += [shortened("      " + below, WIDTH)] if below else []
-    more = len(every.candidates) + len(every.pairs) + 2 - len(shown)
-    return [*lines, f"  and {more} less likely, in diagnose.json"] if more > 0 else lines
-
-
-def _cells(row: HypothesisRow) -> list[str]:
-    """Name, four figures, words, and what stands on a line of its own below: sizes and a remark."""
-    figures = ((row.mean_abs_error_percent, 2), (row.held_out_error_percent, 2), (row.held_out_gain_in_se, 1))
-    return [
-        shortened(("* " if row.standing else "  ") + plain(row.label), LONGEST_NAME),
-        probability_text(row.probability),
-        *("-" if value is None else f"{value:.{digits}f}" for value, digits in figures),
-        plain(row.words),
-        "; ".join(filter(None, (", ".join(size_texts(row, intervals=False)), plain(row.remark)))),
+    cells = [
+        (
+            shortened(f"{'* ' if row.standing else '  '}{row.label}", LONGEST_NAME),
+            probability_text(row.probability),
+            number(row.mean_abs_error_percent, 2),
+            number(row.held_out_error_percent, 2),
+            number(row.held_out_gain_in_se, 1),
+            row.words,
+        )
+        for row in shown
     ]
+    head, *lines = Table(("", ">probab.", ">error %", ">left out %", ">gain/SE", ""), cells).lines(least=0)
+    for place, row in reversed([*enumerate(shown, 1)]):
+        if below := "; ".join(filter(None, (", ".join(size_texts(row, intervals=False)), plain(row.remark)))):
+            lines.insert(place, shortened(f"      {below}", WIDTH))
+    more = len(every.candidates) + len(every.pairs) + 2 - len(shown)
+    return [head, *lines, *([f"  and {more} less likely, in diagnose.json"] if more > 0 else [])]
 
 
 def _would_show(diagnosis: Diagnosis) -> str:

@@ -19,8 +19,6 @@ from toolpath_stiff.files import Content
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.report.pages import Drawing
-
 
 def view_of(shown_by: str) -> ModuleType:
     """The view of results of this name."""
@@ -34,8 +32,8 @@ def pictures_of(shown_by: str) -> Mapping[str, Callable[..., Figure | None]]:
     return pictures
 
 
-def _style() -> ModuleType:
-    return import_module("toolpath_stiff.report.pictures.style")
+def _writer() -> ModuleType:
+    return import_module("toolpath_stiff.report.pictures.files")
 
 
 def names(shown_by: str, plots: bool = True, omit: Collection[str] = ()) -> tuple[str, ...]:
@@ -55,27 +53,26 @@ def files(
     }
     if not plots:
         return contents
-    style = _style()
-    drawn: dict[str, Drawing] = {}
+    writer, questions = _writer(), getattr(view, "QUESTIONS", {})
+    drawn: dict[str, bytes] = {}
     for name, draw in pictures_of(result.shown_by).items():
-        if name in omit:
-            continue
-        if name not in getattr(view, "QUESTIONS", {}):
-            contents[name] = partial(style.picture_file, name, draw, result, look)
-        elif (picture := style.drawing(draw, result)) is not None:
-            contents[name] = drawn[name] = picture
+        if name in questions and name not in omit:
+            drawn |= {name: content} if (content := writer.picture_file(name, draw, result, writer.SHARP)) else {}
+        elif name not in omit:
+            contents[name] = partial(writer.picture_file, name, draw, result, **look)
+    contents |= drawn
     return contents | ({view.PAGE: partial(view.page, result, drawn, **look)} if hasattr(view, "PAGE") else {})
 
 
 def picture(result: Any, **look: Any) -> bytes:
     """The first picture of a result as PNG."""
     name, draw = next(iter(pictures_of(result.shown_by).items()))
-    content: bytes = _style().picture_file(name, draw, result, look)
+    content: bytes = _writer().picture_file(name, draw, result, **look)
     return content
 
 
 def figure(result: Any, name: str = "", **look: Any) -> Figure | None:
     """A picture of a result as a figure, the first that shows something unless named; None where none does."""
-    with _style().house_style():
+    with _writer().house_style():
         draws = (draw for file, draw in pictures_of(result.shown_by).items() if name in ("", file))
         return next(filter(None, (draw(result, **look) for draw in draws)), None)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from toolpath_stiff.readings.history import StrutHistory, StrutOverTime
+from toolpath_stiff.report.pages import Section
 from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import plain
-
-if TYPE_CHECKING:
-    from toolpath_stiff.readings.history import StrutHistory, StrutOverTime
-    from toolpath_stiff.report.pages import Section
 
 PICTURE = "history.png"
 QUESTION = (

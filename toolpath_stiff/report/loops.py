@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from toolpath_stiff.comparison.loop_readings import BesideTip
+from toolpath_stiff.report.pages import Section
 from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import plain
-
-if TYPE_CHECKING:
-    from toolpath_stiff.comparison.loop_readings import BesideTip
-    from toolpath_stiff.report.pages import Section
 
 MOST_ROWS = 40  # on a page; all are in the document
 REMARK = (
@@ -20,33 +16,30 @@ REMARK = (
 
 def loops_section(loops: BesideTip) -> Section:
     """The section of a page, by loop, then reading by reading."""
-    means = [
-        (
-            mean.loop,
-            mean.readings,
-            f"{mean.read_nm_per_N:.2f}",
-            f"{mean.model_nm_per_N:.2f}",
-            f"{mean.off_nm_per_N:+.2f} +- {mean.sd_nm_per_N:.2f}",
-            f"{mean.standard_deviations:+.1f}",
-        )
-        for mean in loops.by_loop
-    ]
-    readings = [
-        (
-            f"{reading.file}:{reading.line}",
-            reading.loop,
-            reading.direction,
-            reading.point,
-            f"{reading.read_nm_per_N:.2f}",
-            f"{reading.model_nm_per_N:.2f}",
-            f"{reading.standard_deviations:+.1f}",
-        )
-        for reading in loops.readings[:MOST_ROWS]
-    ]
-    figures = (">read, nm/N", ">modelled, nm/N")
-    by_loop = Table(("loop", ">readings", *figures, ">off, nm/N", ">standard deviations"), means)
-    each = Table(("line", "loop", "direction", "point", *figures, ">standard deviations"), readings)
-    return "Indicators beside the tip", by_loop, REMARK if means else "", each
+    by_loop = Table.of(
+        loops.by_loop,
+        {
+            "loop": lambda mean: mean.loop,
+            ">readings": lambda mean: mean.readings,
+            ">read, nm/N": lambda mean: f"{mean.read_nm_per_N:.2f}",
+            ">modelled, nm/N": lambda mean: f"{mean.model_nm_per_N:.2f}",
+            ">off, nm/N": lambda mean: f"{mean.off_nm_per_N:+.2f} +- {mean.sd_nm_per_N:.2f}",
+            ">standard deviations": lambda mean: f"{mean.standard_deviations:+.1f}",
+        },
+    )
+    each = Table.of(
+        loops.readings[:MOST_ROWS],
+        {
+            "line": lambda reading: f"{reading.file}:{reading.line}",
+            "loop": lambda reading: reading.loop,
+            "direction": lambda reading: reading.direction,
+            "point": lambda reading: reading.point,
+            ">read, nm/N": lambda reading: f"{reading.read_nm_per_N:.2f}",
+            ">modelled, nm/N": lambda reading: f"{reading.model_nm_per_N:.2f}",
+            ">standard deviations": lambda reading: f"{reading.standard_deviations:+.1f}",
+        },
+    )
+    return "Indicators beside the tip", by_loop, REMARK if loops.by_loop else "", each
 
 
 def loops_text(loops: BesideTip) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,6 @@ from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.words import machine_text, plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
-
-if TYPE_CHECKING:
-    from toolpath_stiff.report.pages import Drawing
 
 MOST_CELLS = 120  # along a side; a finer grid is thinned for the page, the CSV file has all of it
 DECIMALS: dict[str, int | None] = {"x_mm": 6, "y_mm": 6, "z_mm": 6, "stiffness_N_per_mm": 4, "reachable": None}
@@ -29,7 +25,7 @@ def heading(planes: StiffnessMap) -> list[str]:
     return [machine, *([tilt] if any(planes.abc) else [])]
 
 
-def page(planes: StiffnessMap, drawn: dict[str, Drawing]) -> Iterator[str]:
+def page(planes: StiffnessMap, drawn: dict[str, bytes]) -> Iterator[str]:
     """The page, in pieces."""
     step = max(1, -(-max(len(planes.x), len(planes.y)) // MOST_CELLS))
     stiffness = n_per_mm_from_n_per_m(planes.stiffness[:, ::step, ::step])

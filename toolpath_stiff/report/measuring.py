@@ -16,10 +16,11 @@ DATA: Mapping[str, Callable[[Reduction], Content]] = {}
 HEAD = ("loop", ">N/mm", ">force N", ">deflection um", ">lost motion um", ">width um", ">linearity %", ">closure um")
 
 
-def pictures(reduction: Reduction) -> Mapping[str, Content | Callable[[], Content]]:
+def pictures(reduction: Reduction) -> dict[str, Content]:
     """The loops drawn, and dated struts over their dates."""
     there = {"loops.png": bool(reduction.recorded), "history.png": dated(reduction.history)}
-    return folder.files(reduction, omit=[name for name in there if not there[name]])
+    drawn = folder.files(reduction, omit=[name for name in there if not there[name]])
+    return {name: content() if callable(content) else content for name, content in drawn.items()}
 
 
 def text(reduction: Reduction) -> str:

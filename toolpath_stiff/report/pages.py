@@ -10,6 +10,7 @@ import base64
 import hashlib
 import json
 import re
+import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -28,12 +29,7 @@ if TYPE_CHECKING:
 
 DATA = Markup("<data>")  # where the data of a page go; what is not `Markup` has no such letters in a page
 LONG_LIST = 20_000  # entries
-
-
-class Drawing(bytes):
-    """A picture as PNG, and the same as SVG to stand in a page; "" where that would be too large."""
-
-    svg: str = ""
+FINER = 1.5  # pixels of a picture to one of the page
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ class Head:
 def page_of(
     head: Head,
     sections: Iterable[Section],
-    drawn: Mapping[str, Drawing],
+    drawn: Mapping[str, bytes],
     questions: Mapping[str, tuple[str, str]],
 ) -> str:
     """A page of sections below each other; what has nothing to show is left out.
@@ -126,12 +122,12 @@ def part(content: Part) -> Markup:
     return _macro("bullets", content) if content else Markup()
 
 
-def _picture(name: str, drawn: Mapping[str, Drawing], questions: Mapping[str, tuple[str, str]]) -> Markup:
+def _picture(name: str, drawn: Mapping[str, bytes], questions: Mapping[str, tuple[str, str]]) -> Markup:
     """A picture under the question that it answers, with how it is read; nothing where it was not drawn."""
     if not (picture := drawn.get(name)):
         return Markup()
-    shown = Markup(picture.svg) or base64.b64encode(picture).decode("ascii")
-    return _macro("picture", *questions[name], shown, bool(picture.svg))
+    (width,) = struct.unpack(">I", picture[16:20])  # of the header, in pixels of the PNG
+    return _macro("picture", *questions[name], base64.b64encode(picture).decode("ascii"), round(width / FINER))
 
 
 def render(

@@ -7,50 +7,52 @@ from collections.abc import Iterator, Mapping
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.placement.result import Placement, Written
 from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
-from toolpath_stiff.report.pages import Drawing
 from toolpath_stiff.report.place_page import page_pieces
 from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.units import number
 
+COSTS = ("best_on_front_N_per_mm", "chosen_N_per_mm")
+
 
 def text(placed: Placement) -> str:
     """A placement in words: what got worse, the placement, what it brings, what it costs."""
-    best, present, count = placed.chosen, placed.present, len(placed.front)
     first = len(placed.worse) + placed.search.nothing_better
-    label = "picked" if placed.picked else "recommended"
-    which = (
-        f"placement {best.number} of {count}, picked" if placed.picked else f"objective {placed.task.rules.objective}"
+    before, after = (
+        [("warning", text) for text in part] for part in (placed.warnings[:first], placed.warnings[first:])
     )
-    lines = [
-        *(f"warning         {warning}" for warning in placed.warnings[:first]),
-        f"program         {placed.best.program.name} on {machine_text(placed.machine_stated)}, load {placed.best.load}",
-        f"{label:<16}X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees "
-        f"({which})",
-    ]
-    if best.a_deg or best.b_deg:
-        lines.append(f"                set-up tilted by A{best.a_deg:.3f} B{best.b_deg:.3f} degrees")
-    lines.append(f"  stiffness     {_figures_words(best)}")
-    lines.append(f"  before        {_figures_words(present) if present else f'out of reach: {placed.present_reason}'}")
-    if best.plunge_mean_N_per_mm is not None:
-        now = f", before {number(present.plunge_mean_N_per_mm)}" if present else ""
-        mean = number(best.plunge_mean_N_per_mm)
-        lines.append(f"  plunges       mean {mean}{now} N/mm, along the tool axis, not counted above")
-    for goal, cost in placed.trade_offs.items():
-        lines.append(
-            f"  best {goal:<9} {number(cost['best_on_front_N_per_mm'])} on the front, "
-            f"{number(cost['chosen_N_per_mm'])} here, N/mm"
-        )
+    rows = [*before, *facts(placed), *(_written(placed.written) if placed.written else []), *after]
+    return "\n".join(f"{label:<16}{text}".replace("\n", "\n" + 16 * " ") for label, text in rows)
+
+
+def facts(placed: Placement) -> list[tuple[str, str]]:
+    """The chosen placement in words, each with its label."""
+    best, present, blocks = placed.chosen, placed.present, placed.offsets
+    which = (
+        f"placement {best.number} of {len(placed.front)}, picked"
+        if placed.picked
+        else f"objective {placed.task.rules.objective}"
+    )
+    zero = f"X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees ({which})"
+    tilt = f"set-up tilted by A{best.a_deg:.3f} B{best.b_deg:.3f} degrees"
+    mean, now = best.plunge_mean_N_per_mm, f", before {number(present.plunge_mean_N_per_mm)}" if present else ""
     margin = min(value for value in (best.margin, best.rapid_margin, 1.0) if value is not None)
-    lines.append(f"  margin        {100.0 * margin:.1f} % of a limit's span at least, rapids included")
-    blocks = placed.offsets
-    lines.append(f"LinuxCNC        {blocks.linuxcnc or blocks.linuxcnc_reason}")
-    fanuc = (blocks.fanuc or blocks.fanuc_reason).replace("\n", "\n                ")
-    lines.append(f"Fanuc-style     {fanuc}")
-    evaluated = placed.search.pose_evaluations
-    lines.append(f"front           {count} placements, {number(evaluated)} poses evaluated")
-    lines += _written(placed.written) if placed.written else []
-    lines += [f"warning         {warning}" for warning in placed.warnings[first:]]
-    return "\n".join(lines)
+    costs = [
+        (f"  best {goal:<9} ", "{} on the front, {} here, N/mm".format(*(number(cost[name]) for name in COSTS)))
+        for goal, cost in placed.trade_offs.items()
+    ]
+    return [
+        ("program", f"{placed.best.program.name} on {machine_text(placed.machine_stated)}, load {placed.best.load}"),
+        ("picked" if placed.picked else "recommended", zero),
+        *([("", tilt)] if best.a_deg or best.b_deg else []),
+        ("  stiffness", _figures_words(best)),
+        ("  before", _figures_words(present) if present else f"out of reach: {placed.present_reason}"),
+        *([("  plunges", f"mean {number(mean)}{now} N/mm, along the tool axis, not counted above")] if mean else []),
+        *costs,
+        ("  margin", f"{100.0 * margin:.1f} % of a limit's span at least, rapids included"),
+        ("LinuxCNC", blocks.linuxcnc or blocks.linuxcnc_reason),
+        ("Fanuc-style", blocks.fanuc or blocks.fanuc_reason),
+        ("front", f"{len(placed.front)} placements, {number(placed.search.pose_evaluations)} poses evaluated"),
+    ]
 
 
 def _figures_words(row: PlacementRow) -> str:
@@ -60,17 +62,15 @@ def _figures_words(row: PlacementRow) -> str:
     )
 
 
-def _written(written: Written) -> list[str]:
-    """Lines on the transformed program."""
+def _written(written: Written) -> list[tuple[str, str]]:
+    """What became of the transformed program."""
     if written.refused:
-        return [f"not rewritten   {written.file}: {written.refused}"]
+        return [("not rewritten", f"{written.file}: {written.refused}")]
     zero, apart = written.analysed_at, written.relative_difference
     figures = ", ".join(f"{name} {value:.1e}" for name, value in apart.items())
-    lines = [
-        f"rewritten       {written.file}; at X{zero['x_mm']:g} Y{zero['y_mm']:g} Z{zero['z_mm']:g}, "
-        f"{zero['rotation_deg']:g} degrees it differs from the placed program by (relative) {figures}"
-    ]
-    return lines + [f"                {note}" for note in written.notes]
+    where = f"X{zero['x_mm']:g} Y{zero['y_mm']:g} Z{zero['z_mm']:g}, {zero['rotation_deg']:g} degrees"
+    text = f"{written.file}; at {where} it differs from the placed program by (relative) {figures}"
+    return [("rewritten", text), *(("", note) for note in written.notes)]
 
 
 def _table(placed: Placement) -> str:
@@ -85,7 +85,7 @@ def _cell(value: float | None) -> str:
     return str(value) if isinstance(value, int) else f"{value:.6f}"
 
 
-def page(placed: Placement, drawn: Mapping[str, Drawing]) -> Iterator[str]:
+def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
     """The page, in pieces."""
     return page_pieces(placed)
 

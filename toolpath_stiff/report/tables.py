@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from markupsafe import Markup
 
@@ -11,6 +12,9 @@ from toolpath_stiff.report.words import WIDTH, plain, shortened
 
 LABEL = 14  # columns of the left-hand words
 LEAST_NAME = 24  # columns for the first column, however wide the others are
+
+
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,13 @@ class Table:
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
     kinds: Sequence[str] = ()
+
+    @classmethod
+    def of(
+        cls, items: Iterable[Item], columns: Mapping[str, Callable[[Item], object]], kinds: Sequence[str] = ()
+    ) -> Table:
+        """A row for each item; `columns`: what each shows of it, under its title."""
+        return cls([*columns], [[show(item) for show in columns.values()] for item in items], kinds)
 
     @property
     def titles(self) -> list[str]:

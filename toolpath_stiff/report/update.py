@@ -13,7 +13,7 @@ from toolpath_stiff.correction.result import Update
 from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.correction.strut_law import bar_curve_csv
 from toolpath_stiff.diagnosis.rows import FittedSize, percent_of
-from toolpath_stiff.report.pages import Drawing, Hints, Section, page_of, readings_head
+from toolpath_stiff.report.pages import Hints, Section, page_of, readings_head
 from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, WIDTH, counted, machine_text, percent, plain
 from toolpath_stiff.units import number
@@ -47,7 +47,7 @@ QUESTIONS = {
 }
 
 
-def page(update: Update, drawn: Mapping[str, Drawing]) -> str:
+def page(update: Update, drawn: Mapping[str, bytes]) -> str:
     """The page, the pictures within."""
     document, provenance = update.document, update.provenance
     record = [

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from toolpath_stiff.analysis.statistics import FIGURES
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.documents import Document
-from toolpath_stiff.report.analysis import only_plunges
+from toolpath_stiff.report.analysis_tables import only_plunges
 from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import WIDTH, counted, duration, plain, shortened
 from toolpath_stiff.units import number
@@ -17,46 +18,15 @@ from toolpath_stiff.units import number
 MOST_NAME = 36  # columns of the terminal for the name
 # First columns of summary.csv -> what of the outcome they show.
 TOLD = {"program": "name", "file": "file", "status": "status", "reason": "reason", "report": "opens"}
-# Its further columns, keys of the figures -> decimals; the units are in the names.
-COLUMNS: Mapping[str, int | None] = {
-    "machine": None,
-    "load": None,
-    "force_N": 3,
-    "samples": 0,
-    "cutting_length_mm": 3,
-    "rapid_length_mm": 3,
-    "time_s": 3,
-    "mean_N_per_mm": 4,
-    "min_N_per_mm": 4,
-    "max_N_per_mm": 4,
-    "range_N_per_mm": 4,
-    "mean_deflection_um": 4,
-    "headline": None,
-    "plunge_length_mm": 3,
-    "plunge_mean_N_per_mm": 4,
-    "plunge_min_N_per_mm": 4,
-    "plunge_max_N_per_mm": 4,
-    "weakest_line": 0,
-    "weakest_text": None,
-    "weakest_x_mm": 4,
-    "weakest_y_mm": 4,
-    "weakest_z_mm": 4,
-    "weakest_a_deg": 5,
-    "weakest_b_deg": 5,
-    "weakest_c_deg": 5,
-    "min_margin": 5,
-    "min_margin_line": 0,
-    "out_of_reach_samples": 0,
-    "extrapolated_share": 5,
-    "warnings": 0,
-    "not_acted_upon": 0,
-    "required_N_per_mm": 4,
-    "lines_below_required": 0,
-    "compare_machine": None,
-    "compare_mean_N_per_mm": 4,
-    "compare_min_N_per_mm": 4,
-    "compare_mean_difference_percent": 3,
-}
+# Its further columns, keys of the figures; the units are in the names.
+CUT = ("samples", "cutting_length_mm", "rapid_length_mm", "time_s", *FIGURES, "headline")
+PLUNGES = ("plunge_length_mm", *(f"plunge_{name}" for name in FIGURES[:3]))
+WEAKEST = tuple(f"weakest_{name}" for name in ("line", "text", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"))
+STANDING = ("min_margin", "min_margin_line", "out_of_reach_samples", "extrapolated_share", "warnings", "not_acted_upon")
+REQUIRED = ("required_N_per_mm", "lines_below_required")
+COMPARED = tuple(f"compare_{name}" for name in ("machine", *FIGURES[:2], "mean_difference_percent"))
+COLUMNS = ("machine", "load", "force_N", *CUT, *PLUNGES, *WEAKEST, *STANDING, *REQUIRED, *COMPARED)
+DECIMALS = {"_N": 3, "_mm": 4, "_um": 4, "_s": 3, "_deg": 5, "_percent": 3, "_margin": 5, "_share": 5}  # of a unit
 
 
 @dataclass(frozen=True)
@@ -129,14 +99,14 @@ def figures_of(summary: Document) -> Document:
 def summary_csv(outcomes: Sequence[ProgramOutcome]) -> str:
     """`summary.csv`: one row a program, failures too; a figure that does not exist is an empty cell."""
 
-    def cell(value: Any, digits: int | None) -> str:
-        if value is None:
-            return ""
-        return plain(str(value)) if digits is None else f"{value:.{digits}f}"
+    def cell(name: str, value: object) -> str:
+        if not isinstance(value, float):
+            return "" if value is None else plain(str(value))
+        return f"{value:.{next(digits for unit, digits in DECIMALS.items() if name.endswith(unit))}f}"
 
-    kinds, columns = {**dict.fromkeys(TOLD), **COLUMNS}, columns_of(outcomes).values()
-    rows = [[cell(*pair) for pair in zip(row, kinds.values(), strict=True)] for row in zip(*columns, strict=True)]
-    return csv_text([*kinds], rows)
+    columns = columns_of(outcomes)
+    shown = ([cell(name, value) for value in values] for name, values in columns.items())
+    return csv_text([*columns], zip(*shown, strict=True))
 
 
 def columns_of(outcomes: Sequence[ProgramOutcome]) -> dict[str, list[Any]]:

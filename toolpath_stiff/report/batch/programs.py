@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.languages import EXTENSIONS
+from toolpath_stiff.report.words import counted
 
 # Endings of the files that a folder stands for: `.txt` is as often a note or a tool list.
 ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min", *EXTENSIONS)
@@ -31,12 +31,11 @@ class FolderCount:
 
     folder: str
     programs: int
-    left: tuple[tuple[str, int], ...]  # endings of the other files and how many, "" for none
+    others: int
 
     def __str__(self) -> str:
-        others = ", ".join(f"{count} {ending or 'without an ending'}" for ending, count in self.left)
-        about = f"; other files are left alone: {others}" if others else ""
-        return f"{self.folder}: {self.programs} program{'' if self.programs == 1 else 's'}{about}"
+        about = f"; {counted(self.others, 'other file')} left alone" if self.others else ""
+        return f"{self.folder}: {counted(self.programs, 'program')}{about}"
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,8 @@ def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
     def refuse(error: OSError) -> None:
         raise InputError(f"cannot read folder {str(error.filename)!r}: {error.strerror}")
 
-    inside, others = [], Counter[str]()
+    inside: list[Found] = []
+    others = 0
     for place, folders, files in os.walk(folder, onerror=refuse):
         folders[:] = [name for name in folders if not name.startswith(".")]
         for name in files:
@@ -90,7 +90,7 @@ def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
             if path.suffix.lower() in ENDINGS and (path.is_file() or (path.is_symlink() and not path.exists())):
                 inside.append(Found(str(path), path.relative_to(folder)))
             else:
-                others[path.suffix.lower()] += 1
+                others += 1
     if not inside:
         raise InputError(
             f"no NC program in folder {folder!r}",
@@ -98,7 +98,7 @@ def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
             hint="name files with another ending themselves",
         )
     inside.sort(key=lambda program: [(_by_number(part), part) for part in program.inside.parts])
-    return inside, FolderCount(folder, len(inside), tuple(sorted(others.items())))
+    return inside, FolderCount(folder, len(inside), others)
 
 
 def _by_number(name: str) -> list[str | int]:

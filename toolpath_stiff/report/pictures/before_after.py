@@ -23,6 +23,7 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 SHOWN = 0.98  # share of the residuals that the colour scale holds
 BAND = 0.10  # drawn about measured = modelled
 MAP = 2.05  # inch
+MAPS = "maps from above, X to the right; a point: mean of its readings"
 LEFT = 0.95  # inch
 
 
@@ -45,38 +46,51 @@ class Fits:
 def before_after(fits: Fits) -> Figure:
     """Where model and measurements differ, seen from above, before and after, and measured against modelled."""
     data, halves = fits.data, [np.asarray(residual, dtype=float) for residual in (fits.before, fits.after)]
-    along, levels = directions(data), planes(data)
-    columns = [d for d in DIRECTIONS if (along == d).any()]
-    rows = sorted(set(levels.tolist()), key=lambda name: -float(data.position[levels == name, 2].mean()))
-    limit = _limit(halves)
-    block = MAP * len(columns) + 0.3
-    width, height = max(1.1 + 2 * block + 0.9, 11.0), 1.35 + MAP * len(rows) + 0.4 + 4.0
-    wide = f"{2.4 * _reach(data):.0f} mm wide"
+    limit, (rows, columns) = _limit(halves), panels(data)
+    block = MAP * len(columns) + 1.1
+    width, height = max(1.1 + 2 * block, 11.0), 1.35 + MAP * len(rows) + 0.4 + 4.0
     step = "" if fits.refitted_percent is None else f"{LAW_REFITTED} alone: {percent(fits.refitted_percent, 2)}; "
-    figure = new_figure(
-        width, height, "Did the error fall, and what remains?", f"{step}{DEVIATION}, {MINUS_IS_SOFTER}; maps from "
-        f"above, X to the right, {wide}; a point: mean of its readings",
-    )  # fmt: skip
+    note = f"{step}{DEVIATION}, {MINUS_IS_SOFTER}; {MAPS}, {2.4 * _reach(data):.0f} mm wide"
+    figure = new_figure(width, height, "Did the error fall, and what remains?", note)
     held_out = (None, fits.held_out_percent)
     for half, (name, residual) in enumerate(zip((AS_GIVEN, fits.last), halves, strict=True)):
-        left, top = LEFT + half * block, height - 1.35
         title = _half_title(name, held_out[half], residual)
-        figure.text(left / width, 1.0 - 1.0 / height, title, size=10.5, weight="bold")
-        for i, j in np.ndindex(len(rows), len(columns)):
-            axes = panel(figure, left + MAP * j, top - MAP * (i + 1) + 0.1, MAP - 0.15, MAP - 0.3, xticks=[], yticks=[])
-            here = levels == rows[i]
-            points = _map(axes, data, residual, here & (along == columns[j]), limit)
-            axes.set_title(columns[j] if i == 0 else "", size=9.5, color=MUTED)
-            if half == j == 0:
-                style: Look = {"rotation": 90, "ha": "right", "va": "center", "size": 9}
-                low, high = (f"{end:.0f}" for end in mm_from_m(np.quantile(data.position[here, 2], (0.0, 1.0))))
-                text = f"z {low} mm" if low == high else f"z {low} to {high} mm"
-                axes.text(-0.04, 0.5, text, transform=axes.transAxes, **style)
-    bar = panel(figure, LEFT + 2 * block, height - 1.35 - MAP * len(rows) + 0.1, 0.16, MAP * len(rows) - 0.3)
+        figure.text((LEFT + half * block) / width, 1.0 - 1.0 / height, title, size=10.5, weight="bold")
+        maps(figure, data, residual, (LEFT + half * block, height - 1.35, MAP), limit)
+    _scatter_pair(figure, data, halves, directions(data))
+    return figure
+
+
+def panels(data: Readings) -> tuple[list[str], list[str]]:
+    """Planes, the highest first, and directions of the readings."""
+    along, levels = directions(data), planes(data)
+    rows = sorted(set(levels.tolist()), key=lambda name: -float(data.position[levels == name, 2].mean()))
+    return rows, [direction for direction in DIRECTIONS if (along == direction).any()]
+
+
+def maps(
+    figure: Figure, data: Readings, residual: FloatArray, place: tuple[float, float, float], limit: float = 0.0
+) -> None:
+    """Residuals seen from above, a row a plane, a column a direction, with their scale.
+
+    `place`: left and upper edge of the maps, and the side of one, in inches. `limit`: end of the scale, %; else
+    as the residuals need it.
+    """
+    (rows, columns), (left, top, side) = panels(data), place
+    along, levels, limit = directions(data), planes(data), limit or _limit([residual])
+    for i, j in np.ndindex(len(rows), len(columns)):
+        corner = left + side * j, top - side * (i + 1) + 0.1
+        axes, here = panel(figure, *corner, side - 0.15, side - 0.3, xticks=[], yticks=[]), levels == rows[i]
+        points = _map(axes, data, residual, here & (along == columns[j]), limit)
+        axes.set_title(columns[j] if i == 0 else "", size=9.5, color=MUTED)
+        if j == 0:
+            style: Look = {"rotation": 90, "ha": "right", "va": "center", "size": 9}
+            low, high = (f"{end:.0f}" for end in mm_from_m(np.quantile(data.position[here, 2], (0.0, 1.0))))
+            text = f"z {low} mm" if low == high else f"z {low} to {high} mm"
+            axes.text(-0.04, 0.5, text, transform=axes.transAxes, **style)
+    bar = panel(figure, left + side * len(columns), top - side * len(rows) + 0.1, 0.12, side * len(rows) - 0.3)
     figure.colorbar(points, cax=bar, extend="both").set_label(f"{DEVIATION}, %", size=9)
     bar.grid(visible=False)
-    _scatter_pair(figure, data, halves, along)
-    return figure
 
 
 def _half_title(name: str, held_out: float | None, residual: FloatArray) -> str:
@@ -104,9 +118,11 @@ def _map(axes: Axes, data: Readings, residual: FloatArray, chosen: NDArray[np.bo
     style: Look = {"c": values, "s": 78, "edgecolors": INK, "linewidths": 0.5, "zorder": 3}
     drawn = axes.scatter(places[:, 0], places[:, 1], cmap=RESIDUAL, vmin=-limit, vmax=limit, **style)
     axes.plot(0.0, 0.0, "+", color=MUTED, ms=8, zorder=2)
-    axes.set_xlim(centre[0] - 1.2 * reach, centre[0] + 1.2 * reach)
-    axes.set_ylim(centre[1] - 1.2 * reach, centre[1] + 1.2 * reach)
-    axes.set_aspect("equal")
+    axes.set(
+        xlim=(centre[0] - 1.2 * reach, centre[0] + 1.2 * reach),
+        ylim=(centre[1] - 1.2 * reach, centre[1] + 1.2 * reach),
+        aspect="equal",
+    )
     return drawn
 
 
@@ -149,11 +165,7 @@ def one_to_one(axes: Axes, low: float, high: float) -> None:
     line = np.array([low, high])
     axes.fill_between(line, line * (1.0 - BAND), line * (1.0 + BAND), color=WITHIN, lw=0, zorder=0)
     axes.plot(line, line, color=MUTED, lw=1.0, zorder=1)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlim(low, high)
-    axes.set_ylim(low, high)
+    axes.set(xscale="log", yscale="log", xlim=(low, high), ylim=(low, high))
     for axis in (axes.xaxis, axes.yaxis):
         round_ticks(axis, low, high)
-    axes.set_xlabel("modelled stiffness, N/mm")
-    axes.set_ylabel("measured stiffness, N/mm")
+    axes.set(xlabel="modelled stiffness, N/mm", ylabel="measured stiffness, N/mm")

@@ -41,11 +41,13 @@ def regions(study: CaseStudy) -> Figure:
         for row in study.summary["regions"]:
             if row["z_mm"] == height:
                 drawn = _path(axes, study, row, ends)
-        axes.set_title(f"z = {height:g} mm")
-        axes.set_xlim(left, right)
-        axes.set_ylim(bottom, top)
-        axes.set_xlabel("X mm")
-        axes.set_ylabel("" if column else "Y mm")
+        axes.set(
+            title=f"z = {height:g} mm",
+            xlim=(left, right),
+            ylim=(bottom, top),
+            xlabel="X mm",
+            ylabel="" if column else "Y mm",
+        )
         axes.tick_params(labelleft=not column)
         axes.plot(0, 0, "+", color=MUTED, ms=10)
     colour_scale(drawn, panel(figure, width - right_of, 0.6, 0.18, tall), "tangential stiffness, N/mm")

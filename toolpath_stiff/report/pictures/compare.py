@@ -8,16 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import directions, planes
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.colours import DIRECTIONS, FAINT, INK, MUTED, RED, RESIDUAL, WITHIN
-from toolpath_stiff.report.pictures.before_after import BAND, one_to_one
-from toolpath_stiff.report.pictures.compare_machine import machine, near_rows
+from toolpath_stiff.report.pictures.before_after import BAND, MAPS, maps, one_to_one, panels
 from toolpath_stiff.report.pictures.history import history
 from toolpath_stiff.report.pictures.load_path import load_path
 from toolpath_stiff.report.pictures.style import Look, new_figure, panel, round_ticks
@@ -29,6 +26,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 MOST_CHANGES = 12  # of set-up or file that are marked
 WIDTH = 14.0  # inches
 OPAQUEST = 1.8  # times the largest residual would be drawn opaque: figures stay legible on it
+SIDE = 2.6  # inches, of a map
 SIDES = 2.0  # standard deviations of the bars and bands: 95 %
 
 
@@ -76,28 +74,24 @@ def measured_modelled(comparison: Comparison) -> Figure:
             beside.plot(ends, [float(np.mean(residual[rows]))] * 2, color=colour, lw=1.6, ls="--", zorder=2)
     beside.set_xscale("log")
     round_ticks(beside.xaxis, *beside.get_xlim())
-    beside.set_xlabel("modelled stiffness, N/mm")
-    beside.set_ylabel(RESIDUAL_AXIS)
+    beside.set(xlabel="modelled stiffness, N/mm", ylabel=RESIDUAL_AXIS)
     beside.set_title("the difference; dashed: mean of a direction", fontsize=10)
-    _legend(axes, comparison, along, shapes)
+    _legend(axes, comparison, shapes)
     return figure
 
 
-def _legend(axes: Axes, comparison: Comparison, along: NDArray[np.str_], shapes: dict[str, str]) -> None:
-    """Directions with their mean error; set-ups if there are several."""
-    keys: list[Line2D | Patch] = []
-    for axis, colour in DIRECTIONS.items():
-        if (along == axis).any():
-            errors = comparison.summary.by_direction[axis]
-            mean, bias = errors.mean_abs_error_percent, errors.bias_percent
-            text = f"{axis}: mean error {mean:.1f} %, bias {bias:+.1f} %"
-            keys.append(Line2D([], [], marker="o", ls="", color=colour, label=text))
-    if len(shapes) > 1:
-        for setup, marker in list(shapes.items())[: len(MARKERS)]:
-            name = shortened(plain(setup) or "(no name)", 30)
-            keys.append(Line2D([], [], marker=marker, ls="", color=MUTED, label=f"set-up {name}"))
-    keys.append(Patch(color=WITHIN, label="within 10 %"))
-    axes.legend(handles=keys, loc="upper left", frameon=True, framealpha=0.9, edgecolor="none", fontsize=9)
+def _legend(axes: Axes, comparison: Comparison, shapes: dict[str, str]) -> None:
+    """Directions with their errors; set-ups if there are several."""
+    errors = comparison.summary.by_direction
+    texts = {
+        axis: f"{axis}: mean error {of.mean_abs_error_percent:.1f} %, bias {of.bias_percent:+.1f} %"
+        for axis, of in errors.items()
+    }
+    keys = [Line2D([], [], marker="o", ls="", color=DIRECTIONS[axis], label=text) for axis, text in texts.items()]
+    for setup, marker in list(shapes.items())[: len(MARKERS)] if len(shapes) > 1 else []:
+        name = shortened(plain(setup) or "(no name)", 30)
+        keys.append(Line2D([], [], marker=marker, ls="", color=MUTED, label=f"set-up {name}"))
+    axes.legend(handles=keys, loc="upper left", framealpha=0.9, edgecolor="none", fontsize=9, title="grey: within 10 %")
 
 
 def strips(comparison: Comparison) -> Figure:
@@ -126,10 +120,12 @@ def strips(comparison: Comparison) -> Figure:
             chosen = rows & (data.setup == setup)
             axes.plot(order[chosen], residual[chosen], marker, **look)
         _changes(axes, data.setup, data.file, i == 0)
-        axes.set_xlim(0.0, len(data) + 1.0)
-        axes.set_ylim(edges.min() - margin, edges.max() + margin)
+        axes.set(xlim=(0.0, len(data) + 1.0), ylim=(edges.min() - margin, edges.max() + margin))
         axes.set_ylabel(f"{axis}, %", weight="bold", color=DIRECTIONS[axis])
-        _name_far_off(axes, comparison, axis, residual)
+        far = np.array(
+            [reading.reading for reading in comparison.summary.outliers if reading.direction == axis], dtype=int
+        )
+        axes.plot(far, residual[far - 1], "o", ms=10, mfc="none", mec=RED, mew=1.4, zorder=4)
         last = i == len(present) - 1
         axes.tick_params(labelbottom=last)
         axes.set_xlabel("reading, in the order of the file" if last else "")
@@ -145,28 +141,20 @@ def _changes(axes: Axes, setup: NDArray[np.str_], file: NDArray[np.str_], named:
     if named and 1 < len(starts) <= MOST_CHANGES:
         for start in starts:
             text = shortened(plain(str(setup[start])) or "(no name)", 18)
-            axes.annotate(
-                text, (start + 0.6, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -3),
-                textcoords="offset points", va="top", fontsize=8, color=MUTED,
-            )  # fmt: skip
+            look: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "fontsize": 8}
+            axes.annotate(text, (start + 0.6, 1.0), xytext=(2, -3), va="top", color=MUTED, **look)
 
 
-def _name_far_off(axes: Axes, comparison: Comparison, axis: str, residual: FloatArray) -> None:
-    """File lines of the readings that are far off."""
-    for far in comparison.summary.outliers[:12]:
-        if far.direction != axis:
-            continue
-        i = far.reading - 1
-        axes.plot(i + 1, residual[i], "o", ms=10, mfc="none", mec=RED, mew=1.4, zorder=4)
-        axes.annotate(
-            f"line {far.line}", (i + 1, residual[i]), xytext=(8, 0), textcoords="offset points", va="center",
-            fontsize=8, color=RED, zorder=5,
-        )  # fmt: skip
+def _near_rows(comparison: Comparison) -> NDArray[np.bool_]:
+    """(n,) readings that are not far off."""
+    near = np.ones(len(comparison.residual), dtype=bool)
+    near[[reading.reading - 1 for reading in comparison.summary.outliers]] = False
+    return near
 
 
 def by_plane(comparison: Comparison) -> Figure:
     """Mean residual by plane and direction, a signed percentage a cell with its standard error."""
-    data, near = comparison.data, near_rows(comparison)
+    data, near = comparison.data, _near_rows(comparison)
     along, where = directions(data), planes(data)
     columns = [axis for axis in DIRECTIONS if (along == axis).any()]
     columns += ["all"] if len(columns) > 1 else []
@@ -208,6 +196,16 @@ def by_plane(comparison: Comparison) -> Figure:
     return figure
 
 
+def where_it_fails(comparison: Comparison) -> Figure:
+    """The residuals seen from above, plane by plane, direction by direction."""
+    rows, columns = panels(comparison.data)
+    width, height = max(1.9 + SIDE * len(columns), 11.0), 1.4 + SIDE * len(rows)
+    question = "Where does the model fail? Alike all around, or on one side?"
+    figure = new_figure(width, height, question, f"{RESIDUAL_AXIS}; {MAPS}")
+    maps(figure, comparison.data, comparison.residual, (0.95, height - 1.2, SIDE))
+    return figure
+
+
 def over_dates(comparison: Comparison) -> Figure | None:
     """Struts over their dates."""
     return history(comparison.summary.history)
@@ -216,7 +214,7 @@ def over_dates(comparison: Comparison) -> Figure | None:
 PICTURES = {
     "measured_modelled.png": measured_modelled,
     "planes.png": by_plane,
-    "machine.png": machine,
+    "machine.png": where_it_fails,
     "strips.png": strips,
     "variables.png": variables,
     "load_path.png": load_path,

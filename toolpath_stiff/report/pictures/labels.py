@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import IdentityTransform
 
 from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.report.analysis import headline_text
+from toolpath_stiff.report.analysis_tables import headline_text
 from toolpath_stiff.report.colours import INK, MUTED
 from toolpath_stiff.report.pictures.style import Look
 from toolpath_stiff.report.words import plain, shortened

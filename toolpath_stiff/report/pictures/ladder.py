@@ -14,7 +14,7 @@ from toolpath_stiff.inference.errors import AS_GIVEN
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.report.colours import BLUE, CHOSEN, GREY, INK, MUTED, ORANGE
 from toolpath_stiff.report.explanations import floor_text, probability_text, remark_text, size_texts
-from toolpath_stiff.report.pictures.style import new_figure, open_frame, panel
+from toolpath_stiff.report.pictures.style import Look, new_figure, open_frame, panel
 from toolpath_stiff.report.words import counted, percent, plain, shortened
 from toolpath_stiff.units import json_number
 
@@ -76,18 +76,14 @@ def _errors(axes: Axes, rows: Sequence[HypothesisRow], diagnosis: Diagnosis) -> 
     end = 1.08 * max(error for error in errors if error is not None)
     end = max(end if base is None else min(end, BEYOND * base), 1.3 * floor, 1e-6)
     axes.set_xlim(0.0, end)
-    for value, other, text, colour, style in (
-        (floor, base, f"noise floor {floor_text(diagnosis)}", ORANGE, ":"),
-        (base, floor, f"strut law refitted {percent(base)}", INK, "--"),
-    ):
-        if value is not None:
-            axes.axvline(value, color=colour, lw=1.3, ls=style, zorder=1)
-            leftwards = other is not None and value < other  # two labels turn away from each other
-            axes.annotate(
-                text, (value, 1.0), xycoords=("data", "axes fraction"),
-                xytext=(4 if leftwards else -4, 3), textcoords="offset points", size=8.5, color=colour,
-                ha="right" if leftwards else "left",
-            )  # fmt: skip
+    lines = [(floor, f"noise floor {floor_text(diagnosis)}", ORANGE, ":")]
+    lines += [] if base is None else [(base, f"strut law refitted {percent(base)}", INK, "--")]
+    for (value, text, colour, style), side in zip(
+        sorted(lines), ("right", "left"), strict=False
+    ):  # away from each other
+        axes.axvline(value, color=colour, lw=1.3, ls=style, zorder=1)
+        place: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "size": 8.5, "ha": side}
+        axes.annotate(text, (value, 1.0), xytext=(4 if side == "left" else -4, 3), color=colour, **place)
     for y, row in enumerate(rows):
         colour = BLUE if row.standing else INK if row.name in (AS_GIVEN, NONE) else MUTED
         colour = colour if row.offered else GREY
@@ -114,9 +110,8 @@ def _chances(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
         value = row.probability or 0.0
         axes.barh(y, value, height=0.5, color=BLUE if row.offered else GREY, zorder=2)
         inside = value > 0.6
-        axes.text(
-            value + (-0.03 if inside else 0.03), y, probability_text(row.probability), va="center",
-            ha="right" if inside else "left", size=9, color="white" if inside else INK, zorder=3,
-        )  # fmt: skip
+        look: Look = {"ha": "right", "color": "white"} if inside else {"ha": "left", "color": INK}
+        place = value + (-0.03 if inside else 0.03), y
+        axes.text(*place, probability_text(row.probability), va="center", size=9, zorder=3, **look)
     axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100 %"])
     axes.set_xlabel("probability", size=9)

@@ -1,5 +1,5 @@
 """The picture of a machine that was checked."""
 
-from toolpath_stiff.report.pictures.machine import machine_views
+from toolpath_stiff.report.pictures.machine import machine_checked
 
-PICTURES = {"machine.png": machine_views}
+PICTURES = {"machine.png": machine_checked}

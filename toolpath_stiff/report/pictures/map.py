@@ -45,8 +45,7 @@ def stiffness_map(planes: StiffnessMap) -> Figure:
         axes = figure.add_subplot(grid[i // columns, i % columns])
         drawn = _slice(axes, planes, i, stiffness[i], low, high)
         below, first = i + columns >= slices, i % columns == 0
-        axes.set_xlabel("X mm" if below else "")
-        axes.set_ylabel("Y mm" if first else "")
+        axes.set(xlabel="X mm" if below else "", ylabel="Y mm" if first else "")
         axes.tick_params(labelbottom=below, labelleft=first)
     bar = panel(figure, width - 1.2, BOTTOM, 0.2, height - BOTTOM - TOP)
     colour_scale(drawn, bar, "stiffness along the load, N/mm")
@@ -59,10 +58,7 @@ def _slice(axes: Axes, planes: StiffnessMap, i: int, stiffness: FloatArray, low:
     mesh = axes.pcolormesh(x, y, stiffness, cmap=STIFFNESS, vmin=low, vmax=high, shading="gouraud")
     if not planes.reachable[i].all() and planes.reachable[i].any():
         axes.contour(x, y, planes.reachable[i].astype(float), levels=[0.5], colors=RED, linewidths=1.5)
-    axes.set_facecolor(NOWHERE)
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(y[0], y[-1])
-    axes.set_aspect("equal")
+    axes.set(facecolor=NOWHERE, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), aspect="equal")
     axes.grid(visible=False)
     axes.set_title(f"z = {mm_from_m(planes.z[i]):g} mm", fontsize=10)
     names = _directions(axes, mm_from_m(planes.model.machine.frame_joints[:, :2]))

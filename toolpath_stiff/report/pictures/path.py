@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -24,14 +24,6 @@ from toolpath_stiff.report.pictures.labels import add_heading, add_legend, label
 from toolpath_stiff.report.pictures.style import POINTS, Look, new_figure, panel
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from toolpath_stiff.analysis.results import Analysis
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
 LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views
 MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
@@ -185,10 +177,12 @@ def _lay_out(span: FloatArray) -> tuple[Figure, list[Axes], tuple[float, float, 
 
 def _set_up(axes: Axes, across: int, up: int, middle: FloatArray, span: FloatArray) -> None:
     names = "XYZ"
-    axes.set_xlabel(f"{names[across]} mm")
-    axes.set_ylabel(f"{names[up]} mm")
-    axes.set_xlim(middle[across] - span[across] / 2, middle[across] + span[across] / 2)
-    axes.set_ylim(middle[up] - span[up] / 2, middle[up] + span[up] / 2)
+    axes.set(
+        xlabel=f"{names[across]} mm",
+        ylabel=f"{names[up]} mm",
+        xlim=(middle[across] - span[across] / 2, middle[across] + span[across] / 2),
+        ylim=(middle[up] - span[up] / 2, middle[up] + span[up] / 2),
+    )
     box = axes.get_window_extent()
     axes.xaxis.set_major_locator(MaxNLocator(max(2, int(box.width // 75)), steps=[1, 2, 2.5, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(max(2, int(box.height // 50)), steps=[1, 2, 2.5, 5, 10]))

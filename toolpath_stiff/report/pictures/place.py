@@ -39,8 +39,7 @@ def front(placed: Placement) -> Figure:
         }
         axes.scatter([before.mean_N_per_mm], [before.range_N_per_mm], zorder=3, label="present placement", **look)
     axes.margins(0.08)
-    axes.set_xlabel("mean stiffness, N/mm (more is better)")
-    axes.set_ylabel("range of stiffness, N/mm (less is better)")
+    axes.set(xlabel="mean stiffness, N/mm (more is better)", ylabel="range of stiffness, N/mm (less is better)")
     in_thousands(axes.xaxis, axes.yaxis)
     axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncol=3, fontsize=9)
     colour_scale(dots, panel(figure, 7.6, 0.74, 0.2, 4.28), "weakest place, N/mm (more is better)")

@@ -36,7 +36,6 @@ MOST_ACROSS = 5  # panels in a row
 NARROWEST = 8.0  # inches, for the headings
 ROOM = 1.2  # half a panel, of the farthest pose: marks lean and have labels
 CLOSE = 0.06  # m between marks whose labels would cover each other
-SHORT = 6  # letters of a label that has room on either side
 ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
 
 
@@ -100,8 +99,7 @@ def visits_drawn(
         low, high = (f"{mm_from_m(float(group[end])):.5g}" for end in (0, -1))
         axes.set_title(f"z = {low}{'' if low == high else f' to {high}'} mm{words}", fontsize=10)
         below = which + across >= len(groups) and leaning == len(kinds_of_panel) - 1
-        axes.set_xlabel("X mm" if below else "")
-        axes.set_ylabel("Y mm" if column == 0 else "")
+        axes.set(xlabel="X mm" if below else "", ylabel="Y mm" if column == 0 else "")
         axes.tick_params(labelleft=column == 0, labelbottom=below)
     if drawn is not None:
         bar = panel(figure, width - 0.95, 1.05, 0.18, height - 2.2)
@@ -138,16 +136,12 @@ def _marks(
             near = [j for j in here if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
             place = list(dict.fromkeys(numbers[j] for j in near)).index(numbers[k]) % 4
             left, above = (x > 0.25 * half) != (place >= 2), place % 2 == 0
-            if lean.any() and place == 0 and len(numbers[k]) < SHORT:  # not upon the line
-                left, above = bool(lean[0] > 0.0), bool(lean[1] <= 0.0)
             axes.annotate(
                 numbers[k], (x, y), xytext=(-7 if left else 7, 6 if above else -6), textcoords="offset points",
                 ha="right" if left else "left", va="bottom" if above else "top", fontsize=7.5, zorder=7, bbox=box,
             )  # fmt: skip
             labelled.add(numbers[k])
-    axes.set_xlim(-half, half)
-    axes.set_ylim(-half, half)
-    axes.set_aspect("equal")
+    axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
     axes.grid(visible=False)
 
 

@@ -25,7 +25,7 @@ STRIP = 0.22  # height of the operations above the frame
 OPERATION_COLOURS = ("#ebeff4", "#d9e0e8")  # in turn
 NAME_SIZE, INSET = 8.5, 4.0  # points; pixels before a name
 CURVE_BLUE = "#2b59c3"
-MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
+MOST_LINES = 60  # where operations begin
 MOST_ARROWS = 200  # of plunges beyond the axis; more would be a row of arrowheads
 MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seven pixels
 
@@ -52,7 +52,6 @@ def profile(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
         _draw_band(axes, s, band, columns)
     _curve(axes, analysis, columns, (CURVE_BLUE, SLATE, 4), "plunges", show_plunges)
     _levels(axes, analysis)
-    _tool_changes(axes, analysis)
     if strip:
         _operations(axes, analysis, strip / frame)
     _line_numbers(axes, analysis, 1.0 + strip / frame)
@@ -120,9 +119,9 @@ def _set_limits(axes: Axes, analysis: Analysis, band: tuple[FloatArray, FloatArr
     pad = max(0.12 * (high - low), 0.005 * high)
     axes.set_ylim(max(low - pad, 0.0), high + pad)
     end = mm_from_m(float(analysis.samples.s[-1]))
-    axes.set_xlim(0.0, end or 1.0)
-    axes.set_xlabel("path length, mm (rapids included)")
-    axes.set_ylabel("stiffness along the load, N/mm")
+    axes.set(
+        xlim=(0.0, end or 1.0), xlabel="path length, mm (rapids included)", ylabel="stiffness along the load, N/mm"
+    )
     axes.xaxis.set_major_locator(MaxNLocator(12, steps=STEPS))
     axes.yaxis.set_major_locator(MaxNLocator(8, steps=STEPS))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if end > 20 else 2)))
@@ -150,22 +149,6 @@ def _levels(axes: Axes, analysis: Analysis) -> None:
     axes.axhline(level, color=RED, linewidth=1.3, zorder=5, label=f"required {number(level)} N/mm")
 
 
-def _tool_changes(axes: Axes, analysis: Analysis) -> None:
-    """A dotted line where another tool takes over, while they can be told apart; labels while they are few."""
-    samples = analysis.samples
-    changes = np.flatnonzero(np.diff(samples.tool) != 0) + 1
-    if not 0 < len(changes) <= MOST_TOOL_LINES:
-        return
-    s = mm_from_m(samples.s[changes])
-    axes.vlines(s, 0, 1, transform=axes.get_xaxis_transform(), color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
-    if len(changes) > MOST_TOOL_LABELS:
-        return
-    for where, row in zip(s, changes, strict=True):
-        place, across = (float(where), 0.0), axes.get_xaxis_transform()
-        style: Look = {"textcoords": "offset points", "fontsize": 9, "color": MUTED}
-        axes.annotate(f"T{samples.tool[row]}", place, (4, 5), xycoords=across, **style)
-
-
 def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
     """Named boxes above the frame, `height` of its height; lines where they begin, while these can be told apart."""
     rows = analysis.operations.rows
@@ -173,7 +156,7 @@ def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
     edges = mm_from_m(np.append(analysis.samples.s[first], analysis.samples.s[-1]))
     spans = list(zip(edges[:-1].tolist(), np.diff(edges).tolist(), strict=True))
     across = axes.get_xaxis_transform()
-    if len(rows) <= MOST_TOOL_LINES:
+    if len(rows) <= MOST_LINES:
         axes.vlines(edges[1:-1], 0, 1, transform=across, color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
     for which, colour in enumerate(OPERATION_COLOURS):
         box: Look = {"facecolor": colour, "edgecolor": "none", "transform": across, "clip_on": False}

@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.report.colours import BLUE, INK, MUTED, ORANGE
 from toolpath_stiff.report.pictures.style import Look, new_figure
+from toolpath_stiff.report.place import facts
 from toolpath_stiff.report.words import machine_text, plain
-from toolpath_stiff.units import mm_from_m, number
+from toolpath_stiff.units import mm_from_m
 
 RED = "#b3261e"
-G68_NOTE = "G68 follows the program's own G17 and G54, and holds until G69"
+G68_NOTE = "follows the program's own G17 and G54, and holds until G69"
 WIDTH, HEIGHT = 8.27, 11.69  # inch, A4
 LEFT, COLUMN = 0.1, 0.34  # of the width
 LINE = 0.0185  # of the height
@@ -66,35 +67,20 @@ def _down(figure: Figure, top: float, lines: list[str], step: float, left: float
 
 
 def _rows(placed: Placement) -> list[tuple[str, list[str]]]:
-    """Names and the lines of their values."""
-    row, blocks, best, before = placed.chosen, placed.offsets, placed.best, placed.present
-    heights = mm_from_m(best.samples.position[best.samples.cutting, 2])
-    tilt = f"A {row.a_deg:.4f}, B {row.b_deg:.4f} degrees (about X first, then Y, then Z)"
-    plunges = row.plunge_mean_N_per_mm
-
-    def both(key: str) -> str:
-        now = f" (present placement {number(getattr(before, key))})" if before else ""
-        return f"{number(getattr(row, key))} N/mm{now}"
-
-    lines = {
-        "program zero (G54)": f"X {row.x_mm:.4f}   Y {row.y_mm:.4f}   Z {row.z_mm:.4f} mm",
-        "turn of the work about Z": f"{row.rotation_deg:.4f} degrees",
-        "tilt of the set-up": tilt if row.a_deg or row.b_deg else "",
-        "heights of the cut": f"Z {heights.min():.3f} to {heights.max():.3f} mm (machine)",
-        "LinuxCNC": blocks.linuxcnc or blocks.linuxcnc_reason,
-        "Fanuc-style": (blocks.fanuc or blocks.fanuc_reason) + (f"\n{G68_NOTE}" if "G68" in blocks.fanuc else ""),
-        "program written": placed.written.file if placed.written and not placed.refusal else "",
-        "mean stiffness": both("mean_N_per_mm"),
-        "range": both("range_N_per_mm"),
-        "weakest place": both("min_N_per_mm"),
-        "plunges, mean": "" if plunges is None else f"{number(plunges)} N/mm along the tool axis",
-        "mean deflection": f"{row.mean_deflection_um:.1f} um under {best.force:g} N, load {best.load}",
-    }
-    return [
-        (name, [part for line in value.splitlines() for part in textwrap.wrap(plain(line), VALUE_LETTERS) or [""]])
-        for name, value in lines.items()
-        if value
+    """Names and the lines of their values: those of the terminal, and what the shop floor looks for."""
+    heights, best = mm_from_m(placed.best.samples.position[placed.best.samples.cutting, 2]), placed.best
+    rows = [
+        *(row for row in facts(placed) if row[0] not in ("program", "front")),
+        ("heights of the cut", f"Z {heights.min():.3f} to {heights.max():.3f} mm (machine)"),
+        ("deflection", f"under {best.force:g} N, load {best.load}"),
+        *([("G68", G68_NOTE)] if "G68" in placed.offsets.fanuc else []),
+        *([("program written", placed.written.file)] if placed.written and not placed.refusal else []),
     ]
+
+    def lines(text: str) -> list[str]:
+        return [part for line in text.splitlines() for part in textwrap.wrap(plain(line), VALUE_LETTERS) or [""]]
+
+    return [(name.strip(), lines(value)) for name, value in rows]
 
 
 def _sketch(figure: Figure, box: tuple[float, float, float, float], placed: Placement) -> None:
@@ -119,6 +105,5 @@ def _sketch(figure: Figure, box: tuple[float, float, float, float], placed: Plac
     axes.annotate("program zero", (x, y), xytext=away.tolist(), ha=side, va=level, **style)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.12)
-    axes.set_xlabel("X of the machine, mm")
-    axes.set_ylabel("Y of the machine, mm")
+    axes.set(xlabel="X of the machine, mm", ylabel="Y of the machine, mm")
     axes.set_title("seen from above; + is the machine's axis", fontsize=10, color=MUTED)

@@ -39,8 +39,7 @@ def error_ladder(update: Update) -> Figure:
     axes.axhline(floor, color=ORANGE, ls=":", lw=1.5, label=f"noise floor {percent(floor)}")
     _name_values(axes, held, {"xytext": (9, 7), "color": BLUE})
     _name_values(axes, inside, {"xytext": (-9, -14), "color": MUTED, "size": 9, "ha": "right"})
-    axes.set_ylim(0.0, 1.25 * float(np.nanmax([*held, *inside, floor])) or 1.0)
-    axes.set_xlim(-0.4, len(steps) - 0.3)
+    axes.set(ylim=(0.0, 1.25 * float(np.nanmax([*held, *inside, floor])) or 1.0), xlim=(-0.4, len(steps) - 0.3))
     names = [*(_step_text(step["name"]) for step in taken), *(shortened(step["effect"], 24) for step in down)]
     axes.set_xticks(places, names, color=INK, size=9)
     axes.set_ylabel("mean |modelled - measured| / measured, %", size=9.5)
@@ -92,8 +91,7 @@ def figure3(update: Update) -> Figure | None:
     axes.plot(bars, refitted, color=MUTED, lw=1.5, ls="--", label="strut law refitted for each platform")
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(lambda value, _: significant(value, 1))
-    axes.set_xlabel("stiffness of each platform bar, N/m")
-    axes.set_ylabel("mean |modelled - measured| / measured, %")
+    axes.set(xlabel="stiffness of each platform bar, N/m", ylabel="mean |modelled - measured| / measured, %")
     axes.legend(frameon=False)
     return figure
 

@@ -13,8 +13,7 @@ from toolpath_stiff.comparison.structure import SIGNIFICANT
 from toolpath_stiff.comparison.summary import PatternTest
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.colours import DIRECTIONS, MUTED, RED
-from toolpath_stiff.report.pictures.compare_machine import direction_key
-from toolpath_stiff.report.pictures.style import new_figure, panel
+from toolpath_stiff.report.pictures.style import Look, new_figure, panel
 from toolpath_stiff.report.words import RESIDUAL_AXIS, plain, shortened
 
 ACROSS = 5  # panels in a row
@@ -55,8 +54,18 @@ def variables(comparison: Comparison) -> Figure:
         sure = p < SIGNIFICANT
         shown, weight, colour = (f"p = {p:.2g} *", "bold", RED) if sure else (f"p = {p:.2g}", "normal", MUTED)
         axes.set_title(shown, fontsize=8.5, pad=3, loc="right", weight=weight, color=colour)
-    direction_key(figure, comparison)
+    _key(figure, comparison)
     return figure
+
+
+def _key(figure: Figure, comparison: Comparison) -> None:
+    """The directions of the readings in their colours, in the upper right corner."""
+    width, height = figure.get_size_inches()
+    present = [axis for axis in DIRECTIONS if (directions(comparison.data) == axis).any()]
+    style: Look = {"size": 11, "weight": "bold", "ha": "right"}
+    for i, axis in enumerate(reversed(present)):
+        place = 1.0 - (0.4 + 0.5 * i) / width, 1.0 - 0.4 / height
+        figure.text(*place, f"\u25cf {axis}", color=DIRECTIONS[axis], **style)
 
 
 def _about(test: PatternTest, name: str) -> bool:
@@ -85,12 +94,18 @@ def _panel(axes: Axes, comparison: Comparison, variable: Variable | ReadingNames
         if not rows.any():
             continue
         shift = 0.16 * (k - (len(present) - 1) / 2.0) if 0 < len(names) <= MOST_NAMES else 0.0
-        _points(axes, x[rows] + shift, residual[rows], limits, DIRECTIONS[axis], 2.6 if len(x) > 100 else 4.0)
         held = np.clip(residual[rows], *limits)
+        beyond = np.sign(residual[rows] - held)
+        for side, marker in ((0, "o"), (1, "^"), (-1, "v")):
+            chosen = beyond == side
+            look: Look = {"ms": 2.6 if len(x) > 100 else 4.0, "mew": 0, "alpha": 0.55, "color": DIRECTIONS[axis]}
+            axes.plot(x[rows][chosen] + shift, held[chosen], marker, zorder=2, **look)
         if not names:
             _trend(axes, x[rows], held, DIRECTIONS[axis])
         elif len(names) <= MOST_NAMES:
-            _level_means(axes, x[rows], held, shift, DIRECTIONS[axis])
+            levels = np.unique(x[rows])
+            means = [float(held[x[rows] == level].mean()) for level in levels]
+            axes.plot(levels + shift, means, "_", color=DIRECTIONS[axis], ms=7, mew=2.4, zorder=4)
     _name_levels(axes, names)
 
 
@@ -100,29 +115,6 @@ def _places(variable: Variable | ReadingNames) -> tuple[FloatArray, list[str]]:
         return np.asarray(variable.values, dtype=float), []
     names = sorted(set(variable.values.tolist()), key=_rank)
     return np.array([names.index(level) for level in variable.values.tolist()], dtype=float), names
-
-
-def _points(
-    axes: Axes, x: FloatArray, residual: FloatArray, limits: tuple[float, float], colour: str, size: float
-) -> None:
-    """Readings as dots; those beyond the axis as arrowheads at its edge."""
-    off = np.sign(residual) * ((residual < limits[0]) | (residual > limits[1]))
-    for side, marker in ((0, "o"), (1, "^"), (-1, "v")):
-        chosen = off == side
-        if not chosen.any():
-            continue
-        seen = np.clip(residual[chosen], limits[0] + 0.3, limits[1] - 0.3) if side else residual[chosen]
-        # Arrowheads above all dots: dots that follow each other become one image of a page, not one a direction.
-        axes.plot(
-            x[chosen], seen, marker, color=colour, ms=size + abs(side), mew=0, alpha=0.55, zorder=2 + 0.1 * abs(side)
-        )
-
-
-def _level_means(axes: Axes, x: FloatArray, held: FloatArray, shift: float, colour: str) -> None:
-    """A short bar at the mean of each level."""
-    for level in np.unique(x):
-        mean, middle = float(held[x == level].mean()), float(level) + shift
-        axes.plot([middle - 0.09, middle + 0.09], [mean, mean], color=colour, lw=2.4, zorder=4)
 
 
 def _trend(axes: Axes, x: FloatArray, held: FloatArray, colour: str) -> None:
