@@ -190,10 +190,5 @@ def check(
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
     hexapod = None if on is None else on.model.machine
-    request = replace(
-        part.request,
-        lines=part.lines,
-        origin=origin_si(origin_mm_deg),
-        default_origin=ZERO if hexapod is None else hexapod.default_origin,
-    )
+    request = part.placed(origin_si(origin_mm_deg), ZERO if hexapod is None else hexapod.default_origin)
     return check_program(request, hexapod, m_from_mm(step_mm), speed)

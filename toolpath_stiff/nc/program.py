@@ -216,9 +216,13 @@ class Program:
         """
         key = (origin, tuple(default_origin))
         if not self._last or self._last[0][0] != key:
-            request = replace(self.request, lines=self.lines, origin=origin, default_origin=default_origin)
-            self._last[:] = [(key, read(request))]
+            self._last[:] = [(key, read(self.placed(origin, default_origin)))]
         return self._last[0][1]
+
+    def placed(self, origin: Pose | None, default_origin: Pose) -> Request:
+        """What the reader takes, for a zero."""
+        request = replace(self.request, lines=self.lines, name=self.name, path=self.file or "")
+        return replace(request, origin=origin, default_origin=default_origin)
 
     def to_frame(self) -> pd.DataFrame:
         r"""The moves, one a row: line, motion, tool, start and end in program coordinates of G54, feed.
