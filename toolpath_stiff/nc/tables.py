@@ -190,7 +190,7 @@ def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
 
 
 def _wrong_cell(place: Place, key: str, value: object, expected: str) -> InputError:
-    return place.fail(f"{key} = {value!r}", expected)
+    return place.fail(f"{'tool' if key == 'number' else key} = {value!r}", expected)
 
 
 def _tool(row: Mapping[str, object], wrong: Callable[[str, object, str], InputError]) -> ToolEntry:
