@@ -261,14 +261,6 @@ def test_every_public_name_and_member_is_in_an_example_that_runs(name):
         assert example or member in NO_EXAMPLE.get(name, ()), f"{name}.{member} is in no example"
 
 
-def test_a_name_that_is_imported_for_type_checkers_is_public_and_the_other_way_round():
-    text = Path(tps.__file__).read_text(encoding="utf-8")
-    typed = {
-        line.split(" as ")[-1].strip() for line in text.splitlines() if line.startswith("    from ") and " as " in line
-    }
-    assert typed == set(tps.__all__) - {"__version__"}
-
-
 def test_importing_the_package_loads_nothing_heavy():
     code = (
         "import sys, toolpath_stiff; print([m for m in ('numpy', 'scipy', 'pandas', 'matplotlib') if m in sys.modules])"

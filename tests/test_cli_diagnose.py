@@ -17,7 +17,7 @@ import pytest
 
 from tests.effects.cases import BENCH_FILE
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.report.diagnose.page import names
+from toolpath_stiff.report.folder import names
 from toolpath_stiff.results_folder import MANIFEST
 from toolpath_stiff.rig import case, exercise
 
@@ -57,7 +57,7 @@ def test_it_writes_a_report_and_says_what_it_found(strut):
     assert "weak_strut" in said and "IDENTIFIED" in said
     assert "Traceback" not in told
     written = {file.name for file in out.iterdir()} - {MANIFEST}
-    assert {"diagnose.json", "residuals.csv", "report.html"} <= written <= set(names())
+    assert {"diagnose.json", "residuals.csv", "report.html"} <= written <= set(names("diagnose"))
     for name in written:
         assert name in said
     found = json.loads((out / "diagnose.json").read_text("utf-8"))

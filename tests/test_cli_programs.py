@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from toolpath_stiff.cli.program import analyze
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.report.batch.programs import RESERVED, Found, endings, find_programs, report_folders
+from toolpath_stiff.report.batch.programs import ENDINGS, RESERVED, Found, find_programs, report_folders
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def test_numbers_in_names_are_sorted_as_numbers(jobs):
 
 
 def test_the_help_names_every_ending():
-    assert all(f" {ending}" in analyze.__doc__ for ending in endings())
+    assert all(f" {ending}" in analyze.__doc__ for ending in ENDINGS)
 
 
 def test_a_file_named_twice_in_any_way_is_read_once(jobs):
@@ -83,7 +83,7 @@ def folders(*programs: tuple[str, str]) -> list[str]:
         ([("part.nc", "part.nc"), ("sub/part.nc", "part.nc")], ["part", "sub/part"]),
         ([("../part.nc", "part.nc"), ("../sub/part.nc", "part.nc")], ["part", "sub/part"]),
         ([("part.nc", "part.nc"), ("part.tap", "part.tap")], ["part.nc", "part.tap"]),
-        ([("j/part.nc", "part.nc"), ("j/part/side.nc", "part/side.nc")], ["part.nc", "part/side"]),
+        ([("j/part.nc", "part.nc"), ("j/part/side.nc", "part/side.nc")], ["part.nc", "part/side.nc"]),
         ([("/w/a/Part.nc", "Part.nc"), ("/w/b/part.nc", "part.nc")], ["a/Part", "b/part"]),
         ([("part.nc", "part.nc"), ("part.tap", "part.tap"), ("part.nc.nc", "part.nc.nc")],
          ["part.nc", "part.tap", "part.nc.nc"]),

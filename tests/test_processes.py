@@ -82,7 +82,7 @@ def test_map_and_shutdown_are_those_of_any_executor():
     pool = ProcessPool(2)
     assert list(pool.map(abs, [-1, 2, -3])) == [1, 2, 3]
     left = pool.submit(abs, -4)
-    pool.shutdown(wait=False)
+    pool.shutdown()
     assert left.result() == 4
     with pytest.raises(RuntimeError):
         pool.submit(abs, 1)

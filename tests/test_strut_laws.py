@@ -22,9 +22,9 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.readings.measurements import Readings, read_measurements
-from toolpath_stiff.report.compare.page import text as compare_text
+from toolpath_stiff.report.compare import text as compare_text
 from toolpath_stiff.report.machine import machine_figures
-from toolpath_stiff.report.update.page import text as update_text
+from toolpath_stiff.report.update import text as update_text
 from toolpath_stiff.rig import campaigns, case, exercise
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import parse_nominal

@@ -97,21 +97,20 @@ def check_parquet() -> None:
 
 
 def parquet_pieces(columns_of: Callable[[slice], Columns], rows: int) -> Iterator[bytes]:
-    """A Parquet file in pieces, a row group a block; nan is null."""
+    """A Parquet file, compressed block by block, a row group each; nan is null."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    pieces = _Pieces()
+    file = pa.BufferOutputStream()
     writer: Any = None
     for block in _blocks(rows, ROW_GROUP):
         table = pa.table({name: _arrow(column) for name, column in columns_of(block).items()})
         if writer is None:
             words = [field.name for field in table.schema if pa.types.is_string(field.type)]
-            writer = pq.ParquetWriter(pieces, table.schema, use_dictionary=words, compression="snappy")
+            writer = pq.ParquetWriter(file, table.schema, use_dictionary=words, compression="snappy")
         writer.write_table(table)
-        yield from pieces.taken()
     writer.close()
-    yield from pieces.taken()
+    yield file.getvalue().to_pybytes()
 
 
 def _arrow(column: AnyArray) -> Any:
@@ -127,31 +126,6 @@ def _arrow(column: AnyArray) -> Any:
 def _blocks(rows: int, size: int) -> Iterator[slice]:
     """Slices over all rows; one empty slice if there are none."""
     yield from (slice(start, min(start + size, rows)) for start in range(0, max(rows, 1), size))
-
-
-class _Pieces:
-    """A file open for writing that holds what was written until it is taken."""
-
-    closed = False
-
-    def __init__(self) -> None:
-        self._held: list[bytes] = []
-        self._length = 0
-
-    def write(self, data: bytes) -> int:
-        self._held.append(bytes(data))
-        self._length += len(data)
-        return len(data)
-
-    def tell(self) -> int:
-        return self._length
-
-    def flush(self) -> None:
-        pass
-
-    def taken(self) -> list[bytes]:
-        held, self._held = self._held, []
-        return held
 
 
 def _by_digits(columns: Columns, decimals: Decimals) -> bytes | None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal, InvalidOperation
-from functools import cache
 from typing import Annotated
 
 from toolpath_stiff.options import Option
@@ -35,45 +34,22 @@ SIZES: tuple[Mapping[str, str], ...] = (
     },
     {"C": "1"},
 )  # fmt: skip
-SAME_TOKEN = {"degc": "c", "degrees": "deg", "minutes": "min", "micron": "um", "microns": "um", "inch": "in"}
 
 
 def heading_key(name: str) -> str:
     """A heading without case, brackets, spaces and signs: `Stiffness [N/mm]` and `stiffness_N_per_mm` are one."""
-    text = unicodedata.normalize("NFKC", name.replace("°", "deg").replace("º", "deg")).casefold()
-    tokens = re.findall(r"[^\W_]+|%", text.replace("μ", "u").replace("/", " per "))
-    return "_".join(SAME_TOKEN.get(token, token) for token in tokens)
+    text = unicodedata.normalize("NFKC", name).casefold().replace("μ", "u").replace("°", "deg").replace("/", " per ")
+    return "_".join(re.findall(r"[^\W_]+", text))
 
 
 UNITS = {heading_key(unit): unit for sizes in SIZES for unit in sizes}  # key -> as it is written
-NO_UNITS = frozenset(("%", "k", "f"))  # that stand where a unit may stand, and are none of ours
 
 
-@cache
-def parted(key: str) -> tuple[str, str]:
-    """Quantity and unit of a key, the longest unit that it ends in; "" where it has none."""
-    ends = (unit for unit in sorted(UNITS, key=len, reverse=True) if key.endswith(f"_{unit}"))
-    unit = next(ends, "")
-    return (key[: -len(unit) - 1], unit) if unit else (key, "")
-
-
-def keys(names: Iterable[str]) -> dict[str, str]:
-    """Key -> name of every column."""
-    return {heading_key(name): name for name in names}
-
-
-def meant(key: str, known: Mapping[str, str]) -> str | None:
-    """The known column that a heading with no unit, or with another one, means."""
-    for other, name in known.items():
-        quantity, unit = parted(other)
-        if unit and (key == quantity or parted(key)[0] == quantity):
-            return name
-    return None
-
-
-def unit_of(name: str) -> str:
-    """The unit that a column's name carries, as it is written; "" where it has none."""
-    return UNITS.get(parted(heading_key(name))[1], "")
+def parted(name: str) -> tuple[str, str]:
+    """Quantity of a heading, as a key, and its unit as it is written; "" where it has none."""
+    key = heading_key(name)
+    unit = max((unit for unit in UNITS if key.endswith(f"_{unit}")), key=len, default="")
+    return (key[: -len(unit) - 1], UNITS[unit]) if unit else (key, "")
 
 
 def same_quantity(unit: str, other: str) -> bool:
@@ -83,10 +59,23 @@ def same_quantity(unit: str, other: str) -> bool:
 
 def converted(cell: str, unit: str, wanted: str) -> str:
     """A number in another unit, without a rounding where the ratio is decimal; other cells as they are."""
-    if unit == wanted:
-        return cell
     sizes = next(sizes for sizes in SIZES if unit in sizes)
     try:
         return str(Decimal(cell) * Decimal(sizes[unit]) / Decimal(sizes[wanted]))
     except InvalidOperation:
         return cell
+
+
+def entry(name: str, heading: str, unit: str = "") -> str:
+    """An entry of a mapping: this column from that heading, in that unit or in the column's own."""
+    quantity, own = parted(name)
+    quoted = f'"{heading}"' if re.search(r'[,:="]', heading) else heading
+    unit = unit if same_quantity(unit, own) else own
+    return f"{quantity}={quoted}:{unit}" if unit else f"{quantity}={quoted}"
+
+
+def columns_option(entries: Sequence[str]) -> str:
+    """A mapping as an option to paste."""
+    text = ", ".join(entries)
+    quote = "'" if '"' in text else '"'
+    return f"--columns {quote}{text}{quote} (columns=)"

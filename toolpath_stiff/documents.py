@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+# Sums run in another order on another CPU, and searches stop within a tolerance: digits beyond these are not certain.
+# Of any figure of a document that rests on a search: two CPUs differ in the tenth. Decimals at most: what is left of a
+# difference of like figures has fewer digits that are certain.
+CERTAIN, DECIMALS = 7, 8
 Document = Mapping[str, Any]  # what a JSON file holds, or a part of it, by the file's own keys
 
 
@@ -28,3 +32,14 @@ def without_nan(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [without_nan(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def certain(value: Any) -> Any:
+    """The same, its floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
+    if isinstance(value, float):
+        return float(f"{round(value, DECIMALS):.{CERTAIN}g}") + 0.0
+    if isinstance(value, dict):
+        return {key: certain(part) for key, part in value.items()}
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{field.name: certain(getattr(value, field.name)) for field in fields(value)})
+    return [certain(part) for part in value] if isinstance(value, list | tuple) else value

@@ -243,7 +243,7 @@ class MeasurementError(TableError):
     ...         tps.Measurements.read(file)
     ...     except tps.MeasurementError as error:
     ...         print(error.line, error.found)
-    1 no direction
+    1 column direction is missing (found x_mm, y_mm, z_mm)
     """
 
 

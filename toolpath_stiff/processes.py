@@ -66,28 +66,20 @@ class ProcessPool(Executor):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Take no more calls, let those that are left be answered (or cancel them), then end the processes."""
         self._pool.close()
-        for call in self._calls if cancel_futures else ():
-            if not call.running():
-                call.cancel()
-        if wait:
-            self._join()
-        else:
-            threading.Thread(target=self._join, daemon=True).start()
+        self._leave([call for call in self._calls if cancel_futures and not call.running()])
 
     def stop(self) -> None:
         """End the processes at once, whatever they do; calls that are left are cancelled."""
         self._pool.stop()
-        for call in self._calls:
-            call.cancel()
-        self._join()
+        self._leave(self._calls)
 
-    def _join(self) -> None:
+    def _leave(self, cancelled: Sequence[Future[Any]]) -> None:
+        for call in cancelled:
+            call.cancel()
         self._pool.join()
         for name, setting in self._threads_before.items():
-            if setting is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = setting
+            os.environ.pop(name, None)
+            os.environ.update({} if setting is None else {name: setting})
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -29,6 +29,11 @@ def frame_of(rows: Any, columns: list[str] | None = None) -> pd.DataFrame:
 Progress = Callable[[str, int, int], None]
 
 
+def _door() -> Any:
+    """The door to views and pictures, which stands far above this module."""
+    return import_module("toolpath_stiff.report.folder")
+
+
 class Result(ABC):
     """A result: what a function of this package found.
 
@@ -48,7 +53,7 @@ class Result(ABC):
         >>> tps.map_stiffness("nist", points=5).view.__name__
         'toolpath_stiff.report.map'
         """
-        return import_module(f"toolpath_stiff.report.{self.shown_by}")
+        return _door().view_of(self.shown_by)
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
@@ -101,7 +106,7 @@ class Result(ABC):
         raise self._cannot("has no table", "use to_dict()")
 
     def plot(self) -> Figure:
-        """The result as a matplotlib figure.
+        """The result as a matplotlib figure, its first picture.
 
         Examples
         --------
@@ -110,7 +115,19 @@ class Result(ABC):
         >>> type(figure).__name__
         'Figure'
         """
-        raise self._cannot("has no picture", "print it, or use to_dict()")
+        return self._figure()
+
+    def _figure(self, name: str = "", **look: Any) -> Figure:
+        """A picture of the result; the first unless named."""
+        figure: Figure | None = _door().figure(self, name, **look)
+        if figure is None:
+            raise self._cannot("has no picture", "print it, or use to_dict()")
+        return figure
+
+    def _picture(self, **look: Any) -> bytes:
+        """The same as a PNG."""
+        picture: bytes = _door().picture(self, **look)
+        return picture
 
     def _cannot(self, what: str, hint: str) -> InputError:
         return InputError(f"{type(self).__name__} {what}", hint=hint)
@@ -130,7 +147,13 @@ class FolderResult(Result):
         >>> list(tps.map_stiffness("nist", points=5).files())
         ['map.csv', 'map.json', 'map.png', 'map.html']
         """
-        contents: Mapping[str, Content | Callable[[], Content]] = self.view.files(self, plots=plots)
+        return self._files(plots)
+
+    def _files(
+        self, plots: bool, omit: Collection[str] = (), **look: Any
+    ) -> Mapping[str, Content | Callable[[], Content]]:
+        """The files of the result but for `omit`."""
+        contents: Mapping[str, Content | Callable[[], Content]] = _door().files(self, plots=plots, omit=omit, **look)
         return contents
 
     def save(

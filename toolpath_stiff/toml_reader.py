@@ -7,6 +7,7 @@ means ("6 rows of 3 numbers in mm"), and stop at what a type can say: a bound, a
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -14,10 +15,7 @@ from typing import Any, TypeGuard
 from toolpath_stiff.errors import InputError
 
 LARGEST_BYTES = 4_000_000
-MOST_PARTS = 64  # of a dotted key: tomllib's time grows with their square
-DEEPEST = 32  # arrays and tables in each other
 LARGEST_INTEGER = 2**63 - 1  # TOML 1.0: "64-bit signed integers"
-LONG_KEY = re.compile(rf"""(?:\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+){{{MOST_PARTS}}}""")
 HEADING = re.compile(r"""[ \t]*\[\[?([\w.'" \t-]+)\]""")
 NTH = re.compile(r"(.*)\[(\d+)\]")
 
@@ -38,57 +36,27 @@ class TomlReader:
 
         Raises `kind` with line and column if the text is not TOML.
         """
-        import tomllib
-
         self.file, self.lines, self.kind = file, text.splitlines(), kind
-        self._check_size(text)
+        if len(text) > LARGEST_BYTES:
+            raise kind(f"more than {LARGEST_BYTES / 1e6:.0f} MB", hint="is it the right file?", file=file)
         try:
             self.data: dict[str, Any] = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
+        except (ValueError, RecursionError) as error:  # or thousands of digits, or of brackets
             place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
             line, column = (int(place[1]), int(place[2])) if place else (len(self.lines), None)  # at its end
             reason = str(error).split(" (at ")[0]
             fault = f"{what} is not TOML: {reason}" if what else f"not valid TOML: {reason}"
             raise kind(fault, file=file, line=line, column=column) from None
-        except RecursionError:
-            raise self._too_deep(self._deepest_line()) from None
-        except ValueError:  # an integer of thousands of digits
-            raise self._too_large(re.compile(r"\d[\d_]{999}")) from None
         self._check_values()
 
-    def _check_size(self, text: str) -> None:
-        if len(text) > LARGEST_BYTES:
-            raise self.kind(f"more than {LARGEST_BYTES / 1e6:.0f} MB", hint="is it the right file?", file=self.file)
-        for number, line in enumerate(self.lines, 1):
-            if line.count(".") > MOST_PARTS and LONG_KEY.search(line):
-                raise self.kind(f"a key of more than {MOST_PARTS} parts", file=self.file, line=number)
-
     def _check_values(self) -> None:
-        """Refuse what is nested too deeply, and integers that TOML does not know."""
-        level: list[Any] = [self.data]
-        for _ in range(DEEPEST):
-            if not level:
-                return
-            inner = [value for table in level for value in (table.values() if isinstance(table, dict) else table)]
-            for value in inner:
-                if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
-                    raise self._too_large(re.compile(r"[\da-fA-F][\d_a-fA-F]{15,}"))
-            level = [value for value in inner if isinstance(value, dict | list)]
-        if level:
-            raise self._too_deep(self._deepest_line())
-
-    def _too_deep(self, line: int) -> InputError:
-        return self.kind("arrays or tables within each other", expected=f"at most {DEEPEST}", file=self.file, line=line)
-
-    def _deepest_line(self) -> int:
-        """The line with the most brackets."""
-        counts = [line.count("[") + line.count("{") for line in self.lines]
-        return counts.index(max(counts)) + 1
-
-    def _too_large(self, digits: re.Pattern[str]) -> InputError:
-        """The first integer that looks like it."""
-        line = next((number for number, line in enumerate(self.lines, 1) if digits.search(line)), None)
-        return self.kind("an integer beyond 64 bits", expected="a smaller number", file=self.file, line=line)
+        """Refuse integers that TOML does not know: numbers that are none of Python's floats."""
+        values: list[object] = [self.data]
+        for value in values:  # what a table or an array holds comes after it
+            if isinstance(value, dict | list):
+                values += value.values() if isinstance(value, dict) else value
+            elif isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+                raise self.kind("an integer beyond 64 bits", expected="a smaller number", file=self.file)
 
     @classmethod
     def read(cls, path: str | Path, what: str, kind: type[InputError] = InputError) -> TomlReader:

@@ -2,14 +2,13 @@
 
 Everything inside the package is SI; everything that a user reads or writes is in the shop's units.
 The functions take and return scalars or numpy arrays alike; they only multiply, so this module
-costs nothing at start-up. What is written is rounded here too (`json_number`, `certain`).
+costs nothing at start-up. What is written is rounded here too (`number`, `json_number`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -123,9 +122,6 @@ def pose_in_si(pose: ShopPose) -> Pose:
 # Sums run in another order on another CPU, and searches stop within a tolerance: digits beyond these are not certain.
 
 DIGITS = 5  # significant digits of a fitted figure
-# Of any figure of a document that rests on a search: two CPUs differ in the tenth. Decimals at most: what is left of a
-# difference of like figures has fewer digits that are certain.
-CERTAIN, DECIMALS = 7, 8
 
 
 def number(value: float | None, digits: int = 0) -> str:
@@ -139,14 +135,3 @@ def number(value: float | None, digits: int = 0) -> str:
 def json_number(value: float, digits: int = DIGITS) -> float | None:
     """A float of some significant digits; None for what JSON cannot hold."""
     return float(f"{value:.{digits}g}") if math.isfinite(value) else None
-
-
-def certain(value: Any) -> Any:
-    """The same, its floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
-    if isinstance(value, float):
-        return float(f"{round(value, DECIMALS):.{CERTAIN}g}") + 0.0
-    if isinstance(value, dict):
-        return {key: certain(part) for key, part in value.items()}
-    if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{field.name: certain(getattr(value, field.name)) for field in fields(value)})
-    return [certain(part) for part in value] if isinstance(value, list | tuple) else value

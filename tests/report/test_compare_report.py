@@ -20,9 +20,11 @@ from toolpath_stiff.comparison.compare import Comparison, compare
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.report.compare.load_path import load_path_png
-from toolpath_stiff.report.compare.page import PICTURES, QUESTIONS, compare_html, residuals_csv
-from toolpath_stiff.report.compare.page import text as terminal_text
+from toolpath_stiff.report.compare import page as compare_html
+from toolpath_stiff.report.compare import residuals_csv
+from toolpath_stiff.report.compare import text as terminal_text
+from toolpath_stiff.report.pictures.compare import PICTURES
+from toolpath_stiff.report.pictures.style import drawing
 
 NASTY = '<script>alert("1")</script>$x^2$'
 
@@ -55,13 +57,14 @@ DATA = {"paper": table_1, "one": one_reading, "oblique": oblique, "wild": with_a
 def compared(name: str) -> tuple[Comparison, dict[str, bytes]]:
     """The comparison and its pictures; of the paper's readings with the draws that the command takes."""
     found = compare(nist(), table_1()) if name == "paper" else quick(DATA[name]())
-    return found, {name: draw(found) for name, draw in PICTURES.items()}
+    drawn = {name: drawing(draw, found) for name, draw in PICTURES.items()}
+    return found, {name: picture for name, picture in drawn.items() if picture is not None}
 
 
 @pytest.mark.parametrize("name", DATA)
 def test_pictures_and_page_for_any_data(name):
     found, pictures = compared(name)
-    assert list(pictures) and set(pictures) == set(QUESTIONS)
+    assert set(PICTURES) - set(pictures) == {"history.png"}
     for picture in pictures.values():
         height, width = imread(io.BytesIO(picture), format="png").shape[:2]
         assert 700 <= width <= 1700
@@ -69,13 +72,13 @@ def test_pictures_and_page_for_any_data(name):
     page = compare_html(found, pictures)
     assert "<script" not in page
     assert not re.search(r'(src|href)="(?!data:|#)', page)
-    assert page.count("<svg viewBox=") == len(QUESTIONS)
+    assert page.count("<svg viewBox=") == len(pictures)
     assert "{{" not in page
 
 
 def test_the_page_says_what_the_figures_are():
     found, _ = compared("paper")
-    page = compare_html(found, dict.fromkeys(QUESTIONS, b""))
+    page = compare_html(found, {})
     assert "9.62 %" in page
     assert "No pattern stands out from scatter" in page
     for title in ("Checks without a model", "Errors by direction, plane and set-up", "How much readings scatter"):
@@ -112,7 +115,7 @@ def test_the_command_writes_everything_and_the_same_bytes_again(tmp_path, capsys
     assert main(["compare", "nist-table1", "--out", str(out)]) == 0
     said = capsys.readouterr().out
     assert "as given 9.62 %" in said
-    names = {"compare.json", "residuals.csv", "report.html", *QUESTIONS}
+    names = {"compare.json", "residuals.csv", "report.html", *compared("paper")[1]}
     assert {file.name for file in out.glob("[!.]*")} == names
     for name, picture in compared("paper")[1].items():
         assert (out / name).read_bytes() == picture, name
@@ -166,5 +169,5 @@ def test_a_machine_with_effects_shows_them_in_the_load_path():
     assert len(found.shares.links) == 8
     # The table is 5, 4, 3 nm/N soft along X, Y, Z whatever the pose, the upright spindle 8, 8, 2.
     assert found.shares.compliance[:, 6:] * 1e9 == pytest.approx(np.array([[5.0, 8.0], [4.0, 8.0], [3.0, 2.0]]))
-    picture = load_path_png(found)
+    picture = drawing(PICTURES["load_path.png"], found)
     assert imread(io.BytesIO(picture), format="png").shape[1] >= 1000

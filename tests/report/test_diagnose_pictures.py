@@ -7,22 +7,23 @@ import pytest
 from matplotlib.image import imread
 
 from tests.updating.cases import VERDICTS, diagnosed
-from toolpath_stiff.report.diagnose.ladder import ladder_png
-from toolpath_stiff.report.diagnose.page import diagnose_html
-from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png
+from toolpath_stiff.report.diagnose import page as diagnose_html
 from toolpath_stiff.report.explanations import headline
+from toolpath_stiff.report.pictures.diagnose import confounding
+from toolpath_stiff.report.pictures.ladder import ladder
+from toolpath_stiff.report.pictures.style import drawing
 
-PICTURES = (ladder_png, confounding_png, detectable_png)
+PICTURES = (ladder, confounding)
 
 
 @pytest.mark.parametrize("draw", PICTURES)
 @pytest.mark.parametrize("name", VERDICTS)
 def test_every_verdict_is_drawn(name, draw):
     diagnosis = diagnosed(*VERDICTS[name])
-    first = draw(diagnosis)
+    first = drawing(draw, diagnosis)
     assert imread(io.BytesIO(first), format="png").shape[1] >= 700
     if name == "ambiguous":  # once more, of the one that shows the most
-        again = draw(diagnosis)
+        again = drawing(draw, diagnosis)
         assert again == first and again.svg == first.svg
 
 

@@ -14,10 +14,20 @@ from hypothesis import strategies as st
 from matplotlib.image import imread
 
 from tests.report.factory import make_analysis, short, spiral
-from toolpath_stiff.report.analysis import path as path_module
-from toolpath_stiff.report.analysis.path import UNREACHABLE, path_picture, scale_limits, segment_classes
-from toolpath_stiff.report.figure import CLASSES, PLUNGE_SLATE, new_figure
-from toolpath_stiff.report.profile import MOST_OPERATIONS, _set_limits, extremes_by_column, profile_picture
+from toolpath_stiff.report.colours import CLASSES, SLATE
+from toolpath_stiff.report.curves import extremes_by_column, scale_limits
+from toolpath_stiff.report.pictures import path as path_module
+from toolpath_stiff.report.pictures.path import UNREACHABLE, path, segment_classes
+from toolpath_stiff.report.pictures.profile import MOST_OPERATIONS, _set_limits, profile
+from toolpath_stiff.report.pictures.style import new_figure, picture_file
+
+
+def path_picture(analysis, **look) -> bytes:
+    return picture_file("path.png", path, analysis, look)
+
+
+def profile_picture(analysis, **look) -> bytes:
+    return picture_file("profile.png", profile, analysis, look)
 
 
 def pixels(png: bytes) -> np.ndarray:
@@ -48,9 +58,7 @@ def test_the_same_analysis_gives_the_same_bytes_whatever_the_users_own_settings(
 def test_pictures_need_no_pyplot():
     code = (
         "import sys; from tests.report.factory import short;"
-        "from toolpath_stiff.report.analysis.path import path_picture;"
-        "from toolpath_stiff.report.profile import profile_picture;"
-        "a = short(); before = 'matplotlib' in sys.modules; path_picture(a); profile_picture(a);"
+        "a = short(); before = 'matplotlib' in sys.modules; a.plot(); a.plot_profile();"
         "print(before, 'matplotlib.pyplot' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -83,7 +91,7 @@ def test_what_lies_upon_another_segment_is_drawn_once_and_the_picture_stays(monk
     long = make_analysis(there_and_back)
     whole = path_picture(long)
     monkeypatch.setattr(path_module, "MOST_LINES", 100)
-    curves = path_picture.figure(long).axes[0].collections[0].get_paths()
+    curves = path(long).axes[0].collections[0].get_paths()
     assert sum(len(curve.vertices) for curve in curves) < len(long.samples) / 5
     assert (np.abs(pixels(path_picture(long)) - pixels(whole)).max(axis=2) > 0.3).mean() < 2e-3
 
@@ -156,7 +164,7 @@ def test_plunges_are_on_the_scale_when_asked_for(analysis):
 
 
 def test_plunges_are_grey_unless_asked_for(analysis):
-    slate = tuple(int(PLUNGE_SLATE[i : i + 2], 16) for i in (1, 3, 5))
+    slate = tuple(int(SLATE[i : i + 2], 16) for i in (1, 3, 5))
     for picture in (path_picture, profile_picture):
         hidden, shown = (count_colour(picture(analysis, show_plunges=show), slate) for show in (False, True))
         assert hidden > 20 > shown, picture.__name__

@@ -11,8 +11,8 @@ import pytest
 
 from tests.report.factory import make_analysis, short
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.report.analysis import summary as summary_module
-from toolpath_stiff.report.analysis.summary import names
+from toolpath_stiff.report import analysis as summary_module
+from toolpath_stiff.report.folder import names
 from toolpath_stiff.results_folder import MANIFEST, write_folder
 
 PLOTS = {"samples.csv", "summary.json", "path.png", "profile.png", "report.html"}
@@ -33,7 +33,7 @@ def tree(folder):
 
 def test_all_files_are_written_and_nothing_else(analysis, tmp_path):
     written = write(analysis, tmp_path / "deep" / "out")
-    assert {f.name for f in written} == PLOTS == set(names())
+    assert {f.name for f in written} == PLOTS == set(names("analysis", omit=["samples.parquet"]))
     assert set(tree(tmp_path)) == {f"deep/out/{name}" for name in {*PLOTS, MANIFEST}}
 
 
@@ -98,7 +98,7 @@ def test_an_error_midway_leaves_everything_as_it_was(analysis, tmp_path, monkeyp
     def fail(*_args, **_kwargs):
         raise error
 
-    monkeypatch.setattr(summary_module, "page_pieces", fail)
+    monkeypatch.setattr(summary_module, "page", fail)
     with pytest.raises(type(error)):
         write(analysis, out)
     assert tree(tmp_path) == before

@@ -21,7 +21,7 @@ from toolpath_stiff.planning.result import plan
 from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.planning.tables import TABLES, Tables, tables_of
 from toolpath_stiff.readings.measurements import measured_path, model_stiffness, read_measurements
-from toolpath_stiff.report.compare.page import text
+from toolpath_stiff.report.compare import text
 from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import HiddenMachine
@@ -174,10 +174,10 @@ def test_loop_readings_arrive_as_compliances(tmp_path):
     ("line", "message"),
     [
         ("0,0,800,X,floor,,5,1000,,,", "loop 'floor'"),
-        ("0,0,800,X,table,,,1000,,,", "neither displacement_um nor"),
-        ("0,0,800,X,table,5e4,20,1000,,,", "displacement_um and"),
-        ("0,0,800,X,table,,5,,,,", "without its load"),
-        ("0,0,800,X,table,,5,1000,,700,", "strut_force_N or length_mm"),
+        ("0,0,800,X,table,,,1000,,,", "loop table: no reading"),
+        ("0,0,800,X,table,5e4,20,1000,,,", "loop table: no reading"),
+        ("0,0,800,X,table,,5,,,,", "no reading; expected displacement_um with force_N"),
+        ("0,0,800,X,table,,5,1000,,700,", "strut_force_N in a row of loop table"),
         ("0,0,800,X,strut 1 alone,,-20,1000,,,", "-20 nm/N"),
         (",,,X,strut 1,,-20,1000,,,", "x_mm"),
     ],

@@ -32,14 +32,14 @@ from toolpath_stiff.inference.errors import raised_text, scatter_text
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.planning.rivals import errors_so_far, rivals_of
 from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.report import compare as compare_report
 from toolpath_stiff.report import explanations as diagnose_report
-from toolpath_stiff.report.compare import page as compare_report
-from toolpath_stiff.report.compare.load_path import stiffness_deviation_percent
-from toolpath_stiff.report.compare.page import QUESTIONS as COMPARE_QUESTIONS
-from toolpath_stiff.report.compare.page import compare_html
-from toolpath_stiff.report.diagnose.page import diagnose_html
+from toolpath_stiff.report import update as update_report
+from toolpath_stiff.report.compare import page as compare_html
+from toolpath_stiff.report.diagnose import page as diagnose_html
 from toolpath_stiff.report.explanations import headline
-from toolpath_stiff.report.update import page as update_report
+from toolpath_stiff.report.pages import Drawing
+from toolpath_stiff.report.pictures.load_path import stiffness_deviation_percent
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 
@@ -91,7 +91,7 @@ def test_every_text_prints_these_two_errors():
     last = f", with {diagnosis.best} {found['candidates'][0][MEAN]:.2f} %"
     texts = [
         (compare_report.text(comparison), ""),
-        (compare_html(comparison, dict.fromkeys(COMPARE_QUESTIONS, b"")), ""),
+        (compare_html(comparison, {}), ""),
         (diagnose_report.text(diagnosis), last),
         (diagnose_html(diagnosis, {}), last),
         (update_report.text(update), last),
@@ -173,9 +173,10 @@ def test_minus_is_softer_than_modelled_everywhere(factor, sign):
 def test_pages_say_which_sign_they_have():
     rule = "(measured - modelled) / modelled, minus: softer than modelled"
     found = compared(table_1())
-    assert rule in compare_html(found, dict.fromkeys(COMPARE_QUESTIONS, b""))
+    assert rule in compare_html(found, {})
     assert rule in compare_report.text(found)
-    assert rule in diagnose_html(diagnosed(*CASES["identified"]), {"before_after.png": b""})
+    found = diagnosed(*CASES["identified"])
+    assert rule in diagnose_html(found, {"before_after.png": Drawing(b"png")})
 
 
 # -- verdict, table and picture ----------------------------------------------------------------------------------------

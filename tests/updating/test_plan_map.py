@@ -10,7 +10,8 @@ from tests.updating.planning import rivals, table_1_design
 from toolpath_stiff.planning.gap_map import gap_map, top_pair
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import plan_measurements
-from toolpath_stiff.report.plan import plan_picture
+from toolpath_stiff.report.pictures.plan import visits_drawn
+from toolpath_stiff.report.pictures.style import picture_file
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +51,10 @@ def test_the_pair_on_the_map_can_be_told_apart(mapped):
 
 def test_the_same_picture_every_time(mapped):
     plan, found = mapped
-    first, again = (plan_picture(plan.visits, plan.chosen, plan.kinds, found, "a $title", "b") for _ in range(2))
+
+    def drawn(of):
+        return visits_drawn(of.visits, of.chosen, of.kinds, found, ("a $title", "b"))
+
+    first, again = (picture_file("plan.png", drawn, plan, {}) for _ in range(2))
     assert first == again and first.startswith(b"\x89PNG")
-    assert plan_picture(plan.visits, plan.chosen, plan.kinds, None, "a", "b").startswith(b"\x89PNG")
+    assert visits_drawn(plan.visits, plan.chosen, plan.kinds, None, ("a", "b")).axes

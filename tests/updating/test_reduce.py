@@ -143,7 +143,7 @@ def test_json_without_plots(raw, capsys):
         (HEADING, "no records"),
         (HEADING.replace("jog_um", "jog_steps") + "0,0,800,X,A,1,1,1\n", "column jog_um is missing"),
         (HEADING.replace(",jog_um", "") + "0,0,800,X,A,1,1\n", "column jog_um is missing"),
-        (HEADING.replace(",direction", "") + "0,0,800,A,1,1,1\n", "no direction"),
+        (HEADING.replace(",direction", "") + "0,0,800,A,1,1,1\n", "column direction is missing"),
         (HEADING + "0,0,800,X,A,0,0\n", "raw.csv:2: row with 7 cells; expected 8"),
         (HEADING + "0,0,800,X,A,0,zero,0\n", "raw.csv:2: force_N = 'zero'"),
         (HEADING + "0,0,800,X,A,0,nan,0\n", "raw.csv:2: force_N = 'nan'"),

@@ -14,7 +14,7 @@ from tests.updating.cases import active, table_1
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.report.update.page import update_html
+from toolpath_stiff.report.update import page as update_html
 
 WEAK = ("--add", "weak_strut:strut=3", "--strut-law")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -15,14 +15,12 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, UnreachableError
-from toolpath_stiff.files import Content
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 MOST_POINTS = 5_000_000
 
@@ -118,18 +116,8 @@ class StiffnessMap(FolderResult):
         planes = list(self.columns())
         return frame_of({name: np.concatenate([plane[name] for plane in planes]) for name in planes[0]})
 
-    def plot(self) -> Figure:
-        """Contours over each plane."""
-        figure: Figure = self.view.map_picture.figure(self)
-        return figure
-
     def _short(self) -> str:
         return f"{self.model.machine.name}, load {self.load}, {self.stiffness.size} points"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content]:
-        """Name -> content of each file that `save` writes."""
-        files: Mapping[str, Content] = self.view.files(self, plots)
-        return files
 
 
 def map_stiffness(

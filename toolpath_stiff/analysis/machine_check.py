@@ -17,7 +17,6 @@ from toolpath_stiff.units import Pose, mm_from_m, n_per_um_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 # N/um of a strut: screws, bearings and joints in series. Below, it is no machine's; above, no screw's.
 STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
@@ -94,14 +93,9 @@ class MachineCheck(Result):
         rows = [(severity, text) for severity, texts in kinds for text in texts]
         return frame_of(rows, columns=["severity", "text"])
 
-    def plot(self) -> Figure:
-        """The machine at its neutral pose from two sides, doubtful joints marked."""
-        figure: Figure = self.view.machine_views.figure(self)
-        return figure
-
     def picture(self) -> bytes:
         """The same as a PNG."""
-        return bytes(self.view.machine_views(self))
+        return self._picture()
 
     def _short(self) -> str:
         return f"{self.model.machine.name}, {len(self.wrong)} wrong, {len(self.doubtful)} doubtful"

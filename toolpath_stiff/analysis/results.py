@@ -74,7 +74,7 @@ class Analysis(EvaluatedPath, FolderResult):
     """
 
     command: ClassVar[str] = "analyze"
-    shown_by: ClassVar[str] = "analysis.summary"
+    shown_by: ClassVar[str] = "analysis"
 
     required: float | None = None
     on_other: Analysis | None = None
@@ -145,20 +145,17 @@ class Analysis(EvaluatedPath, FolderResult):
 
     def plot(self, *, show_plunges: bool = False) -> Figure:
         """The path in three views, coloured by stiffness; with `show_plunges` these set axes and colours too."""
-        figure: Figure = self.view.path_picture.figure(self, show_plunges=show_plunges)
-        return figure
+        return self._figure(show_plunges=show_plunges)
 
     def plot_profile(self, *, show_plunges: bool = False) -> Figure:
         """Stiffness along the path."""
-        figure: Figure = self.view.profile_picture.figure(self, show_plunges=show_plunges)
-        return figure
+        return self._figure("profile.png", show_plunges=show_plunges)
 
     def files(
         self, *, plots: bool = True, table: str = "csv", show_plunges: bool = False
-    ) -> Mapping[str, Callable[[], Content]]:
+    ) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps analyze`; samples as "csv" or "parquet"."""
-        files: Mapping[str, Callable[[], Content]] = self.view.files(self, plots, table, show_plunges)
-        return files
+        return self._files(plots, self.view.other_samples(table), show_plunges=show_plunges)
 
 
 def analyze(

@@ -277,8 +277,7 @@ class Machine(Result):
         >>> type(machine.plot((0, 0, 800))).__name__
         'Figure'
         """
-        figure: Figure = self.view.machine_picture.figure(self.model.machine, *self.standing(pose_mm_deg)[:2])
-        return figure
+        return self._figure(pose_mm_deg=pose_mm_deg)
 
     def standing(self, pose_mm_deg: Sequence[float] | None = None) -> tuple[FloatArray, Struts, Reach]:
         """A pose (6,) in SI (unless given, the paper's Figure 2 or the default origin), struts and reach there.
@@ -326,7 +325,7 @@ class Machine(Result):
 
     def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
         """What `plot` draws as a PNG."""
-        return bytes(self.view.machine_picture(self.model.machine, *self.standing(pose_mm_deg)[:2]))
+        return self._picture(pose_mm_deg=pose_mm_deg)
 
     def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
         """Its figures with their origin, and how far the limits are at a pose.
@@ -355,7 +354,7 @@ class Machine(Result):
             "title": self.model.machine.title,
             "source": self.model.machine.source,
             "effects": self.effects,
-            "figures": self.view.figure_entries(self.model.machine),
+            "figures": [figure._asdict() for figure in self.view.machine_figures(self.model.machine)],
         }
 
     def check(self) -> MachineCheck:

@@ -18,10 +18,10 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import writing_errors
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import arguments_of, checked
-from toolpath_stiff.report.analysis.summary import check_table
-from toolpath_stiff.report.batch.index import files, names
+from toolpath_stiff.report.analysis import other_samples
+from toolpath_stiff.report.batch.index import files
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, columns_of, terminal_summary
-from toolpath_stiff.report.batch.programs import Found, find_programs, report_folders
+from toolpath_stiff.report.batch.programs import RESERVED, Found, find_programs, report_folders
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, Result
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
@@ -163,7 +163,7 @@ def analyze_many(
     compared = path_options.pop("compare_with", None)
     other = on.like(compared) if isinstance(compared, str | Path) else compared
     check_options(**path_options)  # a mistake in them is one error
-    check_table(table)
+    other_samples(table)
     listed, given = _listed(programs)
     example = Program.from_text("", **options)
     each = [given.get(program.file) or _named(example, program.file) for program in listed]
@@ -173,7 +173,7 @@ def analyze_many(
     shared = (*on.inputs, *(other.inputs if other else ()))
     rules = Rules(inputs=(*(file for program in each for file in program.inputs), *shared), replace=replace)
     out = Path(folder)
-    check_folder(out, names(), rules)
+    check_folder(out, RESERVED, rules)
     saved = {"plots": plots, "table": table, "show_plunges": show_plunges}
     run = BatchRun(out.absolute(), str(out), pickle.dumps((on, other)), path_options, saved, replace)
     # The overview of an earlier run goes, as its reports do from now on, one after the other.

@@ -31,7 +31,7 @@ def reduce(
       force_N,displacement_um      gauge and indicator, positive the way the jog counts
       date                         2024-03-31, 2024-03-31T14:05, 2024-03, 2024; each date is a loop of its own
       point,setup,clamp,repeat,loop,tool_extension_mm,time_min,temperature_C   optional, carried along
-    of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um; length_mm, serial if known; no pose,
+    of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um; length_mm if known; no pose,
                                    no jog; or strut, date, stiffness_N_per_mm of struts that were reduced elsewhere
     Other names, units and forms of dates are said by a mapping, also kept as RAW.columns.toml (force = "Kraft:kN"):
       tps reduce RAW --columns "strut=hp, date=day_ms:ms, stiffness=stiff_mean:N/um"
@@ -119,7 +119,7 @@ def update(
     """
     args.replace |= args.force
     check_single(args, output)
-    target = destination(args, tps.Update, args.data, machine=output is None)
+    target = destination(args, tps.Update, args.data, () if output is None else ("machine.toml",))
     fitted = call(args, tps.update, machine_file=output or target.folder / "machine.toml")
     after = [target.write(fitted, plots=not args.no_plots, machine=output is None)]
     if output and fitted.accepted:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
@@ -111,10 +111,12 @@ class Destination:
         return written_text(write_folder(self.folder, files, command=result.command, rules=self.rules))
 
 
-def destination(args: Namespace, kind: type[FolderResult], sources: Sequence[str], **options: Any) -> Destination:
+def destination(
+    args: Namespace, kind: type[FolderResult], sources: Sequence[str], omit: Collection[str] = ()
+) -> Destination:
     """The folder of --out, else `reports/<sources>-<command>` or a longer name, which then belongs to these sources.
 
-    Raises `InputError` where the files of a result of this kind cannot be written; `options` say which these are.
+    Raises `InputError` where the files of a result of this kind, but for `omit`, cannot be written.
     """
     suffix = "" if kind.command == "analyze" else f"-{kind.command}"
     folder = Path(args.out) if args.out else _default_folder(sources, suffix)
@@ -124,8 +126,8 @@ def destination(args: Namespace, kind: type[FolderResult], sources: Sequence[str
         replace=args.replace,
         kept=None if args.json else tell_kept,
     )
-    names = import_module(f"toolpath_stiff.report.{kind.shown_by}").names
-    check_folder(folder, names(not args.no_plots, **options), rules)
+    names = import_module("toolpath_stiff.report.folder").names
+    check_folder(folder, names(kind.shown_by, not args.no_plots, omit), rules)
     return Destination(folder, rules)
 
 

@@ -93,7 +93,9 @@ def analyze(
 
 
 def _analyze_one(args: Namespace, file: str) -> int:
-    target = destination(args, tps.Analysis, [file], table=args.table)
+    from toolpath_stiff.report.analysis import other_samples
+
+    target = destination(args, tps.Analysis, [file], other_samples(args.table))
     analysis = call(args, tps.analyze, program=tps.Program.read(file, **given(args, tps.Program.read)))
     saving = {"plots": not args.no_plots, "table": args.table, "show_plunges": args.show_plunges}
     show(args, analysis, target.write(analysis, **saving))

@@ -23,7 +23,7 @@ from toolpath_stiff.comparison.residuals import ReadingNames, Residuals, Variabl
 from toolpath_stiff.comparison.structure import Scattering, find_structure
 from toolpath_stiff.comparison.summary import Answer, ComparisonSummary, summary_of
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.documents import to_dict
+from toolpath_stiff.documents import certain, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Problem
@@ -34,11 +34,9 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
-from toolpath_stiff.units import certain
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 
@@ -89,7 +87,7 @@ class Comparison(FolderResult):
     """
 
     command: ClassVar[str] = "compare"
-    shown_by: ClassVar[str] = "compare.page"
+    shown_by: ClassVar[str] = "compare"
 
     predictor: Predictor
     data: Readings
@@ -121,11 +119,6 @@ class Comparison(FolderResult):
         import pandas as pd
 
         return pd.read_csv(StringIO(self.view.residuals_csv(self)))
-
-    def plot(self) -> Figure:
-        """Measured against modelled."""
-        figure: Figure = self.view.measured_modelled_png.figure(self)
-        return figure
 
     def _short(self) -> str:
         return f"{self.summary.machine}, mean error {self.summary.baseline.mean_abs_error_percent:.2f} %"

@@ -20,7 +20,6 @@ from toolpath_stiff.results import FolderResult
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,7 +58,7 @@ class Update(UpdateOutcome, FolderResult):
     """
 
     command: ClassVar[str] = "update"
-    shown_by: ClassVar[str] = "update.page"
+    shown_by: ClassVar[str] = "update"
 
     inputs: tuple[str, ...] = ()
     opened: Callable[[Hexapod], Any] | None = None
@@ -91,11 +90,6 @@ class Update(UpdateOutcome, FolderResult):
 
         return pd.DataFrame([rounded_step(self, k) for k in range(len(self.steps))])
 
-    def plot(self) -> Figure:
-        """What each step does to the error."""
-        figure: Figure = self.view.error_ladder_png.figure(self)
-        return figure
-
     def _short(self) -> str:
         first, last = (100.0 * step.error for step in (self.steps[0], self.steps[-1]))
         return f"{self.verdict}, mean error {first:.2f} to {last:.2f} %"
@@ -108,7 +102,7 @@ class Update(UpdateOutcome, FolderResult):
         """Write the new machine file, whole or not at all."""
         return write_atomically(file, self.machine_text())
 
-    def files(self, *, plots: bool = True, machine: bool = True) -> Mapping[str, Content]:
+    def files(self, *, plots: bool = True, machine: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps update`; the machine file too, unless it is said not."""
-        files: Mapping[str, Content] = self.view.files(self, plots=plots, machine=machine)
-        return files
+        none = {"machine.toml": machine and self.accepted, "figure3.csv": self.bars is not None}
+        return self._files(plots, [name for name, there in none.items() if not there])

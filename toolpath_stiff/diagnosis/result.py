@@ -13,7 +13,6 @@ from toolpath_stiff.results import FolderResult
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -21,7 +20,7 @@ class Diagnosis(Examination, FolderResult):
     """Which physical effect the model lacks, if any, and what stands behind it; attributes as of `Examination`."""
 
     command: ClassVar[str] = "diagnose"
-    shown_by: ClassVar[str] = "diagnose.page"
+    shown_by: ClassVar[str] = "diagnose"
 
     @cached_property
     def rows(self) -> HypothesisRows:
@@ -37,11 +36,6 @@ class Diagnosis(Examination, FolderResult):
         import pandas as pd
 
         return pd.DataFrame(self.to_dict()["candidates"])
-
-    def plot(self) -> Figure:
-        """The error as given, with the strut law refitted, and with each candidate."""
-        figure: Figure = self.view.ladder_png.figure(self)
-        return figure
 
     def _short(self) -> str:
         names = ", ".join(self.plausible)

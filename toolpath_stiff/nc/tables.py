@@ -180,7 +180,10 @@ def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
         raise Place(file, table.heading_line).fail(problem, f"columns {', '.join(columns)}")
     for line, cells in table.rows:
         place = Place(file, line)
-        row = {key: cell for key, cell in table.record(cells).items() if cell}
+        try:
+            row = {key: cell for key, cell in table.record(cells).items() if cell}
+        except InputError as error:
+            raise error.in_line(file, line) from None
         numbers = {key: _number(row[key], key, place) for key in columns[:4] if key in row}
         wrong = partial(_wrong_cell, place)
         yield line, _tool({**row, **numbers, "number": numbers.get("tool")}, wrong)

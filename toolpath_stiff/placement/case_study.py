@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from toolpath_stiff.units import Pose, mm_from_m, number, pose_in_si
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 PROGRAM = "case_study.nc"
 LOW_MM, HIGH_MM = 400.0, 1200.0
@@ -98,10 +97,6 @@ class CaseStudy(FolderResult):
         import pandas as pd
 
         return pd.DataFrame(self.summary["regions"])
-
-    def plot(self) -> Figure:
-        """The path in its regions, coloured by stiffness."""
-        return cast("Figure", self.view.regions_picture.figure(self))
 
     def _short(self) -> str:
         held = [conclusion["holds"] for conclusion in self.summary["conclusions"] if conclusion["holds"] is not None]

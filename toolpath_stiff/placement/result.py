@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from toolpath_stiff.units import ShopPose, mm_from_m, number, pose_in_mm
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 WORSE = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
 ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
@@ -97,7 +96,7 @@ class Placement(FolderResult):
     """
 
     command: ClassVar[str] = "place"
-    shown_by: ClassVar[str] = "place.page"
+    shown_by: ClassVar[str] = "place"
 
     task: PlacementTask
     front: list[PlacementRow]
@@ -253,10 +252,6 @@ class Placement(FolderResult):
         import pandas as pd
 
         return pd.DataFrame(self.front)
-
-    def plot(self) -> Figure:
-        """The front: mean against range, the chosen and the present placement marked."""
-        return cast("Figure", self.view.front_picture.figure(self))
 
     def _short(self) -> str:
         words = [f"{axis}{value:.6g}" for axis, value in zip("XYZABC", self.origin_mm_deg, strict=True)]

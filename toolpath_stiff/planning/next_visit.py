@@ -18,6 +18,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_names import Mapped
+from toolpath_stiff.documents import certain
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.planning.choice import choose, why_of
 from toolpath_stiff.planning.forecasts import Forecast, principal
@@ -29,7 +30,6 @@ from toolpath_stiff.planning.visits import Visits
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.rows import COLUMNS, Row, read_rows
 from toolpath_stiff.results import Result
-from toolpath_stiff.units import certain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -283,7 +283,7 @@ def _taken(tables: Tables, files: tuple[str, ...], columns: Mapped) -> tuple[Tak
         known.setdefault(_key(row, setup, loop), k)
     rows, logs, clamps, where, others = [], [], [], [], 0
     for table in [mapped_table(name, "measurements", COLUMNS, columns) for name in files]:
-        for row in read_rows(table, planned=True).rows:
+        for row in read_rows(table, planned=True)[0]:
             tool = 0.0 if np.isnan(row.tool_extension) else row.tool_extension
             setup, loop = row.labels["setup"] or tables.visits.menu.setups[0], row.labels["loop"]
             place = known.get(_key([*row.position, *row.angles, *row.direction, row.force, tool], setup, loop))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.documents import Document, to_dict
+from toolpath_stiff.documents import Document, certain, to_dict
+from toolpath_stiff.files import Content
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.evidence import Problem
@@ -22,14 +23,13 @@ from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.rivals import errors_so_far, fitted_rivals, rivals_of, unfitted_rivals
 from toolpath_stiff.planning.rows import PlanRow, plan_rows, visit_entries
+from toolpath_stiff.planning.tables import TABLES
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.catalogue import known_effects
-from toolpath_stiff.units import certain
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 PLAN_POSES, CAMPAIGN_POSES = 6, 24
 CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
@@ -97,10 +97,9 @@ class Plan(FolderResult):
 
         return pd.DataFrame(self.rows)
 
-    def plot(self) -> Figure:
-        """The visits in the workspace."""
-        figure: Figure = self.view.figure(self)
-        return figure
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """The files of `tps plan`."""
+        return self._files(plots, () if isinstance(self.choice, RivalPlan) else (TABLES,))
 
     def _short(self) -> str:
         kind = "rivals" if isinstance(self.choice, RivalPlan) else "campaign"

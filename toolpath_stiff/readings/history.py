@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import certain
 from toolpath_stiff.readings.strut_series import (
     FEWEST_DIFFERENCES,
     MOUNTING,
@@ -18,10 +19,10 @@ from toolpath_stiff.readings.strut_series import (
     Kind,
     Series,
     StrutReadings,
+    chance_of_t,
     changes_of,
     series_of,
 )
-from toolpath_stiff.units import certain
 
 # Relative sd, the same on all dates, of a difference of tension and compression; assumed: load cell, indicator and
 # friction are not alike on both sides of zero.
@@ -199,8 +200,6 @@ def _chance_text(p: float) -> str:
 
 def _sides(readings: StrutReadings) -> dict[str, StrutSides]:
     """Strut -> tension against compression, of those measured under both: the mean of dates' differences."""
-    from scipy.stats import t as student
-
     compared: dict[str, tuple[FloatArray, float]] = {}  # differences, and ln stiffness in the middle
     for name in sorted(set(readings.strut.tolist())):
         rows = readings.strut == name
@@ -223,7 +222,7 @@ def _sides(readings: StrutReadings) -> dict[str, StrutSides]:
     entries = {}
     for name, (apart, middle) in compared.items():
         sd, mean = float(np.hypot(of_date / len(apart) ** 0.5, BOTH_SIDES)), float(apart.mean())
-        p = min(1.0, len(compared) * 2.0 * float(student.sf(abs(mean) / sd, freedom)))
+        p = min(1.0, len(compared) * chance_of_t(abs(mean) / sd, freedom))
         tension, compression = (_n_per_mm(middle + sign * 0.5 * mean) for sign in (1.0, -1.0))
         share, strut = 100.0 * float(np.expm1(mean)), name.replace(" alone", "")
         numbers = f"{tension:,.0f} against {compression:,.0f} N/mm"

@@ -14,19 +14,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.readings.raw_cycles import closed_cycle, closed_cycles, ends_without_drift, stands_still, turns_of
+from toolpath_stiff.readings.raw_cycles import closed_cycle, closed_cycles, ends_without_drift, turns_of
 from toolpath_stiff.readings.raw_records import SAME_JOG, Loop
-from toolpath_stiff.readings.raw_shape import Play, Shape, play_of, shape_of, sides_of
+from toolpath_stiff.readings.raw_sides import play_of, sides_of
 from toolpath_stiff.readings.rows import SOFTEST, STIFFEST
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
 CLOSED = 3  # turns of the drive, from which the records hold a closed cycle
-STEPS = 3.0  # of the indicator, that it misses while it stands still, from which that is told of
 
 
 @dataclass(frozen=True)
@@ -53,12 +51,10 @@ class LoopFigures:
         deflection between them.
     closure
         m, deflection at the end less that at the beginning.
-    shape
-        Kinks, two slopes, work lost.
     tension, compression
         N/m, slopes of the two sides of a strut on a bench; beyond the lost motion where there is any.
     beyond
-        N/m, what the secant of a strut on a bench would be without lost motion (`raw_shape.play_of`). nan
+        N/m, what the secant of a strut on a bench would be without lost motion (`raw_sides.play_of`). nan
         without a closed cycle that reaches both sides.
     plays
         Whether the record shows lost motion.
@@ -72,16 +68,10 @@ class LoopFigures:
     loop_width: float = math.nan
     linearity: float = math.nan
     closure: float = math.nan
-    shape: Shape = Shape()  # noqa: RUF009  (frozen)
     tension: float = math.nan
     compression: float = math.nan
     beyond: float = math.nan
     plays: bool = False
-
-    @property
-    def elastic(self) -> float:
-        """N/m, the strut's own stiffness: the secant, but the slope beyond lost motion where there is any."""
-        return self.beyond if self.plays else self.stiffness
 
     @property
     def side(self) -> float:
@@ -89,15 +79,6 @@ class LoopFigures:
         if len(self.loop.force):
             return self.loop.side
         return 0.0 if math.isnan(self.force) else math.copysign(1.0, self.force)
-
-    @property
-    def standstill(self) -> tuple[float, float, float] | None:
-        """Where the indicator of a bench stood still while the force went on, as `stands_still`; None: it did not."""
-        loop = self.loop
-        if loop.jog is not None or not len(loop.force):
-            return None
-        still = stands_still(loop.force, loop.displacement, turns_of(loop.drive))
-        return still if still and abs(still[2] - still[1]) / self.stiffness > STEPS * loop.resolution else None
 
 
 def reduce_loop(loop: Loop) -> LoopFigures:
@@ -111,19 +92,20 @@ def reduce_loop(loop: Loop) -> LoopFigures:
     drive, turns = loop.drive, turns_of(loop.drive)
     force, deflection = _between_extremes(loop, turns)
     cycle = loop.part(closed_cycle(turns)) if len(turns) >= CLOSED else loop
-    ways = [slice(start, end + 1) for start, end in pairwise(turns_of(cycle.drive)[:CLOSED])]
-    width = _loop_width(cycle, ways[0])
-    play = _play(loop, turns)
-    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width, gap=play.shown)
-    if play.shown:
+    start, end = turns_of(cycle.drive)[:2]
+    way = slice(start, end + 1)  # from extreme to extreme
+    width = _loop_width(cycle, way)
+    play, shown = _play(loop, turns)
+    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width, gap=shown)
+    if shown:
         # Lost motion adds the same to the compliance of both sides: their difference is kept, and together they give
         # the deflection without it at the extremes.
         high, low = float(drive.max()), float(drive.min())
         apart = 1.0 / sides[0] - 1.0 / sides[1]
-        pushed = (deflection - play.size - apart * high) / (high - low)
+        pushed = (deflection - play - apart * high) / (high - low)
         pulled = pushed + apart
         sides = (1.0 / pulled, 1.0 / pushed) if min(pulled, pushed) > 0.0 else (math.nan, math.nan)
-    main_force, main = cycle.force[ways[0]], cycle.deflection[ways[0]]
+    main_force, main = cycle.force[way], cycle.deflection[way]
     secant = main[0] + (main[-1] - main[0]) * (main_force - main_force[0]) / (main_force[-1] - main_force[0])
     return LoopFigures(
         loop,
@@ -134,24 +116,23 @@ def reduce_loop(loop: Loop) -> LoopFigures:
         loop_width=width,
         linearity=float(np.abs(main - secant).max() / deflection),
         closure=float(loop.deflection[-1] - loop.deflection[0]),
-        shape=shape_of(cycle.force, cycle.deflection, ways, width),
         tension=sides[0],
         compression=sides[1],
-        beyond=force / (deflection - play.size),
-        plays=play.shown,
+        beyond=force / (deflection - play),
+        plays=shown,
     )
 
 
 def _between_extremes(loop: Loop, turns: list[int]) -> tuple[float, float]:
     """Force (N) and deflection (m) between the extremes. Raises `InputError` where they give no stiffness."""
-    where = {"file": loop.file or None, "line": loop.line}
     drive = loop.drive
     high, low = float(drive.max()), float(drive.min())
     if loop.jog is not None and not (low < -SAME_JOG and high > SAME_JOG):
         raise MeasurementError(
             f"{loop.title}: jogged from {um_from_m(low):g} to {um_from_m(high):g} um",
             expected="extremes on both sides of zero, as 0, +200, -200, 0 um",
-            **where,  # type: ignore[arg-type]
+            file=loop.file or None,
+            line=loop.line,
         )
     if len(turns) >= CLOSED:
         force, deflection = ends_without_drift(drive, loop.force, loop.deflection, turns, loop.same)
@@ -161,23 +142,14 @@ def _between_extremes(loop: Loop, turns: list[int]) -> tuple[float, float]:
     stiffness = n_per_mm_from_n_per_m(force / deflection) if deflection else math.inf
     if SOFTEST <= stiffness <= STIFFEST:
         return force, deflection
-    if loop.jog is not None:
-        hint = "force, jog and displacement count positive the same way; displacement is what the indicator read"
-    elif stiffness < 0.0:
-        hint = (
-            "tension and stretch are positive: one of the two columns counts the other way; turn its sign, "
-            "or say --compression-positive (compression_positive=True)"
-        )
-    else:
-        hint = (
-            "tension and stretch are positive; a slope needs two forces; another unit than N and um is said by a "
-            'mapping: --columns "force=force_N:kN, displacement=displacement_um:mm" (columns=)'
-        )
     raise MeasurementError(
         f"{loop.title}: {force:g} N over a deflection of {um_from_m(deflection):g} um",
         expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm",
-        hint=hint,
-        **where,  # type: ignore[arg-type]
+        hint="force, jog and displacement count positive the same way, on a bench tension and stretch "
+        "(--compression-positive says otherwise), in N and um: another unit is said by a mapping, "
+        '--columns "force=force_N:kN, displacement=displacement_um:mm" (columns=)',
+        file=loop.file or None,
+        line=loop.line,
     )
 
 
@@ -207,10 +179,10 @@ def _sides(loop: Loop, turns: list[int], width: float, gap: bool) -> tuple[float
     return (math.nan, math.nan) if abs(1.0 / sides[0] - 1.0 / sides[1]) * farthest < width else sides
 
 
-def _play(loop: Loop, turns: list[int]) -> Play:
-    """The lost motion of a strut on a bench, of all its closed cycles."""
+def _play(loop: Loop, turns: list[int]) -> tuple[float, bool]:
+    """The lost motion of a strut on a bench, of all its closed cycles, as `play_of`."""
     if loop.jog is not None or len(turns) < CLOSED or loop.side:
-        return Play(math.nan, False)
+        return math.nan, False
     records = closed_cycles(turns)
     cycles = loop.part(records)
     way = np.searchsorted(np.array(turns), np.arange(records.start, records.stop), side="right") % 2

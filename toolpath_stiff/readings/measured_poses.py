@@ -17,13 +17,8 @@ from toolpath_stiff.units import mm_from_m
 SINGULAR = 1e-6  # singularity index: the tip would be a million times softer than at the neutral pose
 
 
-# Section of the machine file -> the word in its limits' names.
-LIMIT_WORDS = {
-    "limits.strut_length": "length",
-    "limits.joint_angle": "angle",
-    "limits.workspace": "workspace",
-    "limits.singularity": "singularity",
-}
+# Of the machine file under `limits`; the last word of each stands in its limits' names.
+SECTIONS = ("strut_length", "joint_angle", "workspace", "singularity")
 
 
 NAMED = 5  # so many poses are named in a warning
@@ -76,17 +71,13 @@ def pose_warnings(
     for name, those in beyond.items():
         poses = list(dict.fromkeys(_shown(position[i], angles[i]) for i in those))
         more = f" and {len(poses) - NAMED} more" if len(poses) > NAMED else ""
+        sections = (section for section in SECTIONS if section.rpartition("_")[2] in name)
+        origin = machine.origins.get(f"limits.{next(sections, '')}", "origin not stated")
         warnings.append(
-            f"measured beyond a limit of the machine file ({name}, {_origin(machine, name)}): "
+            f"measured beyond a limit of the machine file ({name}, {origin}): "
             f"{'; '.join(poses[:NAMED])}{more}. {stand.describe(those[0])}"
         )
     return tuple(warnings)
-
-
-def _origin(machine: Hexapod, limit: str) -> str:
-    """Where a limit comes from."""
-    quantity = next((q for q, word in LIMIT_WORDS.items() if word in limit), "")
-    return machine.origins.get(quantity, "origin not stated")
 
 
 def _shown(position: FloatArray, angles: FloatArray) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from importlib import resources
@@ -23,20 +23,20 @@ from toolpath_stiff.readings.dates import day_of, days_since_first
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, offsets
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measured_poses import pose_warnings
-from toolpath_stiff.readings.rows import COLUMNS, LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
+from toolpath_stiff.readings.rows import AXES, COLUMNS, LABELS, OPTIONAL, POSITION, Row, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
-from toolpath_stiff.tables import parse_table
+from toolpath_stiff.tables import Columns, parse_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 
 NIST_TABLE_1 = "nist-table1"
 
 
-RISER_ABOVE = 1.0  # m: of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser
+RISER_ABOVE_MM = 1000.0  # of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser
 
 
 @dataclass(frozen=True)
@@ -181,39 +181,47 @@ def read_measurements(
     twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
     if twice is not None:
         raise MeasurementError(f"{twice!r} is given twice", hint="name it once")
-    files: list[RowFile] = []
+    rows: list[Row] = []
+    notes: list[str] = []
     errors: list[InputError] = []
     for name in names:
         try:
-            files.append(_rows(name, planned, columns))
+            of_file, remarks = _rows(name, planned, columns)
+            rows += of_file
+            notes += remarks
         except InputErrors as bad:  # those of all files are reported together
             errors += bad.errors
-    errors = errors or duplicates([row for file in files for row in file.rows], across_files=True)
+    errors = errors or duplicates(rows, across_files=True)
     if errors:
         raise InputErrors(errors)
-    data = _columns(files, machine)
+    data = _columns(rows, notes, machine)
     places = list(zip(data.file.tolist(), data.line.tolist(), strict=True))
     warnings = pose_warnings(machine, data.position, data.angles, data.tool_extension, places)
     return with_offsets(replace(data, warnings=warnings), machine)
 
 
-def _rows(name: str, planned: bool, columns: Mapped) -> RowFile:
-    """Rows of a file, or of the paper's Table 1."""
-    if name != NIST_TABLE_1:
-        return read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
+def _rows(name: str, planned: bool, columns: Mapped) -> tuple[list[Row], list[str]]:
+    if name == NIST_TABLE_1:
+        return _table_1()
+    return read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
+
+
+def _table_1() -> tuple[list[Row], list[str]]:
+    """The paper's Table 1, printed with a row a point."""
     text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
-    table_1 = read_rows(parse_table(text, NIST_TABLE_1, COLUMNS))
+    printed = parse_table(text, NIST_TABLE_1, Columns(POSITION))
     rows = tuple(
-        replace(row, labels={**row.labels, "setup": "riser" if row.position[2] > RISER_ABOVE else "no riser"})
-        for row in table_1.rows
+        (line, (*cells[:3], axis, measured, "riser" if float(cells[2]) > RISER_ABOVE_MM else "no riser"))
+        for line, cells in printed.rows
+        for axis, measured in zip(AXES, cells[3:6], strict=True)
     )
+    heading = (*POSITION, "direction", "stiffness_N_per_mm", "setup")
     note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
-    return RowFile(rows, table_1.columns | {"setup"}, (*table_1.notes, note))
+    return read_rows(replace(printed, heading=heading, rows=rows))[0], [note]
 
 
-def _columns(files: list[RowFile], machine: Hexapod) -> Readings:
+def _columns(rows: list[Row], notes: Sequence[str], machine: Hexapod) -> Readings:
     """Readings as columns; those of loops in m/N until `with_offsets`."""
-    rows = [row for file in files for row in file.rows]
 
     def numbers(name: str) -> FloatArray:
         return np.array([getattr(row, name) for row in rows], dtype=float)
@@ -255,7 +263,7 @@ def _columns(files: list[RowFile], machine: Hexapod) -> Readings:
         # Set-ups and loops may go without a name; of the other columns every reading must have its own.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
         notes=(
-            *(note for file in files for note in file.notes),
+            *notes,
             *_incomplete(given),
             *(f"column {name} is not in every file and is not used" for name in dropped),
             *[bench] * bool(unknown),
@@ -338,13 +346,9 @@ def _points(poses: FloatArray, labels: TextArray) -> TextArray:
 
 def _clampings(rows: list[Row], point: TextArray, setup: TextArray) -> TextArray:
     """Labels of the clampings. Numbers start anew in every file; without a number, a point in a set-up is one."""
-    return np.array(
-        [
-            f"{row.file}: clamp {row.labels['clamp']}" if row.labels["clamp"] else f"point {p}, set-up {s}"
-            for row, p, s in zip(rows, point, setup, strict=True)
-        ],
-        dtype=str,
-    )
+    numbered = [f"{row.file}: clamp {row.labels['clamp']}" if row.labels["clamp"] else "" for row in rows]
+    named = [f"point {p}, set-up {s}" for p, s in zip(point, setup, strict=True)]
+    return np.array([number or name for number, name in zip(numbered, named, strict=True)], dtype=str)
 
 
 def reading_columns(data: Readings) -> dict[str, NDArray[Any]]:
@@ -370,29 +374,19 @@ def reading_columns(data: Readings) -> dict[str, NDArray[Any]]:
 MARK = 10  # hexadecimal digits of a reading's mark: among 5,000 readings two differ in it but for one time in 90,000
 
 
-DIGITS = {
-    "mm": 2,
-    "deg": 3,
-    "direction": 3,
-    "stiffness": 5,
-}  # to which readings are told apart: decimals; of N/m, digits
-
-
 def reading_marks(data: Readings) -> TextArray:
     """(n,) what tells a reading from others, however its file is called, sorted or laid out.
 
     The first `MARK` digits of the SHA-256 of its pose (to 0.01 mm and 0.001 degrees), its direction (without sign) and
     the measured stiffness (to five digits).
     """
-    pose = np.concatenate(
-        [np.round(mm_from_m(data.position), DIGITS["mm"]), np.round(deg_from_rad(data.angles), DIGITS["deg"])], axis=1
-    )
-    axis = np.round(data.direction, DIGITS["direction"])
+    pose = np.concatenate([np.round(mm_from_m(data.position), 2), np.round(deg_from_rad(data.angles), 3)], axis=1)
+    axis = np.round(data.direction, 3)
     first = np.take_along_axis(axis, np.argmax(axis != 0.0, axis=1)[:, None], axis=1)
     rows = np.concatenate([pose, axis * np.sign(first)], axis=1) + 0.0  # no -0
     return np.array(
         [
-            hashlib.sha256(f"{row} {stiffness:.{DIGITS['stiffness'] - 1}e}".encode()).hexdigest()[:MARK]
+            hashlib.sha256(f"{row} {stiffness:.4e}".encode()).hexdigest()[:MARK]
             for row, stiffness in zip(rows.tolist(), data.stiffness.tolist(), strict=True)
         ],
         dtype=str,

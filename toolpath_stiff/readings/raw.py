@@ -14,28 +14,21 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError, TableError
-from toolpath_stiff.files import Content, read_bytes, write_atomically
+from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.loop_figures import LoopFigures, in_tension, reduce_loops
 from toolpath_stiff.readings.mapping import mapped_table
-from toolpath_stiff.readings.raw_history import struts_over_dates
-from toolpath_stiff.readings.raw_records import COLUMNS, Loop, is_table, read_raw, read_stiffnesses
-from toolpath_stiff.readings.raw_remarks import remarks
+from toolpath_stiff.readings.raw_history import remarks, struts_over_dates
+from toolpath_stiff.readings.raw_records import COLUMNS, Loop, read_raw
 from toolpath_stiff.readings.raw_rows import loop_entry, measurement_csv
-from toolpath_stiff.results import Result
-from toolpath_stiff.tables import Table
-from toolpath_stiff.workbooks import split_name
+from toolpath_stiff.readings.strut_tables import is_strut_table, read_strut_table
+from toolpath_stiff.results import Result, frame_of
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 READ = (".csv", ".txt", ".dat", ".asc", ".tsv", ".xlsx", ".xlsm")  # of a folder
 OWN_OUTPUT = "_measurements.csv"
-FOREIGN = {
-    b"MATLAB": "a MATLAB file", b"\x89HDF": "an HDF5 file (or MATLAB 7.3)", b"TDSm": "a TDMS file",
-    b"MDF ": "an MDF file", b"PAR1": "a Parquet file", b"%PDF": "a PDF", b"{": "JSON", b"[": "JSON",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -107,25 +100,19 @@ class Reduction(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a loop."""
-        import pandas as pd
-
-        return pd.DataFrame(self.to_dict()["loops"])
-
-    def plot(self) -> Figure:
-        """Force against deflection of each loop; without records the struts over their dates."""
-        figure: Figure = self.view.reduction_figure(self)
-        return figure
-
-    def __str__(self) -> str:
-        return str(self.view.reduction_text(self))
+        return frame_of(self.to_dict()["loops"])
 
     def _short(self) -> str:
-        return f"{self.title}, {len(self.figures)} loop{'s' * (len(self.figures) != 1)}"
+        return f"{self.title}, {len(self.figures)} loops"
 
     def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
         """The measurement file; beside it the picture of the loops, and of dated struts that over their dates."""
-        pictures: Mapping[Path, Content] = self.view.reduction_pictures(self, Path(file)) if plots else {}
-        return {Path(file): measurement_csv(self.figures, self.history), **pictures}
+        out, pictures = Path(file), self.view.pictures(self) if plots else {}
+        beside = {
+            out.with_name(f"{out.stem}_{name}"): content() if callable(content) else content
+            for name, content in pictures.items()
+        }
+        return {out: measurement_csv(self.figures, self.history), **beside}
 
     def save(self, file: str | Path, *, plots: bool = True) -> list[Path]:
         """Write the measurement file and, beside it, the picture of the loops."""
@@ -169,16 +156,18 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
     notes: list[str] = []
     read_as: list[str] = []
     for file in (file for name in raw for file in _files(str(name))):
-        table = _table(file, columns)
-        if is_table(table):
-            struts, remarked = read_stiffnesses(table)
-            reduced = [LoopFigures(*strut) for strut in struts]
+        table = mapped_table(file, "raw records", COLUMNS, columns)
+        if is_strut_table(table):
+            reduced, remarked = read_strut_table(table)
+            kind = "stiffnesses of struts"
         else:
             loops, remarked = read_raw(table)
             reduced = reduce_loops([in_tension(loop) for loop in loops] if compression_positive else loops)
+            kind = f"records of {len(reduced)} loops"
         figures += reduced
         notes += [*table.notes, *remarked]
-        read_as.append(_read_as(table, len(reduced)))
+        known = [name for name in table.heading if name in (*COLUMNS.numbers, *COLUMNS.texts)]
+        read_as.append(f"{file}: {kind} from {', '.join(known)}")
     over_time = struts_over_dates(figures)
     notes += remarks(figures, over_time)
     return Reduction(tuple(map(str, raw)), tuple(figures), notes, tuple(read_as), over_time)
@@ -193,18 +182,3 @@ def _files(name: str) -> list[str]:
     if not files:
         raise TableError("a folder without records", expected=f"files {', '.join(READ)}", file=name)
     return files
-
-
-def _table(file: str, columns: Mapped) -> Table:
-    start = read_bytes(split_name(file)[0], "raw records").lstrip()
-    for first, kind in FOREIGN.items():
-        if start.startswith(first):
-            raise TableError(kind, expected="CSV or .xlsx", hint="export the channels as CSV", file=file)
-    return mapped_table(file, "raw records", COLUMNS, columns)
-
-
-def _read_as(table: Table, loops: int) -> str:
-    """Which reading a file got, in one line."""
-    known = [name for name in table.heading if name in (*COLUMNS.numbers, *COLUMNS.texts)]
-    kind = "stiffnesses of struts" if is_table(table) else f"records of {loops} loop{'s' * (loops != 1)}"
-    return f"{table.file}: {kind} from {', '.join(known)}, heading in line {table.heading_line}"

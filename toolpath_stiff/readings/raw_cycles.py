@@ -3,7 +3,7 @@
 A test rig goes up and down several times. The first way is that of a strut that was never loaded (a virgin curve), and
 seating, creep and a warm sensor carry the deflection away slowly; neither is stiffness. So with three turns or more
 (high, low, high) the secant is taken from second differences of the turns, in which a steady drift cancels, as in a
-weighing A B A (OIML R 111-1:2004, C.4), and the shape of the loop is that of its last closed cycle.
+weighing A B A (OIML R 111-1:2004, C.4), and width and linearity are those of the last closed cycle.
 """
 
 from __future__ import annotations
@@ -15,12 +15,6 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 
 NEAR_TURN = 0.1  # of the range: how near to an extreme a cycle must come to turn there
-
-
-FEWEST_STILL = 3  # records, and share of the range of the force, over which an indicator stands still at its end
-
-
-STILL = 0.05
 
 
 def turns_of(drive: FloatArray) -> list[int]:
@@ -71,18 +65,3 @@ def ends_without_drift(
     signs = np.where(drive[turns[1:-1]] < drive[turns[0:-2]], 1.0, -1.0)
     force_between, deflection_between = (0.5 * (signs[:, None] * second).mean(axis=0)).tolist()
     return force_between, deflection_between
-
-
-def stands_still(force: FloatArray, displacement: FloatArray, turns: list[int]) -> tuple[float, float, float] | None:
-    """Displacement (m), and the forces (N) between which the indicator reads exactly that on the way to a turn.
-
-    None where it does not: an indicator at the end of its range stands still while the force goes on.
-    """
-    for start, turn in zip([0, *turns[:-1]], turns, strict=True):
-        way = slice(start, turn + 1)
-        still = displacement[way] == displacement[turn]
-        first = len(still) - int(np.argmin(still[::-1])) if not still.all() else 0
-        n = len(still) - first
-        if n >= FEWEST_STILL and abs(force[turn] - force[start + first]) >= STILL * float(np.ptp(force)):
-            return float(displacement[turn]), float(force[start + first]), float(force[turn])
-    return None

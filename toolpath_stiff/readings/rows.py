@@ -1,78 +1,47 @@
 """Rows of a measurement file: one measured stiffness each, every cell read and judged, in SI.
 
-A file is either long (one row a reading) or wide like the paper's Table 1 (one row a point, `measured_x_N_per_mm` and
-so on). A bad row is named with its line; all bad rows of a file are reported together.
+A bad row is named with its line; all bad rows of a file are reported together.
 """
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import loop_of
-from toolpath_stiff.readings.mapping import DATE, check_heading
+from toolpath_stiff.readings.mapping import DATE, check_needed
 from toolpath_stiff.stiffness.measuring_loop import TIP, MeasuringLoop
 from toolpath_stiff.tables import Columns, Table
-from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
+from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg, s_from_min
 
 Parsed = TypeVar("Parsed")
 
-
-LOOP_COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # of a measurement file, for loops beside the tip alone
-
-
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-
-
 POSITION = ("x_mm", "y_mm", "z_mm")
-
-
 ANGLES = ("a_deg", "b_deg", "c_deg")
-
-
 VECTOR = ("dx", "dy", "dz")
-
-
 LABELS = ("setup", "clamp", "repeat", "point", "loop")
-
-
-WIDE = tuple(f"measured_{axis}_N_per_mm" for axis in "xyz")
-
-
-WIDE_MODEL = tuple(f"modeled_{axis}_N_per_mm" for axis in "xyz")
-
-
+LOOP_COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # of loops beside the tip alone
 OPTIONAL = ("force_N", "sd_N_per_mm", *LABELS, "time_min", "tool_extension_mm", "temperature_C")
-
-
 COLUMNS = Columns(
     numbers=(
         *POSITION, *ANGLES, *VECTOR, "stiffness_N_per_mm", "displacement_um", "force_N", "sd_N_per_mm", "time_min",
-        "tool_extension_mm", "temperature_C", *LOOP_COLUMNS, *WIDE, *WIDE_MODEL,
+        "tool_extension_mm", "temperature_C", *LOOP_COLUMNS,
     ),
     texts=("direction", *LABELS, DATE),
 )  # fmt: skip
-
-
-KNOWN = (
-    *POSITION, *ANGLES, "direction", *VECTOR, "stiffness_N_per_mm", "displacement_um", *OPTIONAL, DATE,
-    *LOOP_COLUMNS,
-)  # fmt: skip
-
+KNOWN = (*COLUMNS.numbers, *COLUMNS.texts)
 
 # N/mm: no machine is softer than 0.1 N/um or stiffer than 10 kN/um; beyond, the unit is not N/mm.
 SOFTEST, STIFFEST = 1e2, 1e7
-
-
 BOUNDS = {
     **dict.fromkeys((*POSITION, "tool_extension_mm"), (-1e5, 1e5)),
     **dict.fromkeys(ANGLES, (-360.0, 360.0)),
-    **dict.fromkeys(("stiffness_N_per_mm", *WIDE), (SOFTEST, STIFFEST)),
+    "stiffness_N_per_mm": (SOFTEST, STIFFEST),
     "sd_N_per_mm": (1e-6, STIFFEST),
     "force_N": (1e-3, 1e7),
     "displacement_um": (1e-3, 1e6),
@@ -82,21 +51,9 @@ BOUNDS = {
     "strut_force_N": (-1e7, 1e7),
     "length_mm": (1.0, 1e5),
 }
-
-
 # Of a loop beside the tip, which may read nothing, or backwards.
 LOOP_BOUNDS = {"stiffness_N_per_mm": (-1e12, 1e12), "displacement_um": (-1e6, 1e6)}
-
-
 LEAST_FORCE = 1e-3  # N, of either sign
-
-
-SOFTEST_ALONE, STIFFEST_ALONE = 1e5, 1e10  # N/mm; beyond, the unit of a strut measured alone is wrong
-
-
-LIKE_DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
-
-
 AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be their quotient, rounding allowed
 
 
@@ -156,17 +113,8 @@ class Row:
         return not self.labels["loop"]
 
 
-@dataclass(frozen=True)
-class RowFile:
-    """Rows of a file, the known columns that it has, and what was not used, in words."""
-
-    rows: tuple[Row, ...]
-    columns: frozenset[str]
-    notes: tuple[str, ...]
-
-
-def read_rows(table: Table, planned: bool = False) -> RowFile:
-    """Rows of a measurement file.
+def read_rows(table: Table, planned: bool = False) -> tuple[list[Row], list[str]]:
+    """Rows of a measurement file; and what was not used, in words.
 
     Parameters
     ----------
@@ -182,29 +130,20 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
     InputErrors
         Bad rows, all of them.
     """
-    file, heading, line = table.file, list(table.heading), table.heading_line
-    if "" in heading:
-        raise MeasurementError("a column without a name", file=file, line=line)
-    long = {"direction", *VECTOR, "stiffness_N_per_mm", "displacement_um"}
-    if {*WIDE} & {*heading} and long & {*heading}:
-        fault = "columns of the wide layout beside those of the long one"
-        raise MeasurementError(fault, hint="use one of the two", file=file, line=line)
-    known = (*KNOWN, *WIDE, *WIDE_MODEL)
-    check_heading(table, known, _needed(heading, planned))
-    if not table.rows:
-        expected = "one row a measured stiffness"
-        raise MeasurementError("no rows below the heading", expected=expected, file=file, line=line)
-    further = [name for name in heading if name not in known and _all_numbers(table, heading.index(name))]
-    notes = [*table.notes]
-    notes += [f"{file}: column {name} holds text and is not used" for name in heading if name not in (*known, *further)]
-    if any(name in WIDE_MODEL for name in heading):
-        notes.append(f"{file}: the printed model values (modeled_x_N_per_mm and so on) are not used")
-    parsed, errors = parsed_rows(table, lambda line, record: _rows_of(record, further, file, line, planned))
-    rows = [row for rows in parsed for row in rows]
+    file, heading, line = table.file, table.heading, table.heading_line
+    check_needed(table, _needed(heading, planned), "one row a reading: x_mm,y_mm,z_mm,direction,stiffness_N_per_mm")
+    fault = "a column without a name" if "" in heading else "" if table.rows else "no rows below the heading"
+    if "direction" in heading and "dx" in heading:
+        fault = "two directions: direction, and dx,dy,dz"
+    if fault:
+        raise MeasurementError(fault, file=file, line=line)
+    further = [name for name in heading if name not in KNOWN and _all_numbers(table, heading.index(name))]
+    unused = [name for name in heading if name not in (*KNOWN, *further)]
+    rows, errors = parsed_rows(table, lambda line, record: _row(record, further, file, line, planned))
     errors += duplicates(rows)
     if errors:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
-    return RowFile(tuple(rows), frozenset(name for name in heading if name in KNOWN), tuple(notes))
+    return rows, [*table.notes, *(f"{file}: column {name} holds text and is not used" for name in unused)]
 
 
 def parsed_rows(table: Table, parse: Callable[[int, dict[str, str]], Parsed]) -> tuple[list[Parsed], list[InputError]]:
@@ -219,11 +158,9 @@ def parsed_rows(table: Table, parse: Callable[[int, dict[str, str]], Parsed]) ->
     return parsed, errors
 
 
-def _needed(heading: list[str], planned: bool) -> tuple[str, ...]:
-    """Columns that the layout of a heading needs: three angles and three components of a direction, or none."""
+def _needed(heading: Sequence[str], planned: bool) -> tuple[str, ...]:
+    """Columns that a heading needs: three angles and three components of a direction, or none."""
     groups = tuple(name for group in (ANGLES, VECTOR) if not {*group}.isdisjoint(heading) for name in group)
-    if not {*WIDE}.isdisjoint(heading):
-        return (*POSITION, *WIDE, *groups)
     bench = "loop" in heading  # a strut on a bench has neither place nor direction
     loaded = "displacement_um" in heading and ("force_N" in heading or "strut_force_N" in heading)
     return (
@@ -241,40 +178,31 @@ def _all_numbers(table: Table, column: int) -> bool:
         return False
 
 
-def _rows_of(record: Mapping[str, str], further: list[str], file: str, line: int, planned: bool) -> list[Row]:
-    """The one reading of a long row, the three of a wide one."""
+def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int, planned: bool) -> Row:
     loop = loop_of(record.get("loop", ""))
-    date = record.get(DATE, "")
-    day_of(date)  # refuses what is no date
+    day_of(record.get(DATE, ""))  # refuses what is no date
     # A strut on a bench has no pose.
     poseless = loop.kind == "alone" and not any(record.get(name) for name in (*POSITION, *ANGLES))
+    on_bench = poseless or (loop.kind == "alone" and bool(record.get("length_mm")))
+    undirected = on_bench and not record.get("direction", "Z" if VECTOR[0] in record else "")
     row = Row(
         position=(math.nan,) * 3 if poseless else tuple(m_from_mm(number(record, name)) for name in POSITION),
         angles=(math.nan,) * 3 if poseless else tuple(_angle(record, name) for name in ANGLES),
-        direction=(),
+        direction=AXES["Z"] if undirected else direction_of(record),
         force=optional_number(record, "force_N"),
         sd=n_per_m_from_n_per_mm(optional_number(record, "sd_N_per_mm")),
-        time=60.0 * optional_number(record, "time_min"),
+        time=s_from_min(optional_number(record, "time_min")),
         temperature=optional_number(record, "temperature_C"),
         tool_extension=m_from_mm(optional_number(record, "tool_extension_mm")),
         labels={name: record.get(name, "") for name in LABELS} | {"loop": "" if loop == TIP else str(loop)},
         file=file,
         line=line,
         extra={name: float(record[name]) for name in further},
-        date=date,
+        date=record.get(DATE, ""),
     )
     if loop != TIP:
-        on_bench = poseless or (loop.kind == "alone" and bool(record.get("length_mm")))
-        absent = on_bench and not record.get("direction", "Z" if VECTOR[0] in record else "")
-        return [
-            replace(_beside_tip(row, record, loop, planned), direction=AXES["Z"] if absent else direction_of(record))
-        ]
-    if WIDE[0] in record:
-        values = [number(record, name) for name in WIDE]
-        stiffnesses: list[tuple[tuple[float, ...], float]] = list(zip(AXES.values(), values, strict=True))
-    else:
-        stiffnesses = [(direction_of(record), _stiffness(record, row.force, planned))]
-    return [replace(row, direction=axis, stiffness=n_per_m_from_n_per_mm(value)) for axis, value in stiffnesses]
+        return _beside_tip(row, record, loop, planned)
+    return replace(row, stiffness=n_per_m_from_n_per_mm(_stiffness(record, row.force, planned)))
 
 
 def _angle(record: Mapping[str, str], name: str) -> float:
@@ -289,37 +217,35 @@ def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planne
     InputError
         There is no reading, or two that disagree, or one that cannot be.
     """
-    if record.get("sd_N_per_mm"):
-        raise MeasurementError(f"sd_N_per_mm in a row of loop {loop}", expected="sd_um, of displacement_um")
-    sd, own_force, length = (optional_number(record, name) for name in LOOP_COLUMNS)
-    stiffness, moved = (
-        number(record, name, bounds) if record.get(name) else math.nan for name, bounds in LOOP_BOUNDS.items()
-    )
-    if stiffness == 0.0:
-        raise MeasurementError("stiffness_N_per_mm = 0", expected="displacement_um, where a loop reads it")
     alone = loop.kind == "alone"
-    if not alone and not (math.isnan(own_force) and math.isnan(length)):
-        raise MeasurementError(f"strut_force_N or length_mm in a row of loop {loop}", expected="loop strut 1 alone")
+    sd, own_force, length = (optional_number(record, name) for name in LOOP_COLUMNS)
+    others = ("sd_N_per_mm",) if alone else ("sd_N_per_mm", "strut_force_N", "length_mm")
+    wrong = next((name for name in others if record.get(name)), "")
+    if wrong:
+        expected = "sd_um, of displacement_um" if wrong == "sd_N_per_mm" else "loop strut 1 alone"
+        raise MeasurementError(f"{wrong} in a row of loop {loop}", expected=expected)
     force = own_force if alone and not math.isnan(own_force) else row.force
     if abs(force) < LEAST_FORCE:
         raise MeasurementError(f"strut_force_N = {force:g}", expected="a force: tension positive, compression negative")
-    if math.isnan(moved) == math.isnan(stiffness) and not (planned and math.isnan(moved)):
-        both = "neither displacement_um nor" if math.isnan(moved) else "displacement_um and"
-        raise MeasurementError(f"loop {loop}: {both} stiffness_N_per_mm", expected="one of them")
-    if not math.isnan(moved) and math.isnan(force):
-        raise MeasurementError(f"loop {loop}: displacement_um without its load", expected="force_N")
+    stiffness, moved = (
+        number(record, name, bounds) if record.get(name) else math.nan for name, bounds in LOOP_BOUNDS.items()
+    )
+    empty = math.isnan(moved) and math.isnan(stiffness)
+    one_alone = math.isnan(moved) != math.isnan(stiffness) and stiffness != 0.0
+    if not (one_alone or (planned and empty)) or (math.isnan(force) and not math.isnan(moved)):
+        raise MeasurementError(
+            f"loop {loop}: no reading", expected="displacement_um with force_N, or else stiffness_N_per_mm, not 0"
+        )
     compliance = m_from_um(moved) / force if math.isnan(stiffness) else 1e-3 / stiffness
     # A sign of the direction turns what does not read along the load.
     if record.get("direction", "").startswith("-") and not (loop.along_load or alone):
         compliance = -compliance
-    if alone and not (planned or 1.0 / STIFFEST_ALONE <= compliance <= 1.0 / SOFTEST_ALONE):
-        raise MeasurementError(
-            f"loop {loop}: {1e9 * compliance:.4g} nm/N",
-            expected=f"{1e9 / STIFFEST_ALONE:g} to {1e9 / SOFTEST_ALONE:g} nm/N; longer under tension is positive",
-        )
-    size, side = abs(force), math.copysign(1.0, force)
-    sd = m_from_um(sd) / size
-    return replace(row, force=size, sd=sd, compliance=compliance, length=1e-3 * length, side=side)
+    if alone and not (planned or 1e-3 / STIFFEST <= compliance <= 1e-3 / SOFTEST):
+        expected = f"{1e6 / STIFFEST:g} to {1e6 / SOFTEST:g} nm/N; longer under tension is positive"
+        raise MeasurementError(f"loop {loop}: {1e9 * compliance:.4g} nm/N", expected=expected)
+    sd = m_from_um(sd) / abs(force)
+    side = math.copysign(1.0, force)
+    return replace(row, force=abs(force), sd=sd, compliance=compliance, length=m_from_mm(length), side=side)
 
 
 def _stiffness(record: Mapping[str, str], force: float, planned: bool) -> float:
@@ -329,15 +255,10 @@ def _stiffness(record: Mapping[str, str], force: float, planned: bool) -> float:
     quotient = force / (displacement / 1e3)  # N/mm
     if math.isnan(printed) and math.isnan(quotient) and not planned:
         raise MeasurementError("no stiffness", expected="stiffness_N_per_mm, or force_N and displacement_um")
-    if abs(quotient - printed) > AGREEMENT * printed:
+    if abs(quotient - printed) > AGREEMENT * printed or quotient < SOFTEST or quotient > STIFFEST:
         raise MeasurementError(
-            f"stiffness {printed:g} N/mm, but force over displacement is {quotient:.6g} N/mm",
-            hint="correct one of them or leave one out",
-        )
-    if not math.isnan(quotient) and not SOFTEST <= quotient <= STIFFEST:
-        raise MeasurementError(
-            f"{force:g} N over {displacement:g} um is {quotient:.4g} N/mm",
-            expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm; is the unit right?",
+            f"{force:g} N over {displacement:g} um, force over displacement, is {quotient:.6g} N/mm",
+            expected=f"the stiffness that is given, {SOFTEST:g} to {STIFFEST:g} N/mm; is the unit right?",
         )
     return quotient if math.isnan(printed) else printed
 
@@ -368,12 +289,10 @@ def number(record: Mapping[str, str], name: str, bounds: tuple[float, float] | N
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        dated = "the spreadsheet has made a date of it" if LIKE_DATE.match(text) else ""
-        raise MeasurementError(f"{name} = {text!r}", expected="a finite number", hint=dated)
+        raise MeasurementError(f"{name} = {text!r}", expected="a finite number, without thousands separators")
     low, high = bounds or BOUNDS.get(name, (-math.inf, math.inf))
     if not low <= value <= high:
-        doubt = "; is the unit right?" if value > 0.0 else ""
-        raise MeasurementError(f"{name} = {text}", expected=f"{low:g} to {high:g}{doubt}")
+        raise MeasurementError(f"{name} = {text}", expected=f"{low:g} to {high:g}; is the unit right?")
     return value
 
 

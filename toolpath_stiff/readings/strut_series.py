@@ -135,6 +135,13 @@ class Change(NamedTuple):
     slope: float | None = None
 
 
+def chance_of_t(ratio: float, freedom: float) -> float:
+    """Probability that Student's |t| is so large by chance."""
+    from scipy.special import stdtr
+
+    return 2.0 * float(stdtr(freedom, -ratio))
+
+
 def series_of(readings: StrutReadings) -> list[Series]:
     """One a strut; where tension and compression never share a date, one a side."""
     series = []

@@ -1,39 +1,30 @@
-"""The text of `tps check`, with its tables of tools and operations: plain text, at most 98 columns."""
+"""The text of `tps check`, with its tables of tools and operations: plain text, at most 100 columns."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from toolpath_stiff.analysis.program_check import Figures, OperationRow, ProgramCheck, ToolRow
-from toolpath_stiff.report.words import aligned, duration, first_column_fitted, plain
+from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.words import duration
 from toolpath_stiff.units import number
 
-INDENT = 2  # columns to the left of the tables
 MOST_ROWS = 40  # all are in --json
-CHECK_FIGURES = ("cutting mm", "time", "X", "Y", "Z")
+FIGURES = (">cutting mm", ">time", ">X", ">Y", ">Z")
 
 
-def check_tables(tools: Sequence[ToolRow], operations: Sequence[OperationRow]) -> list[str]:
+def _by_part(tools: Sequence[ToolRow], operations: Sequence[OperationRow]) -> list[str]:
     """One row a tool that cuts, one row an operation, with the extents of the cuts; no table of a single row."""
-    shown = operations[:MOST_ROWS]
-    digits = len(str(len(shown)))
-    by_tool = [[f"{_tool(row.tool)} {plain(row.remark)}".rstrip(), *_figures(row)] for row in tools if row.extents_mm]
+    digits = len(str(min(len(operations), MOST_ROWS)))
+    by_tool = [(f"{_tool(row.tool)} {row.remark}", *_figures(row)) for row in tools if row.extents_mm]
     by_operation = [
-        [
-            f"{row.operation:>{digits}} {plain(row.name)}",
-            _tool(row.tool),
-            f"{row.first_line}-{row.last_line}",
-            *_figures(row),
-        ]
-        for row in shown
+        (f"{row.operation:>{digits}} {row.name}", _tool(row.tool), f"{row.first_line}-{row.last_line}", *_figures(row))
+        for row in operations[:MOST_ROWS]
     ]
-    tables: list[str] = []
-    for head, rows in ((["tool"], by_tool), (["operation", "tool", "lines"], by_operation)):
-        if len(rows) > 1:
-            tables += aligned(first_column_fitted([[*head, *CHECK_FIGURES], *rows], INDENT))
-    if len(operations) > MOST_ROWS:
-        tables.append(f"and {len(operations) - MOST_ROWS} more operations in --json")
-    return tables
+    tables = [Table(("tool", *FIGURES), by_tool), Table(("operation", ">tool", ">lines", *FIGURES), by_operation)]
+    lines = [line for table in tables if len(table.rows) > 1 for line in table.lines(indent=2)]
+    more = len(operations) - MOST_ROWS
+    return lines + ([f"  and {more} more operations in --json"] if more > 0 else [])
 
 
 def _tool(number: int) -> str:
@@ -72,7 +63,6 @@ def text(check: ProgramCheck) -> str:
     if speed:
         lengths.append(f"fastest strut in a cut: {speed['mm_per_min']:.0f} mm/min, line {speed['line']}")
     ignored = [f"{word.code:<7} {word.line}:{word.column}  {word.text}" for word in check.unsupported]
-    by_part = "extents of cuts in mm, by tool and operation"
     sections = {
         "findings": findings or ["none"],
         "not acted upon": ignored or ["nothing"],
@@ -81,12 +71,12 @@ def text(check: ProgramCheck) -> str:
         ],
         "extents of cuts": extents,
         "lengths and times": lengths,
-        by_part: check_tables(check.tools, check.operations),
+        "extents of cuts in mm, by tool and operation": _by_part(check.tools, check.operations),
         "modal state at the start, at the end": [
             f"{key:<18} {value:<10} {check.modal_end[key]}" for key, value in check.modal_start.items()
         ],
     }
     for title, rows in sections.items():
-        if rows or title != by_part:
-            lines += [f"\n{title}:", *(f"  {row}" for row in rows)]
+        if rows:
+            lines += [f"\n{title}:", *(f"  {row.removeprefix('  ')}" for row in rows)]
     return "\n".join(lines) + "\n"

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from toolpath_stiff.report.tables import Table
+
 if TYPE_CHECKING:
     from toolpath_stiff.stiffness.catalogue import EffectCatalogue
     from toolpath_stiff.stiffness.contract import Effect, Parameter
     from toolpath_stiff.stiffness.trial import EffectCheck
 
+WIDE = 1000  # columns: names of parameters are not cut
 TRIAL_WORDS = {True: "good", False: "FAILS", None: "note"}
 
 
@@ -42,12 +45,11 @@ def _plain(value: object) -> object:
 
 def text(catalogue: EffectCatalogue) -> str:
     """One line an effect: link, name, title, parameters with their units; then the plug-ins that do not load."""
-    rows = [("link", "name", "title", "parameters")]
+    rows = []
     for effect in catalogue.effects:
         parameters = ", ".join(f"{p.name} ({p.unit})" if p.unit else p.name for p in effect.parameters)
         rows.append((effect.link, effect.name, effect.title, parameters or "-"))
-    widths = [max(len(row[i]) for row in rows) for i in range(4)]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    lines = Table(("link", "name", "title", "parameters"), rows).lines(least=0, width=WIDE)
     if catalogue.broken:
         lines += ["", "plug-ins that do not load:"]
         lines += [f"  {name}: {reason}" for name, reason in catalogue.broken.items()]

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from markupsafe import Markup
-
-from toolpath_stiff.report.pages import markup, section, table
+from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import plain
 
 if TYPE_CHECKING:
     from toolpath_stiff.comparison.loop_readings import BesideTip
-
+    from toolpath_stiff.report.pages import Section
 
 MOST_ROWS = 40  # on a page; all are in the document
+REMARK = (
+    "Displacement between the indicator's two points per load at the tip; of a strut alone, per force in it. By loop "
+    "in the mean, counted in the direction in which the struts of the machine file would move it."
+)
 
 
-def loops_section(loops: BesideTip) -> list[Markup]:
-    """The section of a page, by loop, then reading by reading; none without such readings."""
-    if not loops.by_loop:
-        return []
+def loops_section(loops: BesideTip) -> Section:
+    """The section of a page, by loop, then reading by reading."""
     means = [
         (
             mean.loop,
-            str(mean.readings),
+            mean.readings,
             f"{mean.read_nm_per_N:.2f}",
             f"{mean.model_nm_per_N:.2f}",
             f"{mean.off_nm_per_N:+.2f} +- {mean.sd_nm_per_N:.2f}",
@@ -43,18 +43,13 @@ def loops_section(loops: BesideTip) -> list[Markup]:
         )
         for reading in loops.readings[:MOST_ROWS]
     ]
-    head = ("loop", "readings", "read, nm/N", "modelled, nm/N", "off, nm/N", "standard deviations")
-    titles = ("line", "loop", "direction", "point", "read, nm/N", "modelled, nm/N", "standard deviations")
-    remark = (
-        "Displacement between the indicator's two points per load at the tip; of a strut alone, per force in it. By "
-        "loop in the mean, counted in the direction in which the struts of the machine file would move it."
-    )
-    body = table(head, [("", row) for row in means], range(1, 6)) + markup('<p class="muted">{}</p>', remark)
-    return [section("Indicators beside the tip", body + table(titles, [("", row) for row in readings], (4, 5, 6)))]
+    figures = (">read, nm/N", ">modelled, nm/N")
+    by_loop = Table(("loop", ">readings", *figures, ">off, nm/N", ">standard deviations"), means)
+    each = Table(("line", "loop", "direction", "point", *figures, ">standard deviations"), readings)
+    return "Indicators beside the tip", by_loop, REMARK if means else "", each
 
 
 def loops_text(loops: BesideTip) -> list[str]:
     """Lines for the terminal; none without such readings."""
-    return (
-        ["", "indicators beside the tip", *(f"  {plain(mean.text)}" for mean in loops.by_loop)] if loops.by_loop else []
-    )
+    lines = [f"  {plain(mean.text)}" for mean in loops.by_loop]
+    return ["", "indicators beside the tip", *lines] if lines else []

@@ -1,4 +1,4 @@
-"""Pages: templates, style sheets and scripts from `assets/`, and the parts that several pages have.
+"""Pages: a list of sections below a head, put into the templates of `assets/`.
 
 A page is one file that loads nothing. Whatever is put into a template is escaped and cleared of control characters
 unless it is `Markup`; a content security policy lets nothing run but the page's own script.
@@ -11,6 +11,7 @@ import hashlib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,26 +20,124 @@ from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.hints import parted
-from toolpath_stiff.report.figure import Drawing
+from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import counted, machine_text, plain
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-
 DATA = Markup("<data>")  # where the data of a page go; what is not `Markup` has no such letters in a page
-
-
 LONG_LIST = 20_000  # entries
 
 
-Row = tuple[str, Sequence[str]]  # class of the row, its cells: text, or `Markup`
+class Drawing(bytes):
+    """A picture as PNG, and the same as SVG to stand in a page; "" where that would be too large."""
+
+    svg: str = ""
+
+
+@dataclass(frozen=True)
+class Hints:
+    """Sentences of a section, the command of each set as one, to be copied."""
+
+    texts: Sequence[str]
+
+
+# Of a section: a table, a list of sentences, a remark, or HTML.
+Part = Table | Hints | Sequence[object] | str | Markup
+Section = tuple[str, *tuple[Part, ...]] | str  # its title and its parts; or a picture's file name
+
+
+@dataclass(frozen=True)
+class Head:
+    """What stands above the sections; `figures`: the few that say it all, each with what it is."""
+
+    title: str
+    verdict: str
+    headline: str
+    text: str
+    about: Sequence[str]
+    figures: Sequence[tuple[str, str]]
+    warnings: Sequence[str]
+    footer: str
+    verdict_class: str = ""
+
+
+def page_of(
+    head: Head,
+    sections: Iterable[Section],
+    drawn: Mapping[str, Drawing],
+    questions: Mapping[str, tuple[str, str]],
+) -> str:
+    """A page of sections below each other; what has nothing to show is left out.
+
+    Parameters
+    ----------
+    head
+        What stands above them.
+    sections
+        In their order.
+    drawn
+        The pictures by file name.
+    questions
+        Picture -> the question that it answers, and how it is read.
+    """
+    shown = (
+        _picture(part, drawn, questions) if isinstance(part, str) else _section(part[0], part[1:]) for part in sections
+    )
+    values = {**vars(head), "about": "   ·   ".join(filter(None, head.about))}
+    return "".join(render("sections.html", styles=["sections.css"], sections=[*filter(None, shown)], **values))
+
+
+def readings_head(
+    command: str, document: Mapping[str, Any], verdict: str, headline: str, figures: Sequence[tuple[str, str]]
+) -> Head:
+    """The head of a page on readings: text, data, machine, warnings and seed are those of its document."""
+    files = ", ".join(document["data"])
+    return Head(
+        title=f"{command.capitalize()}: {files}",
+        verdict=verdict,
+        headline=headline,
+        text=document["text"],
+        about=[counted(document["readings"], "reading"), files, f"machine {machine_text(document)}"],
+        figures=figures,
+        warnings=document["warnings"],
+        footer=f"tps {command}, seed {document['seed']}",
+    )
+
+
+def _section(title: str, parts: Iterable[Part]) -> Markup:
+    body = Markup().join(map(part, parts))
+    return _macro("section", title, body) if body else Markup()
+
+
+def part(content: Part) -> Markup:
+    """A part of a section; nothing where it has nothing to show."""
+    if isinstance(content, Table):
+        kinds = content.kinds or [""] * len(content.rows)
+        rows = [*zip(kinds, content.rows, strict=True)]
+        return _macro("table", content.titles, rows, content.right) if rows else Markup()
+    if isinstance(content, Hints):
+        return _macro("hints", [parted(str(text)) for text in content.texts]) if content.texts else Markup()
+    if isinstance(content, Markup):
+        return content
+    if isinstance(content, str):
+        return markup('<p class="muted">{}</p>', content) if content else Markup()
+    return _macro("bullets", content) if content else Markup()
+
+
+def _picture(name: str, drawn: Mapping[str, Drawing], questions: Mapping[str, tuple[str, str]]) -> Markup:
+    """A picture under the question that it answers, with how it is read; nothing where it was not drawn."""
+    if not (picture := drawn.get(name)):
+        return Markup()
+    shown = Markup(picture.svg) or base64.b64encode(picture).decode("ascii")
+    return _macro("picture", *questions[name], shown, bool(picture.svg))
 
 
 def render(
     template: str, *, styles: Sequence[str] = (), scripts: Sequence[str] = (), data: Any = None, **values: Any
-) -> str:
-    """A page.
+) -> Iterator[str]:
+    """A page in pieces: the data of a long program are most of it, and stand in memory once.
 
     Parameters
     ----------
@@ -53,13 +152,6 @@ def render(
     values
         What the template names.
     """
-    return "".join(render_pieces(template, styles=styles, scripts=scripts, data=data, **values))
-
-
-def render_pieces(
-    template: str, *, styles: Sequence[str] = (), scripts: Sequence[str] = (), data: Any = None, **values: Any
-) -> Iterator[str]:
-    """The same in pieces: the data of a long program are most of a page, and stand in memory once."""
     script = '\n"use strict";\n(() => {\n' + "".join(asset(file) for file in scripts) + "})();\n" if scripts else ""
     text = _templates().get_template(template).render(
         style=Markup("".join(asset(file) for file in ("page.css", *styles))),
@@ -91,6 +183,12 @@ def _shown(value: object) -> object:
     return value if isinstance(value, Markup) else plain(str(value))
 
 
+def _macro(name: str, *values: object) -> Markup:
+    """What a macro of `parts.html` makes."""
+    html: Markup = getattr(_templates().get_template("parts.html").module, name)(*values)
+    return html
+
+
 def asset(name: str) -> str:
     """Text of a file in `assets/`."""
     return Path(__file__).with_name("assets").joinpath(name).read_text(encoding="utf-8")
@@ -101,13 +199,11 @@ def script_hash(script: str) -> str:
     return "sha256-" + base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
-def json_for_script(value: Any) -> str:
-    """JSON that can stand inside a script element: nothing in it ends the element, or a line of JavaScript."""
-    return "".join(json_pieces(value))
-
-
 def json_pieces(value: Any) -> Iterator[str]:
-    """The text of `json_for_script` in pieces: the values of an object and the entries of a long list one by one."""
+    """JSON that can stand inside a script element: nothing in it ends the element, or a line of JavaScript.
+
+    In pieces: the values of an object and the entries of a long list one by one.
+    """
     if isinstance(value, dict) and value:
         before = "{"
         for key, entry in value.items():
@@ -137,74 +233,4 @@ def _json(value: Any) -> str:
 
 def markup(template: str, *values: object) -> Markup:
     """A bit of HTML with values in the place of {}: as a template, for what is smaller than one."""
-    return Markup(template).format(*(_shown(value) for value in values))
-
-
-def _part(name: str, *values: object) -> Markup:
-    """What a macro of `parts.html` makes."""
-    html: Markup = getattr(_templates().get_template("parts.html").module, name)(*values)
-    return html
-
-
-def section(title: str, body: Markup) -> Markup:
-    """A titled section; nothing where there is no body."""
-    return _part("section", title, body) if body else Markup()
-
-
-def bullets(sentences: Sequence[object]) -> Markup:
-    """A list; nothing without sentences."""
-    return _part("bullets", sentences) if sentences else Markup()
-
-
-def hint_list(hints: Sequence[object]) -> Markup:
-    """As `bullets`, a hint's command set as one, to be copied."""
-    return _part("hints", [parted(str(text)) for text in hints]) if hints else Markup()
-
-
-def picture(name: str, pictures: Mapping[str, bytes | str], questions: Mapping[str, tuple[str, str]]) -> Markup:
-    """A picture under the question that it answers, with how it is read; nothing where it was not drawn."""
-    content = pictures.get(name)
-    if not isinstance(content, bytes):
-        return Markup()
-    drawn = isinstance(content, Drawing)
-    shown = Markup(content.svg) if isinstance(content, Drawing) else base64.b64encode(content).decode("ascii")
-    return _part("picture", *questions[name], shown, drawn)
-
-
-def table(head: Sequence[str], rows: Sequence[Row], numeric: Iterable[int] = ()) -> Markup:
-    """A table; the columns `numeric` are aligned to the right. Nothing without rows."""
-    return _part("table", head, rows, list(numeric)) if rows else Markup()
-
-
-def readings_page(
-    title: str, command: str, document: Mapping[str, Any], verdict: str, headline: str,
-    figures: Iterable[tuple[str, str]], sections: Iterable[Markup],
-) -> str:  # fmt: skip
-    """The page of a result on readings: text, data, machine, warnings and seed are those of its document."""
-    files = ", ".join(document["data"])
-    return page(
-        title=f"{title}: {files}",
-        verdict=verdict,
-        headline=headline,
-        text=document["text"],
-        about=[counted(document["readings"], "reading"), files, f"machine {machine_text(document)}"],
-        figures=figures,
-        warnings=document["warnings"],
-        sections=sections,
-        footer=f"tps {command}, seed {document['seed']}",
-    )
-
-
-def page(
-    title: str, verdict: str, headline: str, text: str, about: Sequence[str], figures: Iterable[tuple[str, str]],
-    warnings: Sequence[str], sections: Iterable[Markup], footer: str, verdict_class: str = "",
-) -> str:  # fmt: skip
-    """A page of sections below each other; `sections` are HTML, the others text.
-
-    `figures`: the few that say it all, each with what it is.
-    """
-    return render(
-        "sections.html", styles=["sections.css"], title=title, verdict=verdict, headline=headline, text=text,
-        about="   ·   ".join(part for part in about if part), figures=list(figures), warnings=warnings,
-        sections=[part for part in sections if part], footer=footer, verdict_class=verdict_class,
-    )  # fmt: skip
+    return Markup(template).format(*map(_shown, values))

@@ -10,9 +10,11 @@ from typing import Any
 from toolpath_stiff.stiffness.model import machine_words
 from toolpath_stiff.units import number
 
+WIDTH = 100  # columns of the terminal
 # The sign of every residual that is shown, for axes and legends.
 DEVIATION = "(measured - modelled) / modelled"
 MINUS_IS_SOFTER = "minus: softer than modelled"
+RESIDUAL_AXIS = f"{DEVIATION}, %; {MINUS_IS_SOFTER}"
 
 
 def counted(count: float, thing: str) -> str:
@@ -61,12 +63,7 @@ def machine_text(document: Mapping[str, Any]) -> str:
     return plain(machine_words(document))
 
 
-WIDTH = 100
-LABEL = 14  # columns of the left-hand words
-LEAST_NAME = 24  # columns for the number and name of an operation, however wide the figures are
-
-
-def labelled(label: str, text: str, column: int = LABEL) -> list[str]:
+def labelled(label: str, text: str, column: int) -> list[str]:
     """An entry of a list on the terminal, wrapped and indented; the label is `column` wide."""
     return textwrap.wrap(
         plain(text),
@@ -75,22 +72,3 @@ def labelled(label: str, text: str, column: int = LABEL) -> list[str]:
         subsequent_indent=" " * (column + 2),
         break_on_hyphens=False,
     )
-
-
-def first_column_fitted(rows: list[list[str]], indent: int = 0) -> list[list[str]]:
-    """The same with the first column cut to what the others and `indent` leave, but not below `LEAST_NAME`."""
-    room = WIDTH - indent - sum(2 + max(len(row[i]) for row in rows) for i in range(1, len(rows[0])))
-    return [[shortened(row[0], max(room, LEAST_NAME)), *row[1:]] for row in rows]
-
-
-def aligned(rows: list[list[str]], left_last: bool = False) -> list[str]:
-    """Align: the first column (and the last, if asked) to the left, the others to the right."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    widths[0] = max(widths[0], LABEL)
-    left = {0, len(widths) - 1} if left_last else {0}
-    return [
-        "  ".join(
-            f"{c:<{w}}" if i in left else f"{c:>{w}}" for i, (c, w) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()[:WIDTH]
-        for row in rows
-    ]

@@ -7,8 +7,8 @@ import json
 from importlib import resources
 
 from toolpath_stiff.defaults import VERSION
-from toolpath_stiff.report.figure import page_colours
-from toolpath_stiff.report.pages import asset, json_for_script, script_hash
+from toolpath_stiff.report.colours import page_colours
+from toolpath_stiff.report.pages import asset, json_pieces, script_hash
 from toolpath_stiff.studio.picture import document
 from toolpath_stiff.studio.session import Session
 
@@ -25,7 +25,7 @@ def page() -> str:
 
 def exported(session: Session) -> str:
     """The case as one file that needs neither the studio nor a network."""
-    return _document(json_for_script(document(session)), "", f"{session.name}: a case of toolpath_stiff")
+    return _document("".join(json_pieces(document(session))), "", f"{session.name}: a case of toolpath_stiff")
 
 
 def _document(state: str, connect: str, title: str) -> str:

@@ -9,16 +9,17 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 from urllib.parse import quote
 
 from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
+from toolpath_stiff.documents import Document
 from toolpath_stiff.files import Content
+from toolpath_stiff.report.analysis import ONLY_PLUNGES
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, good_and_failed, summary_csv
 from toolpath_stiff.report.batch.programs import RESERVED
-from toolpath_stiff.report.figure_words import ONLY_PLUNGES
 from toolpath_stiff.report.pages import markup, render
 from toolpath_stiff.report.words import counted, duration, plain, shortened
 from toolpath_stiff.units import number
@@ -28,8 +29,6 @@ TEXT = 40  # characters of a program's line that are shown
 TICKS = 5  # of the scale, about
 MOST_LABELS = 4  # on the scale, or they would touch on a narrow page
 DRAWN = ("min_N_per_mm", "max_N_per_mm", "required_N_per_mm", "compare_mean_N_per_mm")
-PLUNGES = ("plunge_min_N_per_mm", "plunge_max_N_per_mm")
-PLUNGES_ASIDE = "Plunges along the tool axis have a column of their own; bars and scale are of all other cuts."
 PLUNGES_HINT = "mean of the cuts along the tool axis, which the other figures leave out unless nothing else is cut"
 BELOW = "lines below the required stiffness"
 OTHER_MEAN, CHANGE = "mean on the other machine, N/mm", "how much higher the mean is on the other machine"
@@ -44,7 +43,7 @@ def batch_page(outcomes: Sequence[ProgramOutcome]) -> str:
     good, failed = good_and_failed(outcomes)
     every = counted(len(outcomes), "program")
     table = _table(good)
-    return render(
+    pieces = render(
         "batch.html",
         styles=["sections.css", "batch.css"],
         scripts=["batch.js"] if table else [],
@@ -60,6 +59,7 @@ def batch_page(outcomes: Sequence[ProgramOutcome]) -> str:
         footer=f"toolpath_stiff {VERSION}. Stiffness is that of the tool tip along the load.",
         verdict_class="unexplained" if failed else "",
     )
+    return "".join(pieces)
 
 
 def _headline(good: Sequence[ProgramOutcome]) -> str:
@@ -108,33 +108,26 @@ class StiffnessScale:
     ticks: tuple[float, ...]
     required: float | None
 
-    def at(self, value: float) -> str:
+    def at(self, value: float) -> float:
         """Place of a value, in percent of the width."""
-        return f"{100.0 * (value - self.low) / (self.high - self.low):.2f}%"
+        return 100.0 * (value - self.low) / (self.high - self.low)
 
     def line(self, value: float, kind: str, ends: tuple[int, int] = (0, 22)) -> str:
         """A line at a value."""
-        x = self.at(value)
+        x = f"{self.at(value):.2f}%"
         return f'<line class="{kind}" x1="{x}" x2="{x}" y1="{ends[0]}" y2="{ends[1]}"/>'
 
-    def span(self, low: float, high: float, kind: str) -> str:
-        """A bar from value to value."""
-        left, right = self.at(low), self.at(high)
-        width = f"{max(float(right[:-1]) - float(left[:-1]), 0.4):.2f}%"
-        return f'<rect class="{kind}" x="{left}" width="{width}" y="6" height="10" rx="2"/>'
 
-
-def _scale(good: Sequence[ProgramOutcome], with_plunges: bool = False) -> StiffnessScale | None:
+def _scale(good: Sequence[ProgramOutcome]) -> StiffnessScale | None:
     """A scale that holds the bars and the required level; None where there is no bar.
 
-    Programs that only plunge set it if there are no others, or `with_plunges`, as the plunges of all then do.
+    Programs that only plunge set it if there are no others.
     """
     known = [outcome for outcome in good if outcome.figure("min_N_per_mm") is not None]
     if not known:
         return None
     across = [outcome for outcome in known if not outcome.plunges_only]
-    names = (*DRAWN, *PLUNGES) if with_plunges else DRAWN
-    ends = [outcome.figure(name) for outcome in (good if with_plunges or not across else across) for name in names]
+    ends = [outcome.figure(name) for outcome in across or known for name in DRAWN]
     values = [float(end) for end in ends if end is not None]
     low, high = min(values), max(values)
     if high - low < 1e-6 * high:
@@ -142,30 +135,29 @@ def _scale(good: Sequence[ProgramOutcome], with_plunges: bool = False) -> Stiffn
     least = (high - low) / TICKS
     power = 10.0 ** math.floor(math.log10(least))
     step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least * (1.0 - 1e-9))
-    first, last = math.floor(low / step), math.ceil(high / step)
-    ticks = tuple(i * step for i in range(first, last + 1))
-    return StiffnessScale(first * step, last * step, ticks, good[0].figure("required_N_per_mm"))
+    ticks = tuple(i * step for i in range(math.floor(low / step), math.ceil(high / step) + 1))
+    return StiffnessScale(ticks[0], ticks[-1], ticks, good[0].figure("required_N_per_mm"))
 
 
 def _axis(scale: StiffnessScale) -> Markup:
     shown = scale.ticks[:: 1 if len(scale.ticks) <= MOST_LABELS else 2]
-    texts = "".join(f'<text x="{scale.at(tick)}" y="14">{number(tick)}</text>' for tick in shown)
+    texts = "".join(f'<text x="{scale.at(tick):.2f}%" y="14">{number(tick)}</text>' for tick in shown)
     return Markup(f'<svg height="18" aria-hidden="true">{texts}</svg>')  # numbers and words of our own
 
 
-def _bar(outcome: ProgramOutcome, scale: StiffnessScale, with_plunges: bool = False) -> Markup:
+def _bar(outcome: ProgramOutcome, scale: StiffnessScale) -> Markup:
     low, mean, high = (outcome.figure(f"{name}_N_per_mm") for name in ("min", "mean", "max"))
     lines = "".join(scale.line(tick, "tick") for tick in scale.ticks)
     if low is not None and (low > scale.high or high < scale.low):  # only plunges, and these are not on the scale
-        words = f"{number(low)} to {number(high)}"
-        end, text = ("end", f"{words} →") if low > scale.high else ("start", f"← {words}")
-        lines += f'<text class="beyond {end}" x="{"100%" if end == "end" else "0"}" y="15">{text}</text>'
+        words, above = f"{number(low)} to {number(high)}", low > scale.high
+        end, place, text = ("end", "100%", f"{words} →") if above else ("start", "0", f"← {words}")
+        lines += f'<text class="beyond {end}" x="{place}" y="15">{text}</text>'
     elif low is not None:
         kind = "span plunge" if outcome.plunges_only else "span"
-        lines += scale.span(low, high, f"{kind} below" if outcome.figure("lines_below_required") else kind)
+        kind += " below" if outcome.figure("lines_below_required") else ""
+        x, width = scale.at(low), max(scale.at(high) - scale.at(low), 0.4)
+        lines += f'<rect class="{kind}" x="{x:.2f}%" width="{width:.2f}%" y="6" height="10" rx="2"/>'
         lines += scale.line(mean, "mean", (3, 19))
-    if with_plunges and not outcome.plunges_only and (first := outcome.figure(PLUNGES[0])) is not None:
-        lines += scale.span(first, outcome.figure(PLUNGES[1]), "span plunge")
     if (other := outcome.figure("compare_mean_N_per_mm")) is not None:
         lines += scale.line(other, "other", (3, 19))
     if scale.required is not None:
@@ -173,11 +165,10 @@ def _bar(outcome: ProgramOutcome, scale: StiffnessScale, with_plunges: bool = Fa
     return Markup(f'<svg height="22" aria-hidden="true">{lines}</svg>')  # numbers and words of our own
 
 
-Cell = tuple[str, str | list[Markup]]  # what it is sorted by; what it shows, drawings without and with the plunges
+Cell = tuple[str, str]  # what it is sorted by, and what it shows
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """A heading (a line feed divides it), the class of its cells ("num" is also sorted as numbers), its cells.
 
     `hint` is more about it for whoever points at the heading.
@@ -206,20 +197,16 @@ def _sorted_by(outcome: ProgramOutcome, name: str) -> str:
     return "" if figure is None else repr(figure)
 
 
-def _table(good: Sequence[ProgramOutcome]) -> dict[str, Any] | None:
+def _table(good: Sequence[ProgramOutcome]) -> Document | None:
     """What the template makes the table of; None where there is nothing to draw."""
     scale = _scale(good)
     if scale is None:
         return None
     other = good[0].figure("compare_machine")
     plunging = any(outcome.figure("plunge_mean_N_per_mm") is not None for outcome in good)
-    beside = plunging and not all(outcome.plunges_only for outcome in good)
-    second = _scale(good, with_plunges=True) if beside else None
-    columns = [
+    columns: list[Column] = [
         Column("program", "", _link),
-        Column(
-            "", "bar", lambda outcome: ("", [_bar(outcome, scale), *([_bar(outcome, second, True)] if second else [])])
-        ),
+        Column("", "bar", lambda outcome: ("", _bar(outcome, scale))),
         _figure("min\nN/mm", "min_N_per_mm", "lowest on a cutting move"),
         _figure("mean\nN/mm", "mean_N_per_mm", "by cutting length"),
         _figure("max\nN/mm", "max_N_per_mm"),
@@ -234,25 +221,14 @@ def _table(good: Sequence[ProgramOutcome]) -> dict[str, Any] | None:
         _figure("out of\nreach", "out_of_reach_samples", "cutting samples that were left out", flag=True),
         _figure("warn-\nings", "warnings", "in the program's own report", flag=True),
     ]
-    return {
-        "how": f"{HOW_TO_READ} {PLUNGES_ASIDE}" if beside else HOW_TO_READ,
-        "key": _key(scale, other, beside),
-        "switch": beside,
-        "columns": columns,
-        "axes": [_axis(shown) for shown in (scale, second) if shown],
-        "rows": [[column.cell(outcome) for column in columns] for outcome in good],
-    }
-
-
-def _key(scale: StiffnessScale, other: str | None, plunging: bool) -> list[tuple[str, str]]:
-    """Kind of drawing and what it stands for."""
-    return [
+    key = [
         ("span", "lowest to highest, N/mm"),
         ("mean", "mean"),
         *([("other", f"mean on the other machine, {other}")] if other is not None else []),
         *([("required", "required"), ("span below", "below it somewhere")] if scale.required is not None else []),
-        *([("span plunge", "plunges along the tool axis")] if plunging else []),
     ]
+    rows = [[column.cell(outcome) for column in columns] for outcome in good]
+    return {"how": HOW_TO_READ, "key": key, "columns": columns, "axis": _axis(scale), "rows": rows}
 
 
 def _link(outcome: ProgramOutcome) -> Cell:
@@ -274,11 +250,6 @@ def _place(outcome: ProgramOutcome) -> Cell:
         return "", "-"
     text = plain(outcome.figure("weakest_text"))
     return repr(line), markup('{} <code title="{}">{}</code>', line, text, shortened(text, TEXT))
-
-
-def names() -> tuple[str, ...]:
-    """Names of the files that `files` makes."""
-    return INDEX, SUMMARY
 
 
 def files(outcomes: Sequence[ProgramOutcome]) -> dict[str, Content]:

@@ -9,7 +9,8 @@ from typing import Any
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.documents import Document
-from toolpath_stiff.report.figure_words import only_plunges
+from toolpath_stiff.report.analysis import only_plunges
+from toolpath_stiff.report.tables import Table
 from toolpath_stiff.report.words import WIDTH, counted, duration, plain, shortened
 from toolpath_stiff.units import number
 
@@ -105,10 +106,7 @@ class ProgramOutcome:
 
 def good_and_failed(outcomes: Sequence[ProgramOutcome]) -> tuple[list[ProgramOutcome], list[ProgramOutcome]]:
     """The programs that have figures, and those that failed."""
-    good, failed = (
-        [outcome for outcome in outcomes if bool(outcome.figures) is analyzed] for analyzed in (True, False)
-    )
-    return good, failed
+    return [outcome for outcome in outcomes if outcome.figures], [o for o in outcomes if not o.figures]
 
 
 def figures_of(summary: Document) -> Document:
@@ -150,7 +148,7 @@ def columns_of(outcomes: Sequence[ProgramOutcome]) -> dict[str, list[Any]]:
 def terminal_summary(outcomes: Sequence[ProgramOutcome]) -> str:
     """One line a program that was analyzed, then the failures with their reasons; at most 100 columns but for these."""
     good, failed = good_and_failed(outcomes)
-    lines = _program_table(good) if good else []
+    lines = _program_table(good).lines() if good else []
     plunging = [plain(outcome.name) for outcome in good if outcome.plunges_only]
     if plunging:
         lines += textwrap.wrap(f"figures of plunges, nothing else is cut: {', '.join(plunging)}", WIDTH)
@@ -168,29 +166,23 @@ def terminal_summary(outcomes: Sequence[ProgramOutcome]) -> str:
     return "\n".join(lines)
 
 
-def _program_table(good: Sequence[ProgramOutcome]) -> list[str]:
-    """Names and program text to the left, figures to the right."""
+def _program_table(good: Sequence[ProgramOutcome]) -> Table:
     compared = good[0].figure("compare_machine") is not None
-    heads = ["program", "cutting mm", "time", "mean N/mm", "min N/mm"]
-    rows = [[*heads, *(["other mean", "change"] if compared else []), "weakest line", ""]]
+    rows = []
     for outcome in good:
         change = outcome.figure("compare_mean_difference_percent")
-        shown = "-" if change is None else f"{change:+.1f} %"
         rows.append(
             [
-                shortened(plain(outcome.name), MOST_NAME),
+                shortened(outcome.name, MOST_NAME),
                 outcome.number("cutting_length_mm", 1),
                 duration(outcome.figure("time_s")),
                 outcome.number("mean_N_per_mm"),
                 outcome.number("min_N_per_mm"),
-                *([outcome.number("compare_mean_N_per_mm"), shown] if compared else []),
+                *([outcome.number("compare_mean_N_per_mm")] if compared else []),
+                *(["-" if change is None else f"{change:+.1f} %"] if compared else []),
                 outcome.number("weakest_line").replace(" ", ""),
-                plain(outcome.figure("weakest_text") or ""),
+                outcome.figure("weakest_text") or "",
             ]
         )
-    *widths, _ = (max(map(len, column)) for column in zip(*rows, strict=True))
-    lines = []
-    for name, *cells, text in rows:
-        middle = [f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True)]
-        lines.append(shortened("  ".join([f"{name:<{widths[0]}}", *middle, text]).rstrip(), WIDTH))
-    return lines
+    other = (">other mean", ">change") if compared else ()
+    return Table(("program", ">cutting mm", ">time", ">mean N/mm", ">min N/mm", *other, ">weakest line", ""), rows)

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.words import EXTENSIONS
 
-# Endings of NC programs and of nothing else: `.txt` is as often a note or a tool list.
-NC_ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min")
-
-
+# Endings of the files that a folder stands for: `.txt` is as often a note or a tool list.
+ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min", *EXTENSIONS)
 RESERVED = ("index.html", "summary.csv")  # what lies beside the report folders
 
 
@@ -74,20 +73,13 @@ def find_programs(arguments: Sequence[str | Found]) -> tuple[list[Found], list[F
     return list(programs.values()), counts
 
 
-def endings() -> tuple[str, ...]:
-    """Endings of the files that a folder stands for: NC programs, and cutter-location files."""
-    from toolpath_stiff.nc.words import EXTENSIONS
-
-    return NC_ENDINGS + EXTENSIONS
-
-
 def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
     """Programs in a folder and below it; hidden ones, and folders that are symbolic links, are not entered."""
 
     def refuse(error: OSError) -> None:
         raise InputError(f"cannot read folder {str(error.filename)!r}: {error.strerror}")
 
-    inside, others, known = [], Counter[str](), endings()
+    inside, others = [], Counter[str]()
     for place, folders, files in os.walk(folder, onerror=refuse):
         folders[:] = [name for name in folders if not name.startswith(".")]
         for name in files:
@@ -95,14 +87,14 @@ def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
             if name.startswith("."):
                 continue
             # A symbolic link that leads nowhere is a program that cannot be read; a pipe would wait for ever.
-            if path.suffix.lower() in known and (path.is_file() or (path.is_symlink() and not path.exists())):
+            if path.suffix.lower() in ENDINGS and (path.is_file() or (path.is_symlink() and not path.exists())):
                 inside.append(Found(str(path), path.relative_to(folder)))
             else:
                 others[path.suffix.lower()] += 1
     if not inside:
         raise InputError(
             f"no NC program in folder {folder!r}",
-            expected=f"files ending in {', '.join(known)}",
+            expected=f"files ending in {', '.join(ENDINGS)}",
             hint="name files with another ending themselves",
         )
     inside.sort(key=lambda program: [(_by_number(part), part) for part in program.inside.parts])
@@ -117,52 +109,25 @@ def _by_number(name: str) -> list[str | int]:
 def report_folders(programs: Sequence[Found]) -> list[Listed]:
     """A report folder for each program: its path as seen from the folder named, without the ending.
 
-    The ending stays where two programs differ in nothing else (`part.nc` and `part.tap`) or where one would lie within
-    the other (`part.nc` and `part/side.nc`). Where two would still be the same (`a/part.nc` and `b/part.nc`), as many
-    of the folders above as are needed come before. Capitals do not count: some file systems take `Part` for `part`.
+    Where two would be the same (`part.nc` and `part.tap`; capitals do not count) or one lie within another, all keep
+    their endings; where that is not enough, all have the folders above that they do not share; then they are numbered.
     """
-    files = [Path(os.path.abspath(program.file)) for program in programs]  # noqa: PTH100  (without `..`, links kept)
-    whole = [file.with_suffix("") for file in files]
-    while clashing := [i for i in _same_or_around(whole) if whole[i] != files[i]]:
-        for i in clashing:
-            whole[i] = files[i]
-    shown = [len(program.inside.parts) for program in programs]
-    # What each file was named by, steps upwards left out, comes before folders above the current one.
-    paths = [Path(os.path.normpath(program.file)) for program in programs]
-    named = [sum(part not in ("..", path.anchor) for part in path.parts) for path in paths]
-    while True:
-        folders, names = (
-            [Path(*path.parts[-n:]) for path, n in zip(paths, shown, strict=True)] for paths in (whole, files)
-        )
-        clashing = sorted({*_clashing(folders), *_same_or_around(names)})
-        longer = [i for i in clashing if shown[i] < named[i]]
-        longer = longer or [i for i in clashing if shown[i] < len(whole[i].parts) - 1]
-        if not longer:
+    files = [os.path.abspath(program.file) for program in programs]  # noqa: PTH100  (without `..`, links kept)
+    shared = os.path.commonpath([os.path.dirname(file) for file in files]) if files else ""  # noqa: PTH120
+    inside, below = [program.inside for program in programs], [Path(os.path.relpath(file, shared)) for file in files]
+    numbered = [Path(f"{number}-{path.name}") for number, path in enumerate(inside, 1)]
+    for paths, ending in ((inside, False), (inside, True), (below, False), (below, True), (numbered, True)):
+        folders = paths if ending else [path.with_suffix("") for path in paths]
+        if not _clash(folders) and not _clash(paths):
             break
-        for i in longer:
-            shown[i] += 1
     return [
-        Listed(program.file, name.as_posix(), folder)
-        for program, name, folder in zip(programs, names, folders, strict=True)
+        Listed(program.file, path.as_posix(), folder)
+        for program, path, folder in zip(programs, paths, folders, strict=True)
     ]
 
 
-def _same_or_around(paths: Sequence[Path]) -> list[int]:
-    """Which of the paths are another one's too, or hold another one."""
-    keys = [_program_key(path) for path in paths]
-    times = Counter(keys)
-    around = {key[:n] for key in keys for n in range(1, len(key))}
-    return [i for i, key in enumerate(keys) if times[key] > 1 or key in around]
-
-
-def _clashing(paths: Sequence[Path]) -> list[int]:
-    """Those, and the paths that lie within another one, or have a name that is kept for the overview."""
-    keys = [_program_key(path) for path in paths]
-    taken = set(keys)
-    within = {i for i, key in enumerate(keys) if any(key[:n] in taken for n in range(1, len(key)))}
-    reserved = {i for i, key in enumerate(keys) if key[0] in RESERVED}
-    return sorted({*_same_or_around(paths), *within, *reserved})
-
-
-def _program_key(path: Path) -> tuple[str, ...]:
-    return tuple(part.casefold() for part in path.parts)
+def _clash(paths: Sequence[Path]) -> bool:
+    """Whether two are the same, one lies within another, or one has a name that is kept for the overview."""
+    keys = [tuple(part.casefold() for part in path.parts) for path in paths]
+    above = {key[:n] for key in keys for n in range(1, len(key))}
+    return len(set(keys)) < len(keys) or any(key in above or key[0] in RESERVED for key in keys)

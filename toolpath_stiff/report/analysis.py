@@ -1,0 +1,266 @@
+"""The results of an analysis: what a terminal shows, tables, and names of files."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from toolpath_stiff.analysis.document import compare_summaries
+from toolpath_stiff.analysis.loads import PLUNGES_ONLY
+from toolpath_stiff.analysis.results import Analysis
+from toolpath_stiff.analysis.statistics import FIGURES, samples_csv, samples_parquet
+from toolpath_stiff.column_files import check_parquet
+from toolpath_stiff.documents import Document
+from toolpath_stiff.report.pages import markup
+from toolpath_stiff.report.tables import LABEL, Table
+from toolpath_stiff.report.words import WIDTH, duration, labelled, machine_text, shortened
+from toolpath_stiff.results import one_of
+from toolpath_stiff.units import number
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from toolpath_stiff.report.pages import Drawing
+
+# Who read a program, for headings (`Program.interpreter`).
+READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
+SOURCES = {"option": "as asked for", "program": "from the program", "default": "the machine's default"}
+TITLES = ("mean N/mm", "min N/mm", "max N/mm", "range N/mm", "deflection um")
+PLUNGES, ONLY_PLUNGES = "plunges N/mm", "only plunges"
+OPERATION = '<button type="button" class="operation" data-operation="{}">{}</button>'
+MOST_OPERATIONS = 12  # on the terminal; all are in summary.json
+MOST_ROWS = 200  # of any table
+
+
+def other_samples(table: str) -> tuple[str, ...]:
+    """The file of samples that is not written. Raises `InputError` where the format is unknown or not installed."""
+    if one_of("table", table, ("csv", "parquet")) == "parquet":
+        check_parquet()
+    return tuple(name for name in ("samples.csv", "samples.parquet") if not name.endswith(table))
+
+
+def page(analysis: Analysis, drawn: dict[str, Drawing], *, show_plunges: bool = False) -> Iterator[str]:
+    """The page, in pieces."""
+    from toolpath_stiff.report.analysis_page import page_pieces  # with numbers of a script, which a text needs not
+
+    return page_pieces(analysis, show_plunges)
+
+
+DATA = {"samples.csv": samples_csv, "samples.parquet": samples_parquet, "summary.json": Analysis.to_json}
+PAGE = "report.html"
+
+
+def text(analysis: Analysis) -> str:
+    """What the terminal shows: the figures, the other machine beside them, the lines below the required stiffness."""
+    summary = analysis.to_dict()
+    lines = [terminal_text(summary)]
+    if analysis.on_other is not None:
+        lines += comparison(summary, analysis.on_other.to_dict()).lines()
+    if "required" in summary and summary["required"]["below"]:
+        sentence, below = required(analysis)
+        lines += [sentence, *below.lines(2, 0)[1:]]
+    return "\n".join(lines)
+
+
+def terminal_text(summary: Document) -> str:
+    """The figures of one analysis, of its `summary.json`."""
+    tools, operations = tool_table(summary["per_tool"]), operation_table(summary["per_operation"], MOST_OPERATIONS)
+    lines = [line for label, words in facts(summary) for line in labelled(label, words, LABEL) or [label]]
+    if len(tools.rows) > 1:
+        lines += tools.columns("tool", "length mm", "cutting mm", *TITLES[:3], "remark").lines()
+        lines += _only_plunges(summary["per_tool"], [f"T{row['tool']}" for row in summary["per_tool"]])
+    if len(operations.rows) > 1:
+        lines += operations.columns("operation", "tool", "lines", "cutting mm", "time", *TITLES[:2], "in line").lines()
+        shown = summary["per_operation"][:MOST_OPERATIONS]
+        lines += _only_plunges(shown, [f"operation {row['operation']}" for row in shown])
+        lines += and_more(summary["per_operation"], MOST_OPERATIONS, "operations")
+    if count := len(summary["unsupported"]):
+        words = ", ".join(sorted({str(entry["word"]) for entry in summary["unsupported"]}))
+        lines += labelled("not acted upon", f"{count} words (in summary.json): {words}", LABEL)
+    lines += labelled("assumptions", f"{len(summary['assumptions'])}, listed in summary.json", LABEL)
+    return "\n".join(lines + [line for warning in summary["warnings"] for line in labelled("warning", warning, LABEL)])
+
+
+def facts(summary: Document) -> list[tuple[str, str]]:
+    """The figures of one analysis in words, each with its label."""
+    origin = [f"{axis}{value:.10g}" for axis, value in zip("XYZABC", summary["origin_mm_deg"], strict=True)]
+    origin = origin if any(summary["origin_mm_deg"][3:]) else origin[:3]
+    mean, low, high, span = (number(summary[name]) for name in FIGURES[:4])
+    cutting, rapid = (number(summary[f"{kind}_length_mm"], 1) for kind in ("cutting", "rapid"))
+    limit = f"nearest in line {summary['min_margin_line']}: {summary['min_margin_limit']}"
+    if summary["out_of_reach_samples"]:
+        limit += f"; {number(summary['out_of_reach_samples'])} cutting samples are out of reach and left out"
+    reader, posted = summary["interpreter"], summary["kinematics"]
+    return [
+        ("program", summary["program"]),
+        *([("read by", READERS[reader])] if reader != "builtin" else []),
+        *([("posted for", f"{posted}, tool tip and axis recovered")] if posted else []),
+        ("machine", machine_text(summary)),
+        ("load", f"{summary['load']}, {summary['force_N']:g} N"),
+        ("program zero", f"{' '.join(origin)} ({SOURCES.get(summary['origin_source'], summary['origin_source'])})"),
+        ("samples", f"{number(summary['samples'])}, at most {summary['step_mm']:g} mm apart"),
+        ("path", f"{cutting} mm cutting, {rapid} mm rapid, {duration(summary['time_s'])}"),
+        ("stiffness", f"mean {mean} N/mm, min {low}, max {high}, range {span} N/mm"),
+        *_plunges(summary),
+        *_band(summary),
+        *_weakest(summary["weakest"]),
+        ("limits", limit),
+        ("extrapolated", f"{summary['extrapolated_share']:.1%} of the cutting samples are outside the strut law"),
+    ]
+
+
+def _plunges(summary: Document) -> list[tuple[str, str]]:
+    """The plunges beside the headline figures, or that these are of plunges."""
+    if only_plunges(summary):
+        return [("plunges", "this program only plunges: every figure is of cuts along the tool axis")]
+    if (plunges := beside(summary)) is None:
+        return []
+    mean, low, high = (number(plunges[name]) for name in FIGURES[:3])
+    lowest = summary["min_N_per_mm"]
+    weaker = lowest is not None and plunges["min_N_per_mm"] < lowest
+    length = f"{number(plunges['length_mm'], 1)} mm in {number(plunges['moves'])} move{'s' * (plunges['moves'] != 1)}"
+    text = f"{length}: mean {mean} N/mm, min {low}, max {high}; not counted above"
+    return [("plunges", text + (", though weaker than all other cuts" if weaker else ""))]
+
+
+def _band(summary: Document) -> list[tuple[str, str]]:
+    """What the uncertainty of fitted parameters leaves open, where the machine file tells of it."""
+    if not (band := summary.get("parameter_uncertainty")):
+        return []
+    mean, lowest = (" to ".join(map(number, band[f"{name}_95_N_per_mm"])) for name in ("mean", "min"))
+    widest = f"line {band['largest_sd_line']} (sd {band['largest_sd_percent']:.1f} %)"
+    return [("95 % band", f"mean {mean}, min {lowest} N/mm, from the fitted parameters alone; widest on {widest}")]
+
+
+def _weakest(place: Document | None) -> list[tuple[str, str]]:
+    if place is None:
+        return [("weakest", "-")]
+    stiffness, text = number(place["stiffness_N_per_mm"]), shortened(place["text"], WIDTH - LABEL - 2)
+    where = f"{stiffness} N/mm in line {place['line']} at {position(place, 3)}"
+    return [("weakest", where), *([("", text)] if text else [])]
+
+
+def position(place: Document, decimals: int) -> str:
+    """The position of a weakest place, with the angles where there are any: "X10.00 Y0.00 Z-2.00"."""
+    axes = "xyzabc" if any(place[f"{axis}_deg"] for axis in "abc") else "xyz"
+    values = [place[f"{axis}_mm" if axis in "xyz" else f"{axis}_deg"] for axis in axes]
+    return " ".join(f"{axis.upper()}{value:.{decimals}f}" for axis, value in zip(axes, values, strict=True))
+
+
+def only_plunges(figures: Document) -> bool:
+    """True where the figures of a program, a tool or an operation are those of plunges, for it does nothing else."""
+    return bool(figures.get("headline") == PLUNGES_ONLY)
+
+
+def beside(figures: Document) -> Document | None:
+    """The plunges that the headline figures leave out; None where there are none, or where there is nothing else."""
+    plunges: Document | None = figures["plunges"]
+    return None if only_plunges(figures) else plunges
+
+
+def _only_plunges(parts: Sequence[Document], names: Sequence[str]) -> list[str]:
+    """A note on the parts whose figures are of plunges, where not all are."""
+    plunging = [name for part, name in zip(parts, names, strict=True) if only_plunges(part)]
+    if not plunging or len(plunging) == len(parts):
+        return []
+    return textwrap.wrap(f"{', '.join(plunging)}: figures of plunges, there is no other cut", WIDTH)
+
+
+def headline_text(figures: Document, between: str) -> str:
+    """Mean and range for a heading, and what they are about where that is not every cut; `between` the parts."""
+    span, plunges = "{} N/mm ({} to {})", beside(figures)
+    text = f"mean {span.format(*(number(figures[name]) for name in FIGURES[:3]))}"
+    if plunges is None:
+        return f"{text}, {ONLY_PLUNGES}" if only_plunges(figures) else text
+    return f"{text} across the tool axis{between}plunges {span.format(*(number(plunges[n]) for n in FIGURES[:3]))}"
+
+
+def _figures(figures: Document) -> list[str]:
+    """Mean, smallest, largest, range and deflection."""
+    return [number(figures[name], 2 if name.endswith("_um") else 0) for name in FIGURES]
+
+
+def _part_figures(row: Document) -> tuple[object, ...]:
+    """Length, time, stiffness, plunges beside it and weakest place of a tool or an operation."""
+    place, plunges = row["weakest"] or {"line": "-", "text": ""}, beside(row) or {}
+    return (
+        number(row["cutting_length_mm"], 1),
+        duration(row["time_s"]),
+        *_figures(row),
+        ONLY_PLUNGES if only_plunges(row) else number(plunges.get("mean_N_per_mm")),
+        place["line"],
+        markup('<code class="cut">{}</code>', shortened(place["text"], 26)),
+    )
+
+
+PART_TITLES = (">cutting mm", ">time", *(f">{title}" for title in (*TITLES, PLUNGES, "in line")), "weakest")
+
+
+def tool_table(per_tool: Sequence[Document]) -> Table:
+    """A row a tool."""
+    rows = [
+        (
+            f"T{row['tool']}",
+            "reference" if row["length_mm"] is None else number(row["length_mm"], 2),
+            *_part_figures(row),
+            shortened(row["remark"], 30),
+        )
+        for row in per_tool
+    ]
+    return Table(("tool", ">length mm", *PART_TITLES, "remark"), rows)
+
+
+def operation_table(per_operation: Sequence[Document], most: int = MOST_ROWS) -> Table:
+    """A row an operation."""
+    digits = len(str(min(len(per_operation), most)))
+    rows = [
+        (
+            markup(OPERATION, place, f"{row['operation']:>{digits}} {row['name']}"),
+            f"T{row['tool']}" if row["tool"] else "-",
+            f"{row['first_line']}-{row['last_line']}",
+            *_part_figures(row),
+            "-" if row["min_margin"] is None else f"{row['min_margin']:.3f}",
+        )
+        for place, row in enumerate(per_operation[:most])
+    ]
+    return Table(("operation", ">tool", ">lines", *PART_TITLES, ">margin"), rows)
+
+
+def and_more(entries: Sequence[object], most: int, things: str) -> list[str]:
+    """That there are more entries than are shown."""
+    return [f"and {len(entries) - most} more {things} in summary.json"] if len(entries) > most else []
+
+
+def required(analysis: Analysis) -> tuple[str, Table]:
+    """Whether every cut has the required stiffness, and the lines that have not, weakest first."""
+    entry, source = analysis.to_dict()["required"], analysis.program.source
+    level, below = number(entry["required_N_per_mm"]), entry["below"]
+    if not below:
+        return f"Every cutting move has the required {level} N/mm.", Table((), ())
+    more = f", the {MOST_ROWS} weakest of them here" if len(below) > MOST_ROWS else ""
+    rows = [
+        (
+            f"line {row['line']}",
+            "no stiffness" if row["min_N_per_mm"] is None else number(row["min_N_per_mm"]),
+            markup("<code>{}</code>", source[row["line"] - 1].strip() if source else ""),
+        )
+        for row in below[:MOST_ROWS]
+    ]
+    return f"{len(below)} lines below the required {level} N/mm{more}:", Table(("", ">lowest N/mm", "program"), rows)
+
+
+def comparison(summary: Document, other: Document) -> Table:
+    """Two machines side by side, the difference in percent of the first."""
+    compared, sides = compare_summaries(summary, other), (summary, other)
+    changes = [*compared["difference_percent"].values(), compared["plunges_difference_percent"]]
+    shown = ["-" if change is None else f"{change:+.1f} %" for change in changes]
+    rows = [list(row) for row in zip(TITLES, *map(_figures, sides), shown, strict=False)]
+    if any(map(beside, sides)):
+        means = [number((beside(side) or {}).get("mean_N_per_mm")) for side in sides]
+        rows.append([PLUNGES, *means, shown[-1]])
+    rows.append(["weakest line", *(str((side["weakest"] or {"line": "-"})["line"]) for side in sides), ""])
+    rows.append(["extrapolated", *(f"{side['extrapolated_share']:.1%}" for side in sides), ""])
+    if any(side["out_of_reach_samples"] for side in sides):
+        rows.append(["out of reach", *(number(side["out_of_reach_samples"]) for side in sides), ""])
+    return Table(("", *(f">{shortened(machine_text(side), 32)}" for side in sides), ">difference"), rows)

@@ -1,1 +1,0 @@
-"""The results of one analysis: files and text."""

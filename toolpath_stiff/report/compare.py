@@ -1,0 +1,270 @@
+"""The results of a comparison with measurements: page, text, and residuals as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.comparison.compare import Comparison
+from toolpath_stiff.comparison.residuals import Variable, directions, planes
+from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors
+from toolpath_stiff.inference.errors import deviation_percent
+from toolpath_stiff.report import history
+from toolpath_stiff.report.history import history_section, history_text
+from toolpath_stiff.report.loops import loops_section, loops_text
+from toolpath_stiff.report.pages import Drawing, Section, markup, page_of, part, readings_head
+from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+
+# Picture -> the question that it answers, and how it is read.
+QUESTIONS = {
+    "measured_modelled.png": (
+        "How wrong is the model, biased or scattered?",
+        "A cloud beside the line is a bias; as wide as its bars, scatter; one direction off alone points to a gauge, "
+        "a table or a spindle.",
+    ),
+    "planes.png": (
+        "Z against X and Y? Upper against lower plane?",
+        "Standard errors hold the scatter of readings, clampings and struts, and what scatters more than these from "
+        "place to place. They are taken one by one; the findings above are corrected for looking at many places.",
+    ),
+    "machine.png": (
+        "Where does the model fail? Alike all around, or on one side?",
+        "Three times the same around the axis: geometry or the law of all struts. One side only: one strut, one joint, "
+        "the table, or a cable.",
+    ),
+    history.PICTURE: history.QUESTION,
+    "strips.png": (
+        "Drift, a bad clamping, one bad reading?",
+        "A slope is drift, a step is a clamping, a lone bar is a reading to take again.",
+    ),
+    "variables.png": (
+        "Which variable is missing?",
+        "The strongest first. A trend in one direction of load alone says more than one in all: compare with what "
+        "every effect of the catalogue would do with tps diagnose.",
+    ),
+    "load_path.png": (
+        "Which link takes what share of the compliance?",
+        "A missing compliance must fit between the model's bar and the measured one; a link that takes little "
+        "cannot be the cause unless it is badly wrong.",
+    ),
+}
+
+PAGE = "report.html"
+MOST_ROWS = 40  # of patterns; all are in compare.json
+MOST_FAR_OFF, MOST_NAMED = 20, 5  # readings far off, on the page and on the terminal
+BIAS = f"mean of {DEVIATION}, {MINUS_IS_SOFTER}"
+
+
+def page(comparison: Comparison, drawn: Mapping[str, Drawing]) -> str:
+    """The page, the pictures within."""
+    summary = comparison.summary
+    base, refit = summary.baseline, summary.baseline.strut_law_refitted
+    findings = summary.findings
+    mean = f"{base.mean_abs_error_percent:.2f} %"
+    figures = [
+        (mean, "mean |modelled - measured| / measured, as given"),
+        *([(f"{refit.mean_abs_error_percent:.2f} %", "the same, strut law refitted")] if refit else []),
+        (f"{base.bias_percent:+.1f} %", f"bias: {DEVIATION}, {MINUS_IS_SOFTER}"),
+        (f"{base.rms_percent:.1f} %", "rms error"),
+        (f"{_by_noise(base.scatter_rms_percent, '.1f')} %", "rms that scatter alone would leave"),
+        (f"{_by_noise(base.explained_by_scatter_percent, '.0f')} %", "of the mean square is scatter"),
+    ]
+    headline = findings[0].text if findings else f"{mean} off in the mean as given, without a pattern"
+    head = readings_head("compare", comparison.document, "Where does the model fail?", headline, figures)
+    sections: list[Section] = [
+        ("Findings" if findings else "No pattern stands out from scatter", _findings(summary)),
+        "measured_modelled.png",
+        ("Errors by direction, plane and set-up", errors(summary), f"Machine file as given. Bias: {BIAS}."),
+        *("planes.png", "machine.png", "strips.png"),
+        ("Readings far off", far_off(summary, MOST_FAR_OFF)),
+        loops_section(summary.loops),
+        history_section(summary.history),
+        history.PICTURE,
+        "variables.png",
+        ("Checks without a model", _model_free(summary)),
+        "load_path.png",
+        ("All patterns looked for", *_tests(summary)),
+        ("How much readings scatter", _noise(summary)),
+        ("Not tested", summary.not_tested),
+        ("Assumptions", [*summary.assumptions, *summary.notes]),
+    ]
+    return page_of(head, sections, drawn, QUESTIONS)
+
+
+def _by_noise(figures: Mapping[str, float], form: str) -> str:
+    return " to ".join(f"{figure:{form}}" for figure in figures.values())
+
+
+def _findings(summary: ComparisonSummary) -> Table:
+    """Findings with their probabilities, or the strongest hints."""
+    rows = [
+        (hint.text, f"{hint.statistic:+.1f}", f"{hint.p_adjusted:.2g}", ", ".join(hint.indistinguishable_from) or "-")
+        for hint in summary.findings or summary.hints
+    ]
+    first, kind = ("finding", "finding") if summary.findings else ("the strongest hints", "out")
+    return Table((first, ">t", ">p, corrected", "looks the same in these data"), rows, [kind] * len(rows))
+
+
+def groups(summary: ComparisonSummary) -> list[tuple[str, GroupErrors]]:
+    """All readings, and those by direction, plane and set-up where there are several; planes need no title."""
+    rows: list[tuple[str, GroupErrors]] = [("all readings", summary.baseline)]
+    levels: list[tuple[str, Mapping[str, GroupErrors]]] = [
+        ("direction", summary.by_direction),
+        ("", summary.by_plane),
+        ("set-up", summary.by_setup),
+    ]
+    for title, by in levels:
+        if len(by) > 1:
+            rows += [(f"{title} {plain(name) or '(none)'}".strip(), group) for name, group in by.items()]
+    return rows
+
+
+def errors(summary: ComparisonSummary) -> Table:
+    """Errors by direction, plane and set-up, beside those of scatter alone."""
+    rows = [
+        (
+            name,
+            group.readings,
+            f"{group.mean_abs_error_percent:.2f} %",
+            f"{group.bias_percent:+.1f} %",
+            f"{group.rms_percent:.1f} %",
+            *(f"{group.scatter_rms_percent[noise.name]:.1f} %" for noise in summary.noise),
+        )
+        for name, group in groups(summary)
+    ]
+    scatter = (f">scatter alone, {noise.name}" for noise in summary.noise)
+    return Table(("", ">readings", ">mean error", ">bias", ">rms", *scatter), rows)
+
+
+def far_off(summary: ComparisonSummary, most: int) -> Table:
+    """Readings far off."""
+    rows = [
+        (
+            f"{reading.file}:{reading.line}",
+            reading.direction,
+            reading.point,
+            f"{reading.deviation_percent:+.0f} %",
+            f"{reading.standard_deviations:+.1f}",
+        )
+        for reading in summary.outliers[:most]
+    ]
+    return Table(("line", "direction", "point", ">with the findings taken out", ">standard deviations"), rows)
+
+
+def _model_free(summary: ComparisonSummary) -> Table:
+    """Checks that need no stiffness model, and why others cannot be made."""
+    checks, cannot = summary.model_free.checks, summary.model_free.cannot_check
+    rows = [(check.check, check.text, f"{check.statistic:+.1f}", f"{check.p_adjusted:.2g}") for check in checks]
+    rows += [(check.check, f"not checked: {check.reason}", "", "") for check in cannot]
+    kinds = ["" if check.holds else "finding" for check in checks] + ["out"] * len(cannot)
+    return Table(("principle", "result", ">t", ">p, corrected"), rows, kinds)
+
+
+def _tests(summary: ComparisonSummary) -> list[str]:
+    """The strongest patterns, each on its own, to unfold."""
+    count = len(summary.tests)
+    rows = [
+        (test.pattern, test.kind, test.readings, f"{test.statistic:+.1f}", f"{test.p_adjusted:.2g}")
+        for test in summary.tests[:MOST_ROWS]
+    ]
+    remark = f"{count} patterns were looked for, each on its own here"
+    remark += f"; the strongest {MOST_ROWS} are shown, all are in compare.json." if count > MOST_ROWS else "."
+    listed = part(Table(("pattern", "kind", ">readings", ">t", ">p, corrected"), rows))
+    return [markup("<details><summary>{}</summary>{}</details>", remark, listed)] if rows else []
+
+
+def _noise(summary: ComparisonSummary) -> Table:
+    base = summary.baseline
+    rows = [
+        (
+            noise.name,
+            f"{noise.repeat_percent:.2g} %",
+            f"{noise.clamping_percent:.2g} %",
+            f"{noise.strut_spread_percent:.2g} %",
+            f"{base.excess_scatter_percent[noise.name]:.2g} %",
+            f"{base.probability[noise.name]:.2g}",
+            noise.origin,
+        )
+        for noise in summary.noise
+    ]
+    head = (">reading", ">clamping", ">struts", ">beyond it, place to place", ">p of residuals this large", "origin")
+    return Table(("noise", *head), rows)
+
+
+def text(comparison: Comparison) -> str:
+    """Errors, findings, checks, in lines, and the commands that go on from here."""
+    summary = comparison.summary
+    lines = [summary.text, "", f"machine file as given; bias: {BIAS}", *errors(summary).lines()]
+    lines += [*_refitted(summary), "", "findings"]
+    if not summary.findings:
+        lines.append("  none: no pattern stands out from scatter. The strongest hints:")
+    lines += [f"  {plain(hint.text)} (p = {hint.p_adjusted:.2g})" for hint in summary.findings or summary.hints]
+    for hint in summary.findings:
+        if hint.indistinguishable_from:
+            others = ", ".join(hint.indistinguishable_from)
+            lines.append(f"  ({plain(hint.pattern)} looks the same here as: {plain(others)})")
+    lines += [*loops_text(summary.loops), *history_text(summary.history), "", "checks without a model"]
+    lines += [f"  {plain(check.text)}" for check in summary.model_free.checks]
+    lines += [f"  {check.check}: {check.reason}" for check in summary.model_free.cannot_check]
+    if summary.outliers:
+        lines += ["", "readings far off", *far_off(summary, MOST_NAMED).lines(2)]
+        if len(summary.outliers) > MOST_NAMED:
+            lines.append(f"  and {len(summary.outliers) - MOST_NAMED} more, in compare.json")
+    lines += ["", *(f"warning: {plain(text)}" for text in summary.warnings)]
+    lines += [f"note: {plain(text)}" for text in summary.notes]
+    shown = [line for i, line in enumerate(lines) if line or lines[i - 1 : i] != [""]]
+    return "\n".join(["\n".join(shown).rstrip(), "", *summary.next])
+
+
+def _refitted(summary: ComparisonSummary) -> list[str]:
+    """What refitting the strut law leaves."""
+    base, refit = summary.baseline, summary.baseline.strut_law_refitted
+    if refit is None:
+        return []
+    gain = round(base.mean_abs_error_percent - refit.mean_abs_error_percent, 2)
+    law = " / ".join(f"{stiffness:.1f}" for stiffness in refit.N_per_um)
+    return [
+        "",
+        f"strut law refitted: {refit.mean_abs_error_percent:.2f} % mean error, {refit.bias_percent:+.1f} % bias, rms "
+        f"{refit.rms_percent:.1f} % ({law} N/um)" + ("" if gain > 0.0 else ": nothing gained"),
+    ]
+
+
+def _with_unit(variable: Variable) -> str:
+    """A heading: "tilt_deg", unless the name says the unit already."""
+    suffix = variable.unit.replace("/", "_per_").replace("%", "percent")
+    return variable.name if variable.name.endswith(suffix) else f"{variable.name}_{suffix}"
+
+
+def residuals_csv(comparison: Comparison) -> str:
+    """One row a reading: measured, modelled, deviation, scatter, every variable that residuals were held against."""
+    data = comparison.data
+    further = [variable for variable in comparison.numbers if variable.name not in ("x", "y", "height", "order")]
+    head = [
+        "file", "line", "point", "setup", "clamp", "plane", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg",
+        "c_deg", "dx", "dy", "dz", "measured_N_per_mm", "modelled_N_per_mm", "deviation_percent", "scatter_percent",
+        *map(_with_unit, further),
+    ]  # fmt: skip
+    along, where = directions(data), planes(data)
+    rows = []
+    for i in range(len(data)):
+        pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
+        measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
+        modelled = float(n_per_mm_from_n_per_m(np.exp(comparison.log_model[i])))
+        rows.append(
+            [
+                data.file[i], data.line[i], data.point[i], data.setup[i], data.clamp[i], where[i], along[i],
+                *(f"{value + 0.0:.6g}" for value in pose),
+                f"{measured:.1f}", f"{modelled:.1f}", f"{float(deviation_percent(comparison.residual[i])):.3f}",
+                f"{100.0 * comparison.scatter[i]:.3f}",
+                *("" if np.isnan(variable.values[i]) else f"{variable.values[i]:.6g}" for variable in further),
+            ]
+        )  # fmt: skip
+    return csv_text(head, rows)
+
+
+DATA = {"compare.json": Comparison.to_json, "residuals.csv": residuals_csv}

@@ -1,1 +1,0 @@
-"""The results of a comparison with measurements: page, files and text."""

@@ -1,0 +1,89 @@
+"""Stiffness along a path as page and pictures draw it: curves of few points, ends of scales, boxes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.analysis.results import Analysis
+    from toolpath_stiff.path.sampling import Samples
+
+
+def profile_curve(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray]:
+    """Path length in mm and stiffness in N/mm of every sample; nan on rapids and out of reach.
+
+    Without `with_plunges` also nan on the plunges beside the headline.
+    """
+    stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness)
+    drawn = analysis.samples.cutting & (with_plunges | ~analysis.set_aside)
+    return mm_from_m(analysis.samples.s), np.where(drawn, stiffness, np.nan)
+
+
+def profile_band(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray] | None:
+    """Lower and upper end of the 95 % band of every sample in N/mm, nan as in `profile_curve`; None without a band."""
+    band = analysis.parameter_band
+    if band is None:
+        return None
+    _, k = profile_curve(analysis, with_plunges)
+    reach = defaults.NORMAL_95 * n_per_mm_from_n_per_m(band.deviation)
+    return k - reach, k + reach
+
+
+def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
+    """Rows that draw the same picture as all of them on `columns` pixels, in order.
+
+    Of every run of rows in one column of pixels the first, the last, the lowest and the highest are kept, so no
+    extreme is lost; of a run of nan the first, which keeps the gap. x ascends.
+    """
+    if len(x) <= 4 * columns:
+        return np.arange(len(x))
+    span = float(x[-1] - x[0])
+    column = np.zeros(len(x), dtype=np.int64) if span == 0.0 else ((x - x[0]) / span * columns).astype(np.int64)
+    missing = np.isnan(y)
+    fresh = np.concatenate([[True], (np.diff(column) != 0) | (missing[1:] != missing[:-1])])
+    first = np.flatnonzero(fresh)
+    last = np.append(first[1:], len(x)) - 1
+    run = np.cumsum(fresh) - 1
+    lowest = np.flatnonzero(y == np.minimum.reduceat(y, first)[run])
+    highest = np.flatnonzero(y == np.maximum.reduceat(y, first)[run])
+    lowest = lowest[np.diff(run[lowest], prepend=-1) != 0]  # the first of equals
+    highest = highest[np.diff(run[highest], append=-1) != 0]  # the last of equals
+    kept = np.concatenate([first, last, lowest, highest])
+    rows = np.unique(kept)
+    return np.asarray(rows[~missing[rows] | fresh[rows]])
+
+
+def cutting_box(samples: Samples) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest (3,) of the positions of the cutting samples, mm."""
+    low, high = np.empty(3), np.empty(3)
+    for axis in range(3):  # one by one, as a copy of all positions is a tenth of what a long path takes
+        along = samples.position[samples.cutting, axis]
+        low[axis], high[axis] = mm_from_m(float(along.min())), mm_from_m(float(along.max()))
+    return low, high
+
+
+def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float, float]:
+    """Ends of the colour scale in N/mm: lowest and highest of the headline, values far out set aside.
+
+    A few short cuts, stiffer by far than the rest, would otherwise take all the contrast. The legend marks an end
+    that values lie beyond. With `show_plunges` the plunges beside the headline are on the scale, all of them.
+    """
+    low, high = map(n_per_mm_from_n_per_m, analysis.central_range)
+    if show_plunges and analysis.set_aside.any():
+        plunges = n_per_mm_from_n_per_m(analysis.at.stiffness[analysis.set_aside])
+        low, high = min(low, float(plunges.min())), max(high, float(plunges.max()))
+    if high - low < 1e-6 * high:  # a constant: keep the scale from collapsing
+        low, high = low * (1.0 - 1e-3), high * (1.0 + 1e-3)
+    return low, high
+
+
+def beyond_scale(analysis: Analysis, limits: tuple[float, float]) -> tuple[bool, bool]:
+    """Whether headline values lie below the scale, and above."""
+    stiffness = n_per_mm_from_n_per_m(analysis.charted[0])
+    return bool(stiffness.min() < limits[0]), bool(stiffness.max() > limits[1])

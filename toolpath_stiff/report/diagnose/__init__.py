@@ -1,1 +1,0 @@
-"""The results of a diagnosis: page, its section on what the missing thing looks like, and files."""

@@ -1,0 +1,81 @@
+"""The one door to views and pictures: what a result shows of itself is found by its name, `shown_by`.
+
+A view is a module of this room: `text(result)`, and of a result that is a folder `DATA`, file name -> what makes it of
+the result; `PAGE`, the name of its page, `page(result, drawn, **look)`, which makes it, and `QUESTIONS`,
+the pictures that stand in it. The pictures are in the module of that name in `pictures`, which imports matplotlib.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.files import Content
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from toolpath_stiff.report.pages import Drawing
+
+
+def view_of(shown_by: str) -> ModuleType:
+    """The view of results of this name."""
+    return import_module(f"toolpath_stiff.report.{shown_by}")
+
+
+def pictures_of(shown_by: str) -> Mapping[str, Callable[..., Figure | None]]:
+    """File name -> function that draws the picture of a result; it returns None where there is nothing to show."""
+    module = f"toolpath_stiff.report.pictures.{shown_by}"
+    pictures: Mapping[str, Callable[..., Figure | None]] = import_module(module).PICTURES if find_spec(module) else {}
+    return pictures
+
+
+def _style() -> ModuleType:
+    return import_module("toolpath_stiff.report.pictures.style")
+
+
+def names(shown_by: str, plots: bool = True, omit: Collection[str] = ()) -> tuple[str, ...]:
+    """Names of the files that `files` may make."""
+    view = view_of(shown_by)
+    data = tuple(name for name in view.DATA if name not in omit)
+    return (*data, *pictures_of(shown_by), *filter(None, [getattr(view, "PAGE", "")])) if plots else data
+
+
+def files(
+    result: Any, *, plots: bool = True, omit: Collection[str] = (), **look: Any
+) -> dict[str, Content | Callable[[], Content]]:
+    """Name -> content, or what makes it, of a result's files but for `omit`: data, with `plots` pictures and page."""
+    view = view_of(result.shown_by)
+    contents: dict[str, Content | Callable[[], Content]] = {
+        name: partial(make, result) for name, make in view.DATA.items() if name not in omit
+    }
+    if not plots:
+        return contents
+    style = _style()
+    drawn: dict[str, Drawing] = {}
+    for name, draw in pictures_of(result.shown_by).items():
+        if name in omit:
+            continue
+        if name not in getattr(view, "QUESTIONS", {}):
+            contents[name] = partial(style.picture_file, name, draw, result, look)
+        elif (picture := style.drawing(draw, result)) is not None:
+            contents[name] = drawn[name] = picture
+    return contents | ({view.PAGE: partial(view.page, result, drawn, **look)} if hasattr(view, "PAGE") else {})
+
+
+def picture(result: Any, **look: Any) -> bytes:
+    """The first picture of a result as PNG."""
+    name, draw = next(iter(pictures_of(result.shown_by).items()))
+    content: bytes = _style().picture_file(name, draw, result, look)
+    return content
+
+
+def figure(result: Any, name: str = "", **look: Any) -> Figure | None:
+    """A picture of a result as a figure, the first that shows something unless named; None where none does."""
+    with _style().house_style():
+        draws = (draw for file, draw in pictures_of(result.shown_by).items() if name in ("", file))
+        return next(filter(None, (draw(result, **look) for draw in draws)), None)

@@ -1,0 +1,159 @@
+"""Where model and measurements differ before and after a fit, seen from above; measured against modelled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.comparison.residuals import directions, planes
+from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, deviation_percent
+from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.report.colours import DIRECTIONS, INK, MUTED, RESIDUAL, WITHIN
+from toolpath_stiff.report.pictures.style import Look, new_figure, panel, round_ticks
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, shortened
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+
+SHOWN = 0.98  # share of the residuals that the colour scale holds
+BAND = 0.10  # drawn about measured = modelled
+MAP = 2.05  # inch
+LEFT = 0.95  # inch
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Readings, and ln(measured / modelled) (n,) of the machine file as given and of the last model.
+
+    `last` is what that is called, `held_out_percent` its error at left-out points, `refitted_percent` that of the
+    refitted strut law alone, where that is not the last model.
+    """
+
+    data: Readings
+    before: FloatArray
+    after: FloatArray
+    last: str
+    held_out_percent: float | None
+    refitted_percent: float | None
+
+
+def before_after(fits: Fits) -> Figure:
+    """Where model and measurements differ, seen from above, before and after, and measured against modelled."""
+    data, halves = fits.data, [np.asarray(residual, dtype=float) for residual in (fits.before, fits.after)]
+    along, levels = directions(data), planes(data)
+    columns = [d for d in DIRECTIONS if (along == d).any()]
+    rows = sorted(set(levels.tolist()), key=lambda name: -float(data.position[levels == name, 2].mean()))
+    limit = _limit(halves)
+    block = MAP * len(columns) + 0.3
+    width, height = max(1.1 + 2 * block + 0.9, 11.0), 1.35 + MAP * len(rows) + 0.4 + 4.0
+    wide = f"{2.4 * _reach(data):.0f} mm wide"
+    step = "" if fits.refitted_percent is None else f"{LAW_REFITTED} alone: {percent(fits.refitted_percent, 2)}; "
+    figure = new_figure(
+        width, height, "Did the error fall, and what remains?", f"{step}{DEVIATION}, {MINUS_IS_SOFTER}; maps from "
+        f"above, X to the right, {wide}; a point: mean of its readings",
+    )  # fmt: skip
+    held_out = (None, fits.held_out_percent)
+    for half, (name, residual) in enumerate(zip((AS_GIVEN, fits.last), halves, strict=True)):
+        left, top = LEFT + half * block, height - 1.35
+        title = _half_title(name, held_out[half], residual)
+        figure.text(left / width, 1.0 - 1.0 / height, title, size=10.5, weight="bold")
+        for i, j in np.ndindex(len(rows), len(columns)):
+            axes = panel(figure, left + MAP * j, top - MAP * (i + 1) + 0.1, MAP - 0.15, MAP - 0.3, xticks=[], yticks=[])
+            here = levels == rows[i]
+            points = _map(axes, data, residual, here & (along == columns[j]), limit)
+            axes.set_title(columns[j] if i == 0 else "", size=9.5, color=MUTED)
+            if half == j == 0:
+                style: Look = {"rotation": 90, "ha": "right", "va": "center", "size": 9}
+                low, high = (f"{end:.0f}" for end in mm_from_m(np.quantile(data.position[here, 2], (0.0, 1.0))))
+                text = f"z {low} mm" if low == high else f"z {low} to {high} mm"
+                axes.text(-0.04, 0.5, text, transform=axes.transAxes, **style)
+    bar = panel(figure, LEFT + 2 * block, height - 1.35 - MAP * len(rows) + 0.1, 0.16, MAP * len(rows) - 0.3)
+    figure.colorbar(points, cax=bar, extend="both").set_label(f"{DEVIATION}, %", size=9)
+    bar.grid(visible=False)
+    _scatter_pair(figure, data, halves, along)
+    return figure
+
+
+def _half_title(name: str, held_out: float | None, residual: FloatArray) -> str:
+    """Name and errors: the mean as the paper counts it, and at left-out points where it is known."""
+    relative = np.expm1(-residual[np.isfinite(residual)])
+    text = f"{shortened(plain(name), 44)}   mean error {100 * float(np.mean(np.abs(relative))):.2f} %"
+    return text + (f" (at points left out {percent(held_out, 2)})" if held_out is not None else "")
+
+
+def _limit(halves: Sequence[FloatArray]) -> float:
+    """End of the common colour scale, %: of both halves together, few extreme readings not taking the contrast."""
+    sizes = np.abs(deviation_percent(np.concatenate(halves)))
+    sizes = sizes[np.isfinite(sizes)]
+    return max(float(np.quantile(sizes, SHOWN)), 1e-3) if len(sizes) else 1.0
+
+
+def _map(axes: Axes, data: Readings, residual: FloatArray, chosen: NDArray[np.bool_], limit: float) -> Any:
+    """One map: a disc a pose, readings of one pose averaged; poses above each other stand side by side."""
+    everywhere, reach = mm_from_m(data.position[:, :2]), _reach(data)
+    every = np.round(np.concatenate([data.position, data.angles], axis=1)[chosen], 6)
+    poses, which = np.unique(every, axis=0, return_inverse=True)
+    values = np.bincount(which.ravel(), deviation_percent(residual[chosen])) / np.bincount(which.ravel())
+    centre = 0.5 * (everywhere.min(axis=0) + everywhere.max(axis=0))
+    places = _spread(mm_from_m(poses[:, :2]), 0.09 * reach)
+    style: Look = {"c": values, "s": 78, "edgecolors": INK, "linewidths": 0.5, "zorder": 3}
+    drawn = axes.scatter(places[:, 0], places[:, 1], cmap=RESIDUAL, vmin=-limit, vmax=limit, **style)
+    axes.plot(0.0, 0.0, "+", color=MUTED, ms=8, zorder=2)
+    axes.set_xlim(centre[0] - 1.2 * reach, centre[0] + 1.2 * reach)
+    axes.set_ylim(centre[1] - 1.2 * reach, centre[1] + 1.2 * reach)
+    axes.set_aspect("equal")
+    return drawn
+
+
+def _reach(data: Readings) -> float:
+    """Half the larger extent of the measured positions in X and Y, mm."""
+    return 0.5 * float(np.ptp(mm_from_m(data.position[:, :2]), axis=0).max()) or 100.0
+
+
+def _spread(places: FloatArray, step: float) -> FloatArray:
+    """Points at one place moved onto a ring about it, so that each is seen."""
+    out = places.astype(float).copy()
+    _, which, count = np.unique(np.round(places, 1), axis=0, return_inverse=True, return_counts=True)
+    for group in np.flatnonzero(count > 1):
+        members = np.flatnonzero(which.ravel() == group)
+        angle = 2.0 * np.pi * np.arange(len(members)) / len(members)
+        out[members] += step * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return out
+
+
+def _scatter_pair(figure: Figure, data: Readings, halves: Sequence[FloatArray], along: NDArray[np.str_]) -> None:
+    """Measured against modelled, both on the same scales, beside each other below the maps."""
+    across = (figure.get_figwidth() - 1.6) / 2.0  # inches
+    measured = n_per_mm_from_n_per_m(data.stiffness)
+    modelled = [measured * np.exp(-residual) for residual in halves]
+    values = np.concatenate([measured, *modelled])
+    values = values[np.isfinite(values)]
+    for half, stiffness in enumerate(modelled):
+        axes = panel(figure, LEFT + half * across, 0.55, across - 0.75, 3.2)
+        one_to_one(axes, 0.93 * float(values.min()), 1.07 * float(values.max()))
+        for direction, colour in DIRECTIONS.items():
+            chosen = along == direction
+            if chosen.any():
+                axes.plot(stiffness[chosen], measured[chosen], "o", ms=4.5, mfc="none", mec=colour, label=direction)
+        axes.set_title(("before", "after")[half], size=10)
+        axes.legend(frameon=False, loc="upper left", title="grey: +-10 %", title_fontsize=8, fontsize=9)
+
+
+def one_to_one(axes: Axes, low: float, high: float) -> None:
+    """Logarithmic axes of measured against modelled stiffness, N/mm, with the line where they are the same."""
+    line = np.array([low, high])
+    axes.fill_between(line, line * (1.0 - BAND), line * (1.0 + BAND), color=WITHIN, lw=0, zorder=0)
+    axes.plot(line, line, color=MUTED, lw=1.0, zorder=1)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(low, high)
+    axes.set_ylim(low, high)
+    for axis in (axes.xaxis, axes.yaxis):
+        round_ticks(axis, low, high)
+    axes.set_xlabel("modelled stiffness, N/mm")
+    axes.set_ylabel("measured stiffness, N/mm")

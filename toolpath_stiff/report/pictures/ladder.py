@@ -1,0 +1,122 @@
+"""Picture of a diagnosis: every explanation with its error at left-out points and its probability, best first."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from toolpath_stiff.diagnosis.result import Diagnosis
+from toolpath_stiff.diagnosis.rows import HypothesisRow
+from toolpath_stiff.inference.errors import AS_GIVEN
+from toolpath_stiff.inference.judgement import NONE
+from toolpath_stiff.report.colours import BLUE, CHOSEN, GREY, INK, MUTED, ORANGE
+from toolpath_stiff.report.explanations import floor_text, probability_text, remark_text, size_texts
+from toolpath_stiff.report.pictures.style import new_figure, open_frame, panel
+from toolpath_stiff.report.words import counted, percent, plain, shortened
+from toolpath_stiff.units import json_number
+
+ROW = 0.47  # inch a candidate
+MOST_PAIRS = 5  # of the ladder; all are in diagnose.json
+BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and arrows stand for more
+
+
+def ladder(diagnosis: Diagnosis) -> Figure:
+    """Every explanation with its error at left-out points and its probability, best first.
+
+    As given, strut law refitted, what no effect describes (if it was weighed), then pairs and effects.
+    """
+    every, standing = diagnosis.rows, len(diagnosis.explanations)
+    rows = [every.as_given, every.refitted, *([every.outside] if every.outside.probability else [])]
+    rows += [*every.pairs[:MOST_PAIRS], *every.candidates]
+    shaded = f"shaded: {counted(standing, 'explanation')} left standing" if standing else "none left"
+    figure = new_figure(
+        14.0, 1.75 + ROW * len(rows), "Which effect explains the data, and how surely?",
+        f"verdict: {diagnosis.verdict}   ·   {shaded}   ·   bar at a dot: standard error of its fall from the refitted "
+        "strut law   ·   grey: not offered",
+    )  # fmt: skip
+    places = ((0.14, 13.79), (0.28, 4.76), (4.9, 4.34), (9.66, 1.82), (11.83, 2.1))
+    every_axes = [panel(figure, left, 0.62, width, ROW * len(rows) + 0.03) for left, width in places]
+    shade, labels, errors, chances, words = every_axes
+    for axes in (shade, labels, words):
+        axes.set_axis_off()
+        axes.set_xlim(0.0, 1.0)
+    for axes in every_axes:
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+    for axes in (errors, chances):
+        axes.patch.set_visible(False)
+        axes.set_yticks([])
+        axes.grid(visible=False, axis="y")
+        open_frame(axes, "left")
+    _labels(labels, rows)
+    _errors(errors, rows, diagnosis)
+    _chances(chances, rows)
+    for y, row in enumerate(rows):
+        lines = textwrap.wrap(remark_text(row).split(":")[0], 31, max_lines=2, placeholder=" ...")
+        words.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if row.offered else MUTED)
+        if row.standing:
+            shade.axhspan(y - 0.5, y + 0.5, color=CHOSEN, lw=0)
+    return figure
+
+
+def _labels(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
+    for y, row in enumerate(rows):
+        small = ", ".join(size_texts(row, intervals=False)) or plain(row.title)
+        weight = "bold" if row.standing else "normal"
+        name_colour, small_colour = (INK, MUTED) if row.offered else (GREY, GREY)
+        axes.text(0.0, y - 0.16, shortened(plain(row.label), 58), va="center", color=name_colour, weight=weight)
+        axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=small_colour, size=8)
+
+
+def _errors(axes: Axes, rows: Sequence[HypothesisRow], diagnosis: Diagnosis) -> None:
+    base, floor = diagnosis.rows.refitted.held_out_error_percent, json_number(diagnosis.noise.floor_percent) or 0.0
+    errors = [error for row in rows for error in (row.held_out_error_percent, row.mean_abs_error_percent)]
+    end = 1.08 * max(error for error in errors if error is not None)
+    end = max(end if base is None else min(end, BEYOND * base), 1.3 * floor, 1e-6)
+    axes.set_xlim(0.0, end)
+    for value, other, text, colour, style in (
+        (floor, base, f"noise floor {floor_text(diagnosis)}", ORANGE, ":"),
+        (base, floor, f"strut law refitted {percent(base)}", INK, "--"),
+    ):
+        if value is not None:
+            axes.axvline(value, color=colour, lw=1.3, ls=style, zorder=1)
+            leftwards = other is not None and value < other  # two labels turn away from each other
+            axes.annotate(
+                text, (value, 1.0), xycoords=("data", "axes fraction"),
+                xytext=(4 if leftwards else -4, 3), textcoords="offset points", size=8.5, color=colour,
+                ha="right" if leftwards else "left",
+            )  # fmt: skip
+    for y, row in enumerate(rows):
+        colour = BLUE if row.standing else INK if row.name in (AS_GIVEN, NONE) else MUTED
+        colour = colour if row.offered else GREY
+        within, outside = row.mean_abs_error_percent, row.held_out_error_percent
+        if within is not None and within <= end:
+            axes.plot(within, y, "|", color=colour, ms=11, mew=1.6, zorder=3)
+        if outside is None:
+            continue
+        if outside > end:
+            text = f"{percent(outside)} \N{RIGHTWARDS ARROW}"
+            axes.annotate(text, (end, y), ha="right", va="center", size=9, color=colour)
+            continue
+        axes.plot(outside, y, "o", color=colour, mfc=colour if row.offered else "white", ms=8, zorder=4)
+        if base is not None and row.held_out_gain_in_se and base != outside:
+            # Of the fall of the held-out error, from the fall in standard errors.
+            error = abs((base - outside) / row.held_out_gain_in_se)
+            axes.plot([max(outside - error, 0.0), outside + error], [y, y], color=colour, lw=2.0, zorder=3)
+    axes.set_xlabel("mean |modelled - measured| / measured, %; dot: left out, tick: in sample", size=9)
+
+
+def _chances(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
+    axes.set_xlim(0.0, 1.0)
+    for y, row in enumerate(rows):
+        value = row.probability or 0.0
+        axes.barh(y, value, height=0.5, color=BLUE if row.offered else GREY, zorder=2)
+        inside = value > 0.6
+        axes.text(
+            value + (-0.03 if inside else 0.03), y, probability_text(row.probability), va="center",
+            ha="right" if inside else "left", size=9, color="white" if inside else INK, zorder=3,
+        )  # fmt: skip
+    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100 %"])
+    axes.set_xlabel("probability", size=9)

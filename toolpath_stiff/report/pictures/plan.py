@@ -1,0 +1,164 @@
+"""The picture of a plan: how far its rivals would be apart over the workspace, and the planned poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.planning.gap_map import GapMap, gap_map, group_of, height_groups
+from toolpath_stiff.planning.plan import RivalPlan
+from toolpath_stiff.planning.result import Plan
+from toolpath_stiff.planning.visits import Visits
+from toolpath_stiff.report.colours import INK, NOWHERE, STIFFNESS
+from toolpath_stiff.report.pictures.style import Look, colour_scale, new_figure, panel
+from toolpath_stiff.report.words import plain, shortened
+from toolpath_stiff.units import deg_from_rad, mm_from_m
+
+# Colours told apart by eyes that see no red or green (Okabe and Ito 2008), and shapes beside them.
+MARKS = (
+    ("o", "#ffffff"),
+    ("^", "#e69f00"),
+    ("s", "#56b4e9"),
+    ("D", "#cc79a7"),
+    ("v", "#f0e442"),
+    ("P", "#d55e00"),
+    ("X", "#999999"),
+)
+PANEL = 3.5  # inches a side
+MOST_ACROSS = 5  # panels in a row
+NARROWEST = 8.0  # inches, for the headings
+ROOM = 1.2  # half a panel, of the farthest pose: marks lean and have labels
+CLOSE = 0.06  # m between marks whose labels would cover each other
+SHORT = 6  # letters of a label that has room on either side
+ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
+
+
+def plan(of: Plan) -> Figure:
+    """The visits, and of a plan between rivals how well each place tells them apart."""
+    choice, name = of.choice, of.machine.name
+    if isinstance(choice, RivalPlan):
+        gap = gap_map(of.machine, choice, of.effect_files)
+        title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
+        note = f"machine {name}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
+        return visits_drawn(choice.visits, choice.chosen, choice.kinds, gap, (title, note))
+    clampings, readings = len(choice.visits), len(choice.visits.readings)
+    note = f"machine {name}   ·   {clampings} clampings, {readings} readings; lines: where spindles lean"
+    return visits_drawn(choice.visits, choice.chosen, choice.kinds, None, ("A first campaign", note))
+
+
+def visits_drawn(
+    visits: Visits, chosen: Sequence[int], kinds: Sequence[str], gap: GapMap | None, heading: tuple[str, str]
+) -> Figure:
+    """A column a height; with a map one row for vertical and one for tilted poses.
+
+    Parameters
+    ----------
+    visits, chosen, kinds
+        Planned visits in measuring order, and what each changes.
+    gap
+        The gap over the workspace; None: the poses alone.
+    heading
+        Title, and what it is about.
+    """
+    poses = visits.pose[list(chosen)]
+    groups = height_groups(poses[:, 2])
+    panel_of = group_of(poses[:, 2], groups)
+    tilted = poses[:, 3:5].any(axis=1)
+    kinds_of_panel = ("",) if gap is None else (", vertical", f", tilted {deg_from_rad(gap.max_tilt):.3g}°")
+    across = -(-len(groups) // -(-len(groups) // MOST_ACROSS))  # as many as fit, the rows filled evenly
+    rows = -(-len(groups) // across) * len(kinds_of_panel)
+    right = 0.35 if gap is None else 1.2
+    width = max(across * PANEL + 0.75 + right, NARROWEST)
+    height = rows * (PANEL + 0.35) + 1.9
+    farthest = max(mm_from_m(float(np.abs(poses[:, :2]).max())), mm_from_m(gap.x[-1]) if gap is not None else 1.0)
+    numbers = _numbers(visits, chosen)
+    figure = new_figure(width, height, shortened(plain(heading[0]), 90), shortened(plain(heading[1]), 130), 0.75)
+    grid = figure.add_gridspec(
+        rows, across, left=0.75 / width, right=1 - right / width, bottom=1.05 / height,
+        top=1 - 1.15 / height, wspace=0.12, hspace=0.2,
+    )  # fmt: skip
+    gaps = [] if gap is None else [gap.vertical.ravel(), gap.tilted.ravel()]
+    highest = float(np.nanmax(np.concatenate([[1e-6], *gaps])))
+    drawn: Any = None
+    for (which, group), (leaning, words) in product(enumerate(groups), enumerate(kinds_of_panel)):
+        row, column = which // across * len(kinds_of_panel) + leaning, which % across
+        axes = figure.add_subplot(grid[row, column])
+        if gap is not None:
+            axes.set_facecolor(NOWHERE)
+            values = (gap.vertical, gap.tilted)[leaning][which]
+            look: Look = {"cmap": STIFFNESS, "vmin": 0.0, "vmax": highest, "shading": "nearest"}
+            drawn = axes.pcolormesh(mm_from_m(gap.x), mm_from_m(gap.y), values, **look)
+        here = (panel_of == which) & ((tilted == bool(leaning)) | (gap is None))
+        _marks(axes, poses, kinds, numbers, np.flatnonzero(here), ROOM * farthest)
+        low, high = (f"{mm_from_m(float(group[end])):.5g}" for end in (0, -1))
+        axes.set_title(f"z = {low}{'' if low == high else f' to {high}'} mm{words}", fontsize=10)
+        below = which + across >= len(groups) and leaning == len(kinds_of_panel) - 1
+        axes.set_xlabel("X mm" if below else "")
+        axes.set_ylabel("Y mm" if column == 0 else "")
+        axes.tick_params(labelleft=column == 0, labelbottom=below)
+    if drawn is not None:
+        bar = panel(figure, width - 0.95, 1.05, 0.18, height - 2.2)
+        colour_scale(drawn, bar, "gap at one pose, standard deviations", thousands=False)
+    _legend(figure, kinds)
+    return figure
+
+
+def _numbers(visits: Visits, chosen: Sequence[int]) -> list[str]:
+    """Labels of the visits, their numbers in measuring order; visits to one pose share a label."""
+    poses = [visits.pose[v].tobytes() for v in chosen]
+    return [", ".join(str(k + 1) for k, other in enumerate(poses) if other == pose) for pose in poses]
+
+
+def _marks(
+    axes: Axes, poses: FloatArray, kinds: Sequence[str], numbers: Sequence[str], here: IntArray, half: float
+) -> None:
+    """Poses by kind, the tilt of the spindle as a line toward where it leans, numbered in measuring order."""
+    names = list(dict.fromkeys(kinds))
+    labelled: set[str] = set()
+    for k in here:
+        x, y = (float(v) for v in mm_from_m(poses[k, :2]))
+        # The spindle's axis R z leans toward (sin b cos a, -sin a) for small yaw.
+        lean = np.array([np.sin(poses[k, 4]) * np.cos(poses[k, 3]), -np.sin(poses[k, 3])])
+        if lean.any():
+            dx, dy = (ARROW * half * lean / np.sin(np.radians(25.0))).tolist()
+            axes.plot([x, x + dx], [y, y + dy], color=INK, lw=2.6, zorder=4)
+            axes.plot([x, x + dx], [y, y + dy], color="white", lw=1.4, zorder=5)
+        marker, colour = MARKS[names.index(kinds[k]) % len(MARKS)]
+        axes.plot(x, y, marker, ms=8, mfc=colour, mec=INK, mew=1.2, zorder=6, ls="none")
+        if numbers[k] not in labelled:
+            box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.8}
+            # Towards the middle, so that labels stay in their panel; each elsewhere where marks crowd.
+            near = [j for j in here if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
+            place = list(dict.fromkeys(numbers[j] for j in near)).index(numbers[k]) % 4
+            left, above = (x > 0.25 * half) != (place >= 2), place % 2 == 0
+            if lean.any() and place == 0 and len(numbers[k]) < SHORT:  # not upon the line
+                left, above = bool(lean[0] > 0.0), bool(lean[1] <= 0.0)
+            axes.annotate(
+                numbers[k], (x, y), xytext=(-7 if left else 7, 6 if above else -6), textcoords="offset points",
+                ha="right" if left else "left", va="bottom" if above else "top", fontsize=7.5, zorder=7, bbox=box,
+            )  # fmt: skip
+            labelled.add(numbers[k])
+    axes.set_xlim(-half, half)
+    axes.set_ylim(-half, half)
+    axes.set_aspect("equal")
+    axes.grid(visible=False)
+
+
+def _legend(figure: Figure, kinds: Sequence[str]) -> None:
+    names = list(dict.fromkeys(kinds))
+    marks = [MARKS[k % len(MARKS)] for k in range(len(names))]
+    figure.legend(
+        [Line2D([], [], marker=shape, ls="none", ms=8, mfc=colour, mec=INK) for shape, colour in marks],
+        names, loc="lower left", bbox_to_anchor=(0.75 / figure.get_size_inches()[0], 0.0), handletextpad=0.2,
+        ncol=min(len(names), 6), frameon=False, fontsize=9, borderaxespad=0.6,
+    )  # fmt: skip
+
+
+PICTURES = {"plan.png": plan}

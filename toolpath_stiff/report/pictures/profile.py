@@ -1,0 +1,217 @@
+"""`profile.png`: stiffness along the path."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.markers import TICKUP
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from toolpath_stiff.analysis.results import Analysis
+from toolpath_stiff.analysis.statistics import stiffness_figures
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.report.colours import INK, MUTED, ORANGE, RED, SLATE
+from toolpath_stiff.report.curves import extremes_by_column, profile_band, profile_curve
+from toolpath_stiff.report.pictures.labels import CHARACTER, add_heading, add_legend, label_places
+from toolpath_stiff.report.pictures.style import DPI, POINTS, Look, new_figure, panel
+from toolpath_stiff.report.words import plain, shortened
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
+
+WIDTH, HEIGHT = 14.0, 6.2  # inches
+LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
+STEPS = (1, 2, 2.5, 5, 10)  # between ticks
+STRIP = 0.22  # height of the operations above the frame
+OPERATION_COLOURS = ("#ebeff4", "#d9e0e8")  # in turn
+NAME_SIZE, INSET = 8.5, 4.0  # points; pixels before a name
+CURVE_BLUE = "#2b59c3"
+MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
+MOST_ARROWS = 200  # of plunges beyond the axis; more would be a row of arrowheads
+MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seven pixels
+
+
+def profile(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
+    """Stiffness against path length; on the other machine a second curve; the required level, red below it.
+
+    With `show_plunges` the axis holds the plunges beside the headline, and they belong to the curve; else they are
+    grey, and arrows say where they leave the axis.
+    """
+    strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
+    figure = new_figure(WIDTH, HEIGHT)
+    frame = HEIGHT - TOP - BOTTOM - strip
+    axes = panel(figure, LEFT, BOTTOM, WIDTH - LEFT - RIGHT, frame)
+    s, k = profile_curve(analysis, show_plunges)
+    band = profile_band(analysis, show_plunges)
+    _set_limits(axes, analysis, band, show_plunges)
+    _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
+    _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
+    columns = int(axes.get_window_extent().width)
+    if (other := analysis.on_other) is not None:
+        _curve(axes, other, columns, (ORANGE, ORANGE, 3), "_", show_plunges)
+    if band is not None:
+        _draw_band(axes, s, band, columns)
+    _curve(axes, analysis, columns, (CURVE_BLUE, SLATE, 4), "plunges", show_plunges)
+    _levels(axes, analysis)
+    _tool_changes(axes, analysis)
+    if strip:
+        _operations(axes, analysis, strip / frame)
+    _line_numbers(axes, analysis, 1.0 + strip / frame)
+    places = analysis.weakest_rows
+    spots = [(float(s[row]), float(k[row])) for row in places]
+    label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
+    _legend(figure, axes)
+    add_heading(figure, analysis)
+    return figure
+
+
+def _curve(
+    axes: Axes, analysis: Analysis, columns: int, look: tuple[str, str, int], plunges: str, show_plunges: bool
+) -> None:
+    """The curve of a machine; the plunges that it leaves out as thin lines, and arrows where they leave the axes.
+
+    `look`: colour of the curve and of the plunges, order. `plunges` that begins with "_" does not enter the legend
+    (matplotlib's rule).
+    """
+    colour, aside, order = look
+    s, k = profile_curve(analysis, show_plunges)
+    keep = extremes_by_column(s, k, columns)
+    name = shortened(plain(analysis.machine.name), 30)
+    axes.plot(s[keep], k[keep], color=colour, linewidth=1.3, label=name, zorder=order)
+    if show_plunges or not analysis.set_aside.any():
+        return
+    k = np.where(analysis.set_aside, n_per_mm_from_n_per_m(analysis.at.stiffness), np.nan)
+    keep = extremes_by_column(s, k, columns)
+    low, high = axes.get_ylim()
+    above, below = k > high, k < low
+    style: Look = {"color": aside, "linewidth": 1.3, "linestyle": (0, (2, 1))}
+    axes.plot(s[keep], k[keep], zorder=order - 0.5, **style)
+    marker = "^" if above.any() else "v" if below.any() else "none"  # in the legend: of what is seen of them
+    axes.plot([], [], marker=marker, markersize=5, label=plunges, **style)
+    for beyond, edge, marker in ((above, 1.0, "^"), (below, 0.0, "v")):
+        start, stop = _runs(beyond)
+        middles = ((s[start] + s[stop]) / 2.0)[:MOST_ARROWS]
+        axes.plot(
+            middles, np.full(len(middles), edge), linestyle="none", marker=marker, markersize=7, color=aside,
+            transform=axes.get_xaxis_transform(), clip_on=False, zorder=6,
+        )  # fmt: skip
+
+
+def _runs(rows: BoolArray) -> tuple[IntArray, IntArray]:
+    """First and last row of every run in which `rows` holds."""
+    edges = np.diff(np.concatenate([[0], rows.astype(np.int8), [0]]))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+
+
+def _draw_band(axes: Axes, s: FloatArray, band: tuple[FloatArray, FloatArray], columns: int) -> None:
+    low, high = band
+    # Rows that keep the extremes of both edges: a band drawn on either's rows alone would cut the other's.
+    keep = np.union1d(extremes_by_column(s, low, columns), extremes_by_column(s, high, columns))
+    look: Look = {"color": CURVE_BLUE, "alpha": 0.18, "linewidth": 0}
+    axes.fill_between(s[keep], low[keep], high[keep], zorder=3, label="95 % of the fitted parameters", **look)
+
+
+def _set_limits(axes: Axes, analysis: Analysis, band: tuple[FloatArray, FloatArray] | None, show_plunges: bool) -> None:
+    machines = [analysis, *([analysis.on_other] if analysis.on_other else [])]
+    curves = [*(profile_curve(machine, show_plunges)[1] for machine in machines), *(band or ())]
+    low, high = float(min(np.nanmin(k) for k in curves)), float(max(np.nanmax(k) for k in curves))
+    if analysis.required is not None:
+        level = n_per_mm_from_n_per_m(analysis.required)
+        low, high = min(low, level), max(high, level)
+    pad = max(0.12 * (high - low), 0.005 * high)
+    axes.set_ylim(max(low - pad, 0.0), high + pad)
+    end = mm_from_m(float(analysis.samples.s[-1]))
+    axes.set_xlim(0.0, end or 1.0)
+    axes.set_xlabel("path length, mm (rapids included)")
+    axes.set_ylabel("stiffness along the load, N/mm")
+    axes.xaxis.set_major_locator(MaxNLocator(12, steps=STEPS))
+    axes.yaxis.set_major_locator(MaxNLocator(8, steps=STEPS))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if end > 20 else 2)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if high - low > 5 else 2)))
+    axes.grid(axis="x", visible=False)
+
+
+def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) -> None:
+    """Shade the spans of path in which `rows` holds."""
+    start, stop = _runs(rows)
+    if not len(start):
+        return
+    low, high = axes.get_ylim()
+    spans = [(float(s[i]), float(s[j] - s[i])) for i, j in zip(start, stop, strict=True)]
+    axes.broken_barh(spans, (low, high - low), facecolor=colour, edgecolor="none", label=label, zorder=1)
+
+
+def _levels(axes: Axes, analysis: Analysis) -> None:
+    mean = stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"]
+    if mean is not None:
+        axes.axhline(mean, color=INK, linewidth=1.0, linestyle=(0, (6, 3)), zorder=5, label=f"mean {number(mean)} N/mm")
+    if analysis.required is None:
+        return
+    level = n_per_mm_from_n_per_m(analysis.required)
+    axes.axhline(level, color=RED, linewidth=1.3, zorder=5, label=f"required {number(level)} N/mm")
+
+
+def _tool_changes(axes: Axes, analysis: Analysis) -> None:
+    """A dotted line where another tool takes over, while they can be told apart; labels while they are few."""
+    samples = analysis.samples
+    changes = np.flatnonzero(np.diff(samples.tool) != 0) + 1
+    if not 0 < len(changes) <= MOST_TOOL_LINES:
+        return
+    s = mm_from_m(samples.s[changes])
+    axes.vlines(s, 0, 1, transform=axes.get_xaxis_transform(), color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
+    if len(changes) > MOST_TOOL_LABELS:
+        return
+    for where, row in zip(s, changes, strict=True):
+        place, across = (float(where), 0.0), axes.get_xaxis_transform()
+        style: Look = {"textcoords": "offset points", "fontsize": 9, "color": MUTED}
+        axes.annotate(f"T{samples.tool[row]}", place, (4, 5), xycoords=across, **style)
+
+
+def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
+    """Named boxes above the frame, `height` of its height; lines where they begin, while these can be told apart."""
+    rows = analysis.operations.rows
+    first = np.searchsorted(analysis.samples.move, [row.first_move for row in rows])
+    edges = mm_from_m(np.append(analysis.samples.s[first], analysis.samples.s[-1]))
+    spans = list(zip(edges[:-1].tolist(), np.diff(edges).tolist(), strict=True))
+    across = axes.get_xaxis_transform()
+    if len(rows) <= MOST_TOOL_LINES:
+        axes.vlines(edges[1:-1], 0, 1, transform=across, color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
+    for which, colour in enumerate(OPERATION_COLOURS):
+        box: Look = {"facecolor": colour, "edgecolor": "none", "transform": across, "clip_on": False}
+        axes.broken_barh(spans[which::2], (1.0, height), zorder=2, **box)
+    pixels = float(axes.get_window_extent().width) / float(edges[-1] or 1.0)
+    inset = INSET / DPI * POINTS
+    for row, (start, length) in zip(rows, spans, strict=True):
+        letters = int((length * pixels - 2.0 * INSET) / CHARACTER)  # a name of four letters and less tells nothing
+        text = f"{row.number} {plain(row.name)}"
+        text = (
+            shortened(text, letters) if letters > len(str(row.number)) + 4 or len(text) <= letters else str(row.number)
+        )
+        if len(text) <= letters:
+            axes.annotate(
+                text, (start, 1.0 + height / 2.0), (inset, 0.0), xycoords=across, textcoords="offset points",
+                fontsize=NAME_SIZE, va="center", zorder=6, annotation_clip=False,
+            )  # fmt: skip
+
+
+def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
+    """Program lines above the frame, at `height` of its height, where the ticks below fall."""
+    end = float(analysis.samples.s[-1])
+    where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
+    rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)
+    across = axes.get_xaxis_transform()
+    places = mm_from_m(where)
+    axes.plot(
+        places, np.full(len(places), height), linestyle="none", marker=TICKUP, markersize=3.5, color=MUTED,
+        markeredgewidth=0.8, transform=across, clip_on=False, zorder=2,
+    )  # fmt: skip
+    words: Look = {"fontsize": 9.0, "color": MUTED, "ha": "center"}
+    words |= {"textcoords": "offset points", "annotation_clip": False}
+    for place, row in zip(places.tolist(), rows.tolist(), strict=True):
+        axes.annotate(str(analysis.samples.line[row]), (place, height), (0.0, 7.0), xycoords=across, **words)
+    axes.annotate("program line", (0.5, height), (0.0, 20.0), xycoords="axes fraction", **words)
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    keys = list(zip(*axes.get_legend_handles_labels(), strict=True))
+    look = {"ncols": len(keys) or 1, "fontsize": 9.5, "columnspacing": 1.4, "handlelength": 1.8}
+    add_legend(figure, keys, (1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT), loc="upper right", **look)

@@ -1,0 +1,161 @@
+"""Residuals against everything that the model does not use."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.comparison.compare import Comparison
+from toolpath_stiff.comparison.residuals import ReadingNames, Variable, directions
+from toolpath_stiff.comparison.structure import SIGNIFICANT
+from toolpath_stiff.comparison.summary import PatternTest
+from toolpath_stiff.inference.errors import deviation_percent
+from toolpath_stiff.report.colours import DIRECTIONS, MUTED, RED
+from toolpath_stiff.report.pictures.compare_machine import direction_key
+from toolpath_stiff.report.pictures.style import new_figure, panel
+from toolpath_stiff.report.words import RESIDUAL_AXIS, plain, shortened
+
+ACROSS = 5  # panels in a row
+PITCH = 2.15  # inches from one row of panels to the next
+MOST_NAMES = 8  # levels of a label that are written out
+WIDE = 7.5  # median deviations, some 5 standard deviations: readings further off stand at the edge
+
+
+def variables(comparison: Comparison) -> Figure:
+    """Residual against each variable, the strongest first; readings far off stand at the edge."""
+    limits = _limits(comparison)
+    panels: list[tuple[float, float, Variable | ReadingNames]] = []
+    held_against: list[Variable | ReadingNames] = [*comparison.numbers, *comparison.names]
+    for variable in held_against:
+        tests = [test for test in comparison.summary.tests if _about(test, variable.name)]
+        strongest = max((abs(test.statistic) for test in tests), default=0.0)
+        panels.append((-strongest, min((test.p_adjusted for test in tests), default=1.0), variable))
+    panels.sort(key=lambda panel: panel[0])
+    height = 1.0 + PITCH * max(-(-len(panels) // ACROSS), 1)
+    figure = new_figure(
+        15.0, height, "Which variable is missing?", f"{RESIDUAL_AXIS}; lines: a direction's own trend; p: of the "
+        "strongest pattern, corrected for all that were looked for; triangles: beyond the frame",
+    )  # fmt: skip
+    for k, (_, p, variable) in enumerate(panels):
+        i, j = divmod(k, ACROSS)
+        axes = panel(figure, 0.6 + 2.88 * j, height - 1.0 - PITCH * (i + 1) + 0.42, 2.62, 1.45)
+        _panel(axes, comparison, variable, limits)
+        axes.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
+        axes.set_ylim(*limits)
+        axes.tick_params(labelsize=7.5, pad=2)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_label_coords(0.5, 0.0)  # without a name: none is to be kept clear of the figures
+        if j:
+            axes.set_yticklabels([])
+        unit = str(getattr(variable, "unit", ""))
+        name = plain(variable.name.removesuffix(f"_{unit}").replace("_", " ")) + (f", {unit}" if unit else "")
+        axes.set_title(shortened(name, 30), fontsize=9, pad=3)
+        sure = p < SIGNIFICANT
+        shown, weight, colour = (f"p = {p:.2g} *", "bold", RED) if sure else (f"p = {p:.2g}", "normal", MUTED)
+        axes.set_title(shown, fontsize=8.5, pad=3, loc="right", weight=weight, color=colour)
+    direction_key(figure, comparison)
+    return figure
+
+
+def _about(test: PatternTest, name: str) -> bool:
+    """Whether a pattern is about this variable, or a level of this label, or the same as one that is."""
+    about = [test.variable, *(same.partition(": ")[2] for same in test.same)]
+    return any(variable == name or variable.startswith(f"{name} ") for variable in about)
+
+
+def _limits(comparison: Comparison) -> tuple[float, float]:
+    """Range shown: all, but a few wild readings do not squeeze the others."""
+    values = deviation_percent(comparison.residual)
+    middle = float(np.median(values))
+    reach = WIDE * float(np.median(np.abs(values - middle)))
+    kept = values[np.abs(values - middle) <= reach] if reach > 0.0 else values
+    margin = 0.08 * max(float(np.ptp(kept)), 0.1)
+    return float(kept.min()) - margin, float(kept.max()) + margin
+
+
+def _panel(axes: Axes, comparison: Comparison, variable: Variable | ReadingNames, limits: tuple[float, float]) -> None:
+    """Points by direction; a trend line a direction, or the means of levels."""
+    residual, along = deviation_percent(comparison.residual), directions(comparison.data)
+    x, names = _places(variable)
+    present = [axis for axis in DIRECTIONS if (along == axis).any()]
+    for k, axis in enumerate(present):
+        rows = (along == axis) & np.isfinite(x)
+        if not rows.any():
+            continue
+        shift = 0.16 * (k - (len(present) - 1) / 2.0) if 0 < len(names) <= MOST_NAMES else 0.0
+        _points(axes, x[rows] + shift, residual[rows], limits, DIRECTIONS[axis], 2.6 if len(x) > 100 else 4.0)
+        held = np.clip(residual[rows], *limits)
+        if not names:
+            _trend(axes, x[rows], held, DIRECTIONS[axis])
+        elif len(names) <= MOST_NAMES:
+            _level_means(axes, x[rows], held, shift, DIRECTIONS[axis])
+    _name_levels(axes, names)
+
+
+def _places(variable: Variable | ReadingNames) -> tuple[FloatArray, list[str]]:
+    """Where the readings stand across a panel, and the names of the levels there, if it has any."""
+    if variable.values.dtype.kind == "f":
+        return np.asarray(variable.values, dtype=float), []
+    names = sorted(set(variable.values.tolist()), key=_rank)
+    return np.array([names.index(level) for level in variable.values.tolist()], dtype=float), names
+
+
+def _points(
+    axes: Axes, x: FloatArray, residual: FloatArray, limits: tuple[float, float], colour: str, size: float
+) -> None:
+    """Readings as dots; those beyond the axis as arrowheads at its edge."""
+    off = np.sign(residual) * ((residual < limits[0]) | (residual > limits[1]))
+    for side, marker in ((0, "o"), (1, "^"), (-1, "v")):
+        chosen = off == side
+        if not chosen.any():
+            continue
+        seen = np.clip(residual[chosen], limits[0] + 0.3, limits[1] - 0.3) if side else residual[chosen]
+        # Arrowheads above all dots: dots that follow each other become one image of a page, not one a direction.
+        axes.plot(
+            x[chosen], seen, marker, color=colour, ms=size + abs(side), mew=0, alpha=0.55, zorder=2 + 0.1 * abs(side)
+        )
+
+
+def _level_means(axes: Axes, x: FloatArray, held: FloatArray, shift: float, colour: str) -> None:
+    """A short bar at the mean of each level."""
+    for level in np.unique(x):
+        mean, middle = float(held[x == level].mean()), float(level) + shift
+        axes.plot([middle - 0.09, middle + 0.09], [mean, mean], color=colour, lw=2.4, zorder=4)
+
+
+def _trend(axes: Axes, x: FloatArray, held: FloatArray, colour: str) -> None:
+    """The straight line of least squares, where two places and more than two readings make one."""
+    if float(np.ptp(x)) > 0.0 and len(x) > 2:
+        slope, level = np.polyfit(x - x.mean(), held, 1)
+        ends = np.array([x.min(), x.max()])
+        axes.plot(ends, level + slope * (ends - x.mean()), color=colour, lw=1.3, zorder=4)
+
+
+def _name_levels(axes: Axes, names: list[str]) -> None:
+    """Ticks: the levels' names, the first and the last of many, or numbers."""
+    if not names:
+        axes.locator_params(axis="x", nbins=4)
+    elif len(names) <= MOST_NAMES:
+        room = max(int(46 / len(names)) - 2, 4)
+        axes.set_xticks(range(len(names)), [shortened(plain(_brief(name)) or "(none)", room) for name in names])
+        axes.set_xlim(-0.5, len(names) - 0.5)
+    else:
+        axes.set_xticks([0, len(names) - 1], ["first", f"last of {len(names)}"])
+        axes.get_xticklabels()[1].set(ha="right")
+
+
+def _rank(name: str) -> tuple[float, str]:
+    """Order of levels: by number if they are numbers, else by letter."""
+    try:
+        return float(_brief(name)), name
+    except ValueError:
+        return float("inf"), name
+
+
+def _brief(name: str) -> str:
+    """A level's name without what the panel's title says."""
+    for word in ("plane at z = ", " plane", " the axis", " third", "from", " mm"):
+        name = name.replace(word, "")
+    return name

@@ -1,1 +1,0 @@
-"""The page, pictures and set-up sheet of a placement."""

@@ -1,0 +1,209 @@
+"""The results of an update: page and text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from textwrap import fill
+
+import numpy as np
+
+from toolpath_stiff.correction.document import residuals_csv
+from toolpath_stiff.correction.outcome import FORCED, NOTHING, REFUSED, UPDATED
+from toolpath_stiff.correction.result import Update
+from toolpath_stiff.correction.steps import LadderStep
+from toolpath_stiff.correction.strut_law import bar_curve_csv
+from toolpath_stiff.diagnosis.rows import FittedSize, percent_of
+from toolpath_stiff.report.pages import Drawing, Hints, Section, page_of, readings_head
+from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, WIDTH, counted, machine_text, percent, plain
+from toolpath_stiff.units import number
+
+VERDICTS = {
+    UPDATED: "The machine is updated",
+    REFUSED: "Refused: the data do not support it",
+    FORCED: "Added by force",
+    NOTHING: "Nothing to add",
+}
+PAGE = "report.html"
+# Picture -> the question that it answers, and how it is read.
+QUESTIONS = {
+    "ladder.png": (
+        "What does each step do to the error?",
+        "From the machine file as given over its refitted strut law to the last model. What counts is the error at "
+        "left-out points, which the fit has not seen. A fit weighs readings by their scatter, so that a step can raise "
+        "this mean. Effects that only together lower it are one step. Bars: standard error of the step; an error below "
+        "the noise floor is chance.",
+    ),
+    "before_after.png": (
+        "Did the error fall, and what remains?",
+        f"{DEVIATION}, {MINUS_IS_SOFTER} (red); blue: stiffer; both halves on one colour scale. A pattern that remains "
+        "is something else that the model lacks.",
+    ),
+    "figure3.png": (
+        "How stiff must the platform be taken?",
+        "The paper: above 1e10 N/m a stiffer platform changes nothing. With the strut law refitted for each, "
+        "the curve is all but flat: these readings cannot tell a soft platform from soft struts.",
+    ),
+}
+
+
+def page(update: Update, drawn: Mapping[str, Drawing]) -> str:
+    """The page, the pictures within."""
+    document, provenance = update.document, update.provenance
+    record = [
+        f"command: {provenance['command']}",
+        f"SHA-256 of the data: {provenance['data_sha256']}",
+        f"machine file: {document['machine_file'] or 'none written'}",
+    ]
+    sections: list[Section] = [
+        *QUESTIONS,
+        ("Errors by direction", _by_direction(update), f"Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."),
+        ("What was fitted", _fitted(update)),
+        ("Do the data support it?", _support(update)),
+        ("What to do next", Hints(update.next)),
+        ("Where it comes from", record),
+        ("Assumptions", [*document["assumptions"], *document["notes"]]),
+    ]
+    head = readings_head("update", document, VERDICTS[update.verdict], _headline(update), _figures(update))
+    return page_of(head, sections, drawn, QUESTIONS)
+
+
+def _headline(update: Update) -> str:
+    given, findings = f"Mean error {_percent(update.steps[0].error)} as given", update.steps[-1].fit.findings
+    if update.verdict == NOTHING:
+        return f"{given}, and nothing to add"
+    if findings and update.verdict in (UPDATED, FORCED):
+        cause = "; ".join(findings)
+        return cause[0].upper() + cause[1:] + (" (described, not confirmed)" if update.described else "")
+    return f"{given}, {_percent(update.steps[-1].error)} after"
+
+
+def _figures(update: Update) -> list[tuple[str, str]]:
+    last, by_likelihood = update.steps[-1], update.task.objective == "likelihood"
+    figures = [(_percent(update.steps[0].error), "mean error as given")]
+    if by_likelihood:
+        figures.append((_percent(update.refitted.error), "mean error, strut law refitted"))
+    if last.fit.names or not by_likelihood:
+        figures.append((_percent(last.error), f"mean error {last.title}" if last.fit.names else last.name))
+    figures.append((_percent(last.held.mean_error), "the same at left-out points"))
+    figures.append((percent(update.noise.floor_percent, 2), "would be left by scatter alone"))
+    return figures
+
+
+def _result(update: Update) -> LadderStep:
+    """The model that comes out: the last step, the machine file as given where nothing is added."""
+    return update.steps[0 if update.verdict == NOTHING else -1]
+
+
+def _by_direction(update: Update) -> Table:
+    first, last = update.steps[0].by_direction, _result(update).by_direction
+    rows = [
+        (
+            name,
+            before["readings"],
+            percent(before["mean_abs_error_percent"], 2),
+            percent(last[name]["mean_abs_error_percent"], 2),
+            percent(last[name]["held_out_error_percent"], 2),
+            f"{before['bias_percent']:+.1f} %",
+            f"{last[name]['bias_percent']:+.1f} %",
+        )
+        for name, before in first.items()
+    ]
+    figures = (">as given", ">after", ">after, left out", ">bias as given", ">bias after")
+    return Table(("direction", ">readings", *figures), rows)
+
+
+def _fitted(update: Update) -> Table:
+    step = _result(update)
+    rows = [
+        (
+            "strut law",
+            "at every length" if end.length_mm is None else f"at {end.length_mm:.1f} mm",
+            f"{end.stiffness:.2f} N/um",
+            f"sd {end.sd:.2g} N/um",
+        )
+        for end in step.law_ends(update.task.machine.strut_law, update.widening)
+        if end.sd is not None
+    ]
+    for effect, entry in step.sizes(update.widening).items():
+        for key, value in entry.items():
+            if isinstance(value, FittedSize):
+                low, high = map(_value, value.interval)
+                rows.append((effect, key, f"{_value(value.value)} {value.unit}", f"{low} to {high}"))
+            else:
+                rows.append((effect, key, str(value), "chosen"))
+    return Table(("effect", "parameter", ">value", ">95 % interval, or sd"), rows)
+
+
+def _support(update: Update) -> Table:
+    rows = [
+        (
+            support.effect,
+            "yes" if support.supported else "no",
+            f"{support.gain_in_se:+.1f} se" if np.isfinite(support.gain_in_se) else "-",
+            f"{number(support.likelihood_gain, 1)} (chance: {number(support.threshold, 1)})",
+            "; ".join(support.reasons),
+        )
+        for support in (*update.supports, *update.turned_down)
+    ]
+    head = ("effect", "supported", ">fall at left-out points", ">gain in twice the log likelihood")
+    return Table((*head, "what is against it"), rows)
+
+
+def _ladder(update: Update) -> Table:
+    """The error of each step, and what scatter alone would leave."""
+    rows = [
+        (
+            step["name"],
+            percent(step["mean_abs_error_percent"], 2),
+            percent(step["held_out_error_percent"], 2),
+            number(step.get("held_out_gain_in_se"), 1),
+        )
+        for step in update.document["steps"]
+    ]
+    rows.append(("noise floor", percent(update.noise.floor_percent, 2), "", ""))
+    return Table(("", ">error", ">left out", ">gain/SE"), rows)
+
+
+def _percent(share: float) -> str:
+    return percent(percent_of(share), 2)
+
+
+def _value(value: float | None) -> str:
+    return "inf" if value is None else f"{value:.4g}"
+
+
+def text(update: Update) -> str:
+    """Ladder, errors by direction before and after, parameters, what was turned down."""
+    document, fitted = update.document, _fitted(update)
+    data = f"{counted(document['readings'], 'reading')} of {', '.join(map(plain, update.task.files))}"
+    lines = [
+        f"data     {data}, machine {machine_text(document)}",
+        fill(f"result   {update.verdict.upper()}. {plain(document['text'])}", WIDTH, subsequent_indent=" " * 9),
+        "",
+        *_ladder(update).lines(least=0),
+        f"noise: {plain(update.noise.origin)}",
+        "",
+        *_by_direction(update).lines(least=0),
+    ]
+    lines += ["", *fitted.lines(least=0)] if fitted.rows else []
+    if update.turned_down:
+        lines += ["", "tried and not added"]
+        for support in update.turned_down:
+            lines.append(fill(f"  {support.effect}: {'; '.join(support.reasons)}", WIDTH, subsequent_indent=" " * 4))
+    lines += [""] + [f"warning: {plain(warning)}" for warning in document["warnings"]]
+    lines += [f"note: {plain(note)}" for note in document["notes"]]
+    return "\n".join(lines).rstrip()
+
+
+def _bar_curve(update: Update) -> str:
+    assert update.bars is not None
+    return bar_curve_csv(update.bars)
+
+
+DATA = {
+    "update.json": Update.to_json,
+    "residuals.csv": residuals_csv,
+    "machine.toml": Update.machine_text,
+    "figure3.csv": _bar_curve,
+}
