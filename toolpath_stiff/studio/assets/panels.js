@@ -84,8 +84,8 @@ function portrait(p, act) {
     h("div", { class: "two" }, h("div", {}, h("b", {}, "where"), bars(p.links, "link")),
       h("div", {}, h("b", {}, "varies with"), bars(p.variables, "variable"))),
     figures([["rms at left-out points", percent(p.held_out_rms_percent)],
-      ["noise there", percent(p.noise_floor_percent)], ["best that a smooth form could do",
-      percent(p.smooth_rms_percent)], ["of the misfit explained", percent(p.explained_percent, 0)]]),
+      ["noise there", percent(p.noise_floor_percent)],
+      ["of the misfit explained", percent(p.explained_percent, 0)]]),
     p.terms.length ? h("div", { class: "actions live" }, button("Draft it as an effect", () => act({ do: "draft" }),
       { id: "draft" }), h("span", { class: "muted" },
       "a commented file that competes with the others; new readings must confirm it")) : null);

@@ -281,10 +281,10 @@ function draw() {
   document.title = `${state.case}: toolpath_stiff studio`;
   const waiting = r && !v ? "Judging the readings" : r ? "" : "What does the machine do, and does the model say so?";
   $("sentence").classList.toggle("waiting", Boolean(waiting));
-  $("sentence").replaceChildren(waiting || `${v.sentence}.`, v ? h("small", {}, v.text.slice(v.sentence.length + 2)) : "");
+  $("sentence").replaceChildren(...(waiting ? [waiting] : [`${v.sentence}.`,
+    h("small", {}, v.text.slice(v.sentence.length + 2))]));
   $("gauge").replaceChildren(gaugeOf(state));
-  for (const [id, many] of [["undo", state.history.length > 1], ["redo", state.undone.length]]) if ($(id)) $(
-    id).disabled = !many;
+  for (const [id, many] of [["undo", state.history[1]], ["redo", state.undone[0]]]) if ($(id)) $(id).disabled = !many;
   scene.paths = [];
   if (state.program?.path && here >= state.program.path.s_mm.length) here = scene.sample = -1;
   classify();
