@@ -22,6 +22,7 @@ from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.planning.plan import INDICATORS
 from toolpath_stiff.portrait.words import alike_text
 from toolpath_stiff.stiffness.sizes import joined
+from toolpath_stiff.units import mm_from_m
 
 
 def verdict_text(diagnosis: Examination) -> str:
@@ -241,6 +242,9 @@ def assumptions(diagnosis: Examination) -> list[str]:
     """What was assumed, in sentences."""
     noise = diagnosis.noise
     sentences = [
+        f"noise: {noise.origin}",
+        f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
+        f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
         f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: "
         + ("assumed" if noise.outliers == OUTLIERS else "as the repeats have it"),
         f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "
