@@ -171,7 +171,7 @@ def test_the_gate_fails_where_a_cut_has_no_figure(tmp_path, monkeypatch, capsys,
     monkeypatch.chdir(tmp_path)
     Path("part.nc").write_text(f"G21 G90\nG0 X0 Y0 Z0\n{move}\nM2\n")
     assert main(["analyze", "part.nc", "--no-plots", "--require", "1", *option]) == 3
-    assert "line 3: no stiffness" in capsys.readouterr().out
+    assert f"1 line below the required 1 N/mm:\n  line 3  no stiffness  {move}\n" in capsys.readouterr().out
     assert main(["analyze", "part.nc", "--no-plots", *option]) == (1 if option else 0)
     found = tps.analyze("part.nc", "nist", require_N_per_mm=1.0, partial=bool(option))
     assert found.below_required[0][0] == 3 and "part.nc on nist" in repr(found)

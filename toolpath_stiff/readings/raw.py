@@ -108,10 +108,7 @@ class Reduction(Result):
     def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
         """The measurement file; beside it the picture of the loops, and of dated struts that over their dates."""
         out, pictures = Path(file), self.view.pictures(self) if plots else {}
-        beside = {
-            out.with_name(f"{out.stem}_{name}"): content() if callable(content) else content
-            for name, content in pictures.items()
-        }
+        beside = {out.with_name(f"{out.stem}_{name}"): content for name, content in pictures.items()}
         return {out: measurement_csv(self.figures, self.history), **beside}
 
     def save(self, file: str | Path, *, plots: bool = True) -> list[Path]:

@@ -11,7 +11,7 @@ from toolpath_stiff.analysis.statistics import FIGURES
 from toolpath_stiff.documents import Document
 from toolpath_stiff.report.pages import markup
 from toolpath_stiff.report.tables import LABEL, Table
-from toolpath_stiff.report.words import WIDTH, duration, machine_text, shortened
+from toolpath_stiff.report.words import WIDTH, counted, duration, machine_text, shortened
 from toolpath_stiff.units import number
 
 # Who read a program, for headings (`Program.interpreter`).
@@ -180,7 +180,8 @@ def required(analysis: Analysis) -> tuple[str, Table]:
         )
         for row in below[:MOST_ROWS]
     ]
-    return f"{len(below)} lines below the required {level} N/mm{more}:", Table(("", ">lowest N/mm", "program"), rows)
+    sentence = f"{counted(len(below), 'line')} below the required {level} N/mm{more}:"
+    return sentence, Table(("", ">lowest N/mm", "program"), rows)
 
 
 def comparison(summary: Document, other: Document) -> Table:
