@@ -84,6 +84,10 @@ SHORT = {
     "a full circle of many digits": ("G20", "G1 X1.123456 Y.3\nG3 X1.123456 I-1 J0\nG1 X2"),
     "one digit in another plane": ("G21", "G18\nG1 X1 Z0\nG3 X1 Z-0.0001 I-1 K0\nG1 X2"),
     "after an offset": ("G21", "G55\nG1 X1 Y0\nG3 X1 Y0.00004 I-1 J0\nG54\nG1 X2"),
+    "with a code beside it": ("G20", "M3 S100\nG1 X1 Y0\nG3 X1 Y0.00003 I-1 J0 M8\nG1 X2"),
+    "from where, in G91": ("G20", "G1 X1 Y0\nG91 G3 X0 Y0.00003 I-1 J0\nX0 Y-0.00003 I-1 J0\nG90 G1 X2 Y0"),
+    "a full circle of many digits in G91": ("G20", "G1 X1.123456 Y.3\nG91\nG3 X0 Y0 I-1 J0\nG90 G1 X2"),
+    "a full circle behind G91": ("G20", "G91 G1 X.1\nG90 X1.123456 Y.3 M8\nG3 X1.123456 Y.3 I-1 J0\nG1 X2"),
     "of many": ("G21", "".join(f"G1 X{i} Y0\nG3 X{i} Y0.00004 I-1 J0\nX{i} Y0.0001 I-1\n" for i in range(2, 40))),
 }
 
@@ -107,5 +111,11 @@ def test_a_computed_end_that_may_be_either_is_refused(tmp_path):
     with pytest.raises(InputError, match="may be a full circle") as caught:
         read_program(file, interpreter="linuxcnc")
     assert caught.value.line == 3
+    file.write_text(f"G20 {HEAD}G1 X1 Y0\nG3 X1 Y[0.00003] I-1 J0\nG1 X2\nM2\n")  # printed as a full circle is
+    with pytest.raises(InputError, match="may be a full circle"):
+        read_program(file, interpreter="linuxcnc")
+    file.write_text(f"G20 {HEAD}G1 X1 Y0.00003\nG55\nG3 X1 Y0 I-1 J0\nG1 X2\nM2\n")
+    with pytest.raises(InputError, match="may be a full circle"):
+        read_program(file, interpreter="linuxcnc")
     file.write_text(f"G20 {HEAD}G1 X[0.5+0.5] Y0\nG3 X[1] Y0 I-1 J0\nG1 X2\nM2\n")
     assert move_lengths(read_program(file, interpreter="linuxcnc").moves).max() > 0.1

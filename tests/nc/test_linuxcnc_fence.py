@@ -11,13 +11,11 @@ from pathlib import Path
 import pytest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL
 from toolpath_stiff.nc.linuxcnc import reader, runner
 from toolpath_stiff.nc.linuxcnc.runner import RunLimits
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program, read_program
-from toolpath_stiff.nc.request import ZERO, Request
-from toolpath_stiff.nc.tables import Offsets
+from toolpath_stiff.nc.request import Request
 
 INSTALLED = shutil.which("rs274") is not None
 needs_rs274 = pytest.mark.skipif(not INSTALLED, reason="LinuxCNC's rs274 is not installed")
@@ -254,8 +252,8 @@ def test_a_program_is_not_changed_and_a_run_leaves_no_trace_in_the_next(tmp_path
 
 
 def read_limited(text: str, limits: RunLimits, unconfined: bool = False) -> ReadProgram:
-    program = (tuple(text.split("\n")), "part.nc", "", None, ZERO, Offsets(), None, False, "linuxcnc", None, unconfined)
-    return reader.read(Request(*program, UNKNOWN_CONTROL), limits)
+    lines = tuple(text.split("\n"))
+    return reader.read(Request(lines, "part.nc", interpreter="linuxcnc", unconfined=unconfined), limits)
 
 
 @needs_rs274

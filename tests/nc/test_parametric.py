@@ -385,3 +385,9 @@ def test_any_text_is_read_or_refused(text):
 def test_rapids_of_a_macro_are_rapids():
     moves = parse_program("G65 P10 X5.\nM30\nO10\nG0 X#24\nG1 X1. F9.\nM99\n", controller=FANUC).moves
     assert moves.motion.tolist() == [RAPID, FEED]
+
+
+def test_a_loop_that_counts_in_a_work_offset_ends():
+    text = "G21 G90 F100\nG10 L2 P1 X0.\nWHILE[#5221 LT 3.] DO1\nG10 L2 P1 X[#5221+1.]\nEND1\nG1 X2.\nM30\n"
+    program = parse_program(text, "p.nc", controller=Controller(dialect_named("fanuc")))
+    assert program.moves.start[0, 0] == pytest.approx(-3e-3)  # three passes

@@ -37,8 +37,11 @@ HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 LEAVES = re.compile(r"O|.*M0*9[89](?!\d)")  # lines of which rs274 prints no comment: calls, returns, loops, conditions
-# A block that moves in program coordinates, in the modes in force, and says where by numbers alone.
-PLAIN_BLOCK = re.compile(r"(?:G0*[0-3](?![\d.])|[XYZABCIJKRFSP][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII)
+FINE_WORD = re.compile(r"[XYZ]\[?[-+]?\d*\.\d{4,}[1-9]")  # more decimals than rs274 prints
+# A block that moves in program coordinates, in the unit in force, and says where by numbers alone.
+PLAIN_BLOCK = re.compile(
+    r"(?:G(?:0*[0-3]|1[789]|9[014])(?![\d.])|M0*[3-9](?!\d)|[XYZABCIJKRFSPT][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII
+)
 COORDINATE = re.compile(r"([XYZ])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
@@ -87,7 +90,8 @@ class Follower:
 
     def __post_init__(self) -> None:
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
-        self.incremental = any("1" in DISTANCE_MODE.findall(line.plain) for line in self.lines)
+        self.fine = any(FINE_WORD.search(line.words) for line in self.lines)
+        self.incremental = False
         # The numbers of plain blocks, of this line and before it, in the digits of the program.
         self.given, self.given_before = dict[str, str](), dict[str, str]()
         self.passed = [0]  # how many of the first lines no run that comes straight on leaves out
@@ -121,9 +125,12 @@ class Follower:
         if text.isdigit():
             self._note_jump(int(text))
             self.line, self.moves_of_line = int(text), 0
-            words, self.given_before = self.lines[self.line - 1].words, self.given
-            plain = not self.incremental and PLAIN_BLOCK.fullmatch(words)
-            self.given = {**self.given, **dict(COORDINATE.findall(words))} if plain else {}
+            words, was = self.lines[self.line - 1].words, self.incremental
+            modes = DISTANCE_MODE.findall(words)
+            self.incremental = modes[-1] == "1" if modes else was
+            self.given_before = dict.fromkeys("XYZ", "0") if self.incremental else {} if was else self.given
+            plain = PLAIN_BLOCK.fullmatch(words)
+            self.given = {**self.given_before, **dict(COORDINATE.findall(words))} if plain else {}
             codes = MOTION_CODE.findall(self._words(self.line))
             if codes:
                 self.cycle = codes[-1] in CYCLE_CODES
@@ -327,9 +334,10 @@ class Follower:
             numbers = [given.get(AXES[axis], "nan") for given in (self.given, self.given_before)]
             step = float(numbers[0]) - float(numbers[1])
             if not abs(step) <= SAME_PLACE:  # computed, or compensated
-                if apart > ROUNDING:
+                if apart > ROUNDING or self.fine:
                     problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
-                    raise self.fail(problem, "an end that is the start, or more than 0.0002 from it", line=self.line)
+                    expected = "a full circle without its end words, or an end more than 0.0002 from the start"
+                    raise self.fail(problem, expected, line=self.line)
                 return here
             end[axis] += step * self.scale
         return end

@@ -74,7 +74,10 @@ class ParametricRun(ValuesRun):
         kept = repr((state.frames.position, known.levels, known.common, known.named, self._counts, self._levels))
         if len(state.recorder) != self._moved[0]:
             self._moved = (len(state.recorder), self._steps)
-        if kept == self._passes.get(row) or self._steps - self._moved[1] > MOST_IDLE:
+        last = self._passes.get(row, "")
+        if last.startswith(kept):  # the offsets, which take long to write down, only then
+            kept += repr(state.frames)
+        if kept == last or self._steps - self._moved[1] > MOST_IDLE:
             problem = f"the loop back to line {self._place(to).line} never ends"
             raise self._fail(row, f"{problem}: no variable or position changes, or nothing moves", "a loop that ends")
         self._passes[row] = kept
