@@ -132,4 +132,4 @@ def test_without_the_package_the_extra_is_named(shop, capsys, monkeypatch):
 
 def test_jobs_are_not_for_a_cluster(shop, capsys):
     assert main(["analyze", "jobs", "--cluster", "tcp://127.0.0.1:8786", "--jobs", "2"]) == 2
-    assert "--jobs with --cluster" in capsys.readouterr().err
+    assert "--cluster with --jobs; expected one of the two" in capsys.readouterr().err

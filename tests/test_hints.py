@@ -17,6 +17,7 @@ from tests.machine.test_machine_files import HAL
 from toolpath_stiff.cli.main import COMMANDS, main
 from toolpath_stiff.diagnosis.words import next_steps
 from toolpath_stiff.hints import ARGUMENTS, Asked, command_line, hint, parted
+from toolpath_stiff.nc.program import Reading
 from toolpath_stiff.rig import case, exercise
 
 PACKAGE = Path(toolpath_stiff.__file__).parent
@@ -230,4 +231,4 @@ def test_the_arguments_of_options_are_arguments_of_public_functions():
     functions = [getattr(toolpath_stiff, name) for name in toolpath_stiff.__all__]
     functions += [toolpath_stiff.Program.read, toolpath_stiff.Machine.load, toolpath_stiff.Analysis.save]
     taken = {name for one in functions if inspect.isroutine(one) for name in inspect.signature(one).parameters}
-    assert set(ARGUMENTS.values()) <= taken
+    assert set(ARGUMENTS.values()) <= taken | set(Reading.__annotations__)  # `Program.read` takes these by Unpack

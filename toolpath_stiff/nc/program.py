@@ -220,7 +220,14 @@ class Program:
         return self._last[0][1]
 
     def placed(self, origin: Pose | None, default_origin: Pose) -> Request:
-        """What the reader takes, for a zero."""
+        r"""What the reader takes, for a zero, SI.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.Program.from_text("G21 G90\nG1 X40 F300\nM2", name="slot.nc").placed(None, (0.0,) * 6).name
+        'slot.nc'
+        """
         request = replace(self.request, lines=self.lines, name=self.name, path=self.file or "")
         return replace(request, origin=origin, default_origin=default_origin)
 

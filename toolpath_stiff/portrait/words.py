@@ -111,6 +111,7 @@ def _cause(term: Term) -> str:
     }
     words["softer"] = f"{strut} {'is' if single else 'are'} {'softer' if more else 'stiffer'}"
     words["pin"] = f"{term.action.removesuffix(' pin')} {joint} of {strut} {give}"
+    words["pinned"] = PINNED.get(direction, "")
     words["vertex"] = f"{vertex} {give} way {GIVES.get(direction, '')}"
     return CAUSES[term.action].format(**words, **term.constants)
 

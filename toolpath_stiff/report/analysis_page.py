@@ -24,7 +24,7 @@ from toolpath_stiff.report import analysis_tables as words
 from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.curves import beyond_scale, cutting_box, extremes_by_column, profile_curve, scale_limits
 from toolpath_stiff.report.pages import Part, markup, part, render
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
 
@@ -78,18 +78,18 @@ def _tables(analysis: Analysis, weakest: Sequence[int]) -> list[tuple[str, Marku
     tables: list[tuple[str, Sequence[Part], bool]] = [
         ("Tools", [words.tool_table(summary["per_tool"])], True),
         ("Operations", [words.operation_table(operations), *more] if len(operations) > 1 else [], True),
-        ("Figures", [Table((), figures)], False),
+        ("Figures", [ShownTable((), figures)], False),
         ("Weakest places", [_places(summary["weakest_places"], weakest)], False),
         ("Required stiffness", [*words.required(analysis)] if "required" in summary else [], False),
         ("Comparison", [words.comparison(summary, other.to_dict())] if other is not None else [], False),
         ("Assumptions", [summary["assumptions"]], False),
-        ("Read, but not acted upon", [Table(("line:column", "word", "why"), ignored), *more_words], False),
+        ("Read, but not acted upon", [ShownTable(("line:column", "word", "why"), ignored), *more_words], False),
     ]
     shown = ((title, Markup().join(map(part, parts)), wide) for title, parts, wide in tables)
     return [entry for entry in shown if entry[1]]
 
 
-def _places(places: Sequence[Document], weakest: Sequence[int]) -> Table:
+def _places(places: Sequence[Document], weakest: Sequence[int]) -> ShownTable:
     button = '<button type="button" class="place" data-line="{}" data-sample="{}">line {}</button>'
     rows = [
         (
@@ -100,7 +100,7 @@ def _places(places: Sequence[Document], weakest: Sequence[int]) -> Table:
         )
         for place, row in zip(places, weakest, strict=True)
     ]
-    return Table(("", ">N/mm", "position mm", "program"), rows)
+    return ShownTable(("", ">N/mm", "position mm", "program"), rows)
 
 
 MOST_SAMPLES = 200_000  # on the page: some 5 MB; the tables are always of all samples

@@ -10,7 +10,7 @@ from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import FIGURES
 from toolpath_stiff.documents import Document
 from toolpath_stiff.report.pages import markup
-from toolpath_stiff.report.tables import LABEL, Table
+from toolpath_stiff.report.tables import LABEL, ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, duration, machine_text, shortened
 from toolpath_stiff.units import number
 
@@ -130,7 +130,7 @@ def _part_figures(row: Document) -> tuple[object, ...]:
 PART_TITLES = (">cutting mm", ">time", *(f">{title}" for title in (*TITLES, PLUNGES, "in line")), "weakest")
 
 
-def tool_table(per_tool: Sequence[Document]) -> Table:
+def tool_table(per_tool: Sequence[Document]) -> ShownTable:
     """A row a tool."""
     rows = [
         (
@@ -141,10 +141,10 @@ def tool_table(per_tool: Sequence[Document]) -> Table:
         )
         for row in per_tool
     ]
-    return Table(("tool", ">length mm", *PART_TITLES, "remark"), rows)
+    return ShownTable(("tool", ">length mm", *PART_TITLES, "remark"), rows)
 
 
-def operation_table(per_operation: Sequence[Document], most: int = MOST_ROWS) -> Table:
+def operation_table(per_operation: Sequence[Document], most: int = MOST_ROWS) -> ShownTable:
     """A row an operation."""
     digits = len(str(min(len(per_operation), most)))
     rows = [
@@ -157,7 +157,7 @@ def operation_table(per_operation: Sequence[Document], most: int = MOST_ROWS) ->
         )
         for place, row in enumerate(per_operation[:most])
     ]
-    return Table(("operation", ">tool", ">lines", *PART_TITLES, ">margin"), rows)
+    return ShownTable(("operation", ">tool", ">lines", *PART_TITLES, ">margin"), rows)
 
 
 def and_more(entries: Sequence[object], most: int, things: str) -> list[str]:
@@ -165,12 +165,12 @@ def and_more(entries: Sequence[object], most: int, things: str) -> list[str]:
     return [f"and {len(entries) - most} more {things} in summary.json"] if len(entries) > most else []
 
 
-def required(analysis: Analysis) -> tuple[str, Table]:
+def required(analysis: Analysis) -> tuple[str, ShownTable]:
     """Whether every cut has the required stiffness, and the lines that have not, weakest first."""
     entry, source = analysis.to_dict()["required"], analysis.program.source
     level, below = number(entry["required_N_per_mm"]), entry["below"]
     if not below:
-        return f"Every cutting move has the required {level} N/mm.", Table((), ())
+        return f"Every cutting move has the required {level} N/mm.", ShownTable((), ())
     more = f", the {MOST_ROWS} weakest of them here" if len(below) > MOST_ROWS else ""
     rows = [
         (
@@ -181,10 +181,10 @@ def required(analysis: Analysis) -> tuple[str, Table]:
         for row in below[:MOST_ROWS]
     ]
     sentence = f"{counted(len(below), 'line')} below the required {level} N/mm{more}:"
-    return sentence, Table(("", ">lowest N/mm", "program"), rows)
+    return sentence, ShownTable(("", ">lowest N/mm", "program"), rows)
 
 
-def comparison(summary: Document, other: Document) -> Table:
+def comparison(summary: Document, other: Document) -> ShownTable:
     """Two machines side by side, the difference in percent of the first."""
     compared, sides = compare_summaries(summary, other), (summary, other)
     changes = [*compared["difference_percent"].values(), compared["plunges_difference_percent"]]
@@ -197,4 +197,4 @@ def comparison(summary: Document, other: Document) -> Table:
     rows.append(["extrapolated", *(f"{side['extrapolated_share']:.1%}" for side in sides), ""])
     if any(side["out_of_reach_samples"] for side in sides):
         rows.append(["out of reach", *(number(side["out_of_reach_samples"]) for side in sides), ""])
-    return Table(("", *(f">{shortened(machine_text(side), 32)}" for side in sides), ">difference"), rows)
+    return ShownTable(("", *(f">{shortened(machine_text(side), 32)}" for side in sides), ">difference"), rows)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from toolpath_stiff.analysis.program_check import Figures, OperationRow, ProgramCheck, ToolRow
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import duration
 from toolpath_stiff.units import number
 
@@ -21,7 +21,10 @@ def _by_part(tools: Sequence[ToolRow], operations: Sequence[OperationRow]) -> li
         (f"{row.operation:>{digits}} {row.name}", _tool(row.tool), f"{row.first_line}-{row.last_line}", *_figures(row))
         for row in operations[:MOST_ROWS]
     ]
-    tables = [Table(("tool", *FIGURES), by_tool), Table(("operation", ">tool", ">lines", *FIGURES), by_operation)]
+    tables = [
+        ShownTable(("tool", *FIGURES), by_tool),
+        ShownTable(("operation", ">tool", ">lines", *FIGURES), by_operation),
+    ]
     lines = [line for table in tables if len(table.rows) > 1 for line in table.lines(indent=2)]
     more = len(operations) - MOST_ROWS
     return lines + ([f"  and {more} more operations in --json"] if more > 0 else [])

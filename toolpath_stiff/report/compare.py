@@ -15,7 +15,7 @@ from toolpath_stiff.report import history
 from toolpath_stiff.report.history import history_section, history_text
 from toolpath_stiff.report.loops import loops_section, loops_text
 from toolpath_stiff.report.pages import Section, page_of, readings_head
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
@@ -97,7 +97,7 @@ def _by_noise(figures: Mapping[str, float], form: str) -> str:
     return " to ".join(f"{figure:{form}}" for figure in figures.values())
 
 
-def _findings(summary: ComparisonSummary) -> Table:
+def _findings(summary: ComparisonSummary) -> ShownTable:
     """Findings with their probabilities."""
     rows = [
         (row.text, f"{row.statistic:+.1f}", f"{row.p_adjusted:.2g}", ", ".join(row.indistinguishable_from) or "-")
@@ -105,7 +105,7 @@ def _findings(summary: ComparisonSummary) -> Table:
     ]
     kinds = ["finding"] * len(rows) if rows else ["out"]
     none = [("No pattern stands out from scatter", "-", "-", "-")]
-    return Table(("finding", ">t", ">p, corrected", "looks the same in these data"), rows or none, kinds)
+    return ShownTable(("finding", ">t", ">p, corrected", "looks the same in these data"), rows or none, kinds)
 
 
 def groups(summary: ComparisonSummary) -> list[tuple[str, GroupErrors]]:
@@ -122,7 +122,7 @@ def groups(summary: ComparisonSummary) -> list[tuple[str, GroupErrors]]:
     return rows
 
 
-def errors(summary: ComparisonSummary) -> Table:
+def errors(summary: ComparisonSummary) -> ShownTable:
     """Errors by direction, plane and set-up, beside those of scatter alone."""
     rows = [
         (
@@ -136,10 +136,10 @@ def errors(summary: ComparisonSummary) -> Table:
         for name, group in groups(summary)
     ]
     scatter = (f">scatter alone, {noise.name}" for noise in summary.noise)
-    return Table(("", ">readings", ">mean error", ">bias", ">rms", *scatter), rows)
+    return ShownTable(("", ">readings", ">mean error", ">bias", ">rms", *scatter), rows)
 
 
-def far_off(summary: ComparisonSummary, most: int) -> Table:
+def far_off(summary: ComparisonSummary, most: int) -> ShownTable:
     """Readings far off."""
     rows = [
         (
@@ -151,19 +151,19 @@ def far_off(summary: ComparisonSummary, most: int) -> Table:
         )
         for reading in summary.outliers[:most]
     ]
-    return Table(("line", "direction", "point", ">with the findings taken out", ">standard deviations"), rows)
+    return ShownTable(("line", "direction", "point", ">with the findings taken out", ">standard deviations"), rows)
 
 
-def _model_free(summary: ComparisonSummary) -> Table:
+def _model_free(summary: ComparisonSummary) -> ShownTable:
     """Checks that need no stiffness model, and why others cannot be made."""
     checks, cannot = summary.model_free.checks, summary.model_free.cannot_check
     rows = [(check.check, check.text, f"{check.statistic:+.1f}", f"{check.p_adjusted:.2g}") for check in checks]
     rows += [(check.check, f"not checked: {check.reason}", "", "") for check in cannot]
     kinds = ["" if check.holds else "finding" for check in checks] + ["out"] * len(cannot)
-    return Table(("principle", "result", ">t", ">p, corrected"), rows, kinds)
+    return ShownTable(("principle", "result", ">t", ">p, corrected"), rows, kinds)
 
 
-def _noise(summary: ComparisonSummary) -> Table:
+def _noise(summary: ComparisonSummary) -> ShownTable:
     base = summary.baseline
     rows = [
         (
@@ -178,7 +178,7 @@ def _noise(summary: ComparisonSummary) -> Table:
         for noise in summary.noise
     ]
     head = (">reading", ">clamping", ">struts", ">beyond it, place to place", ">p of residuals this large", "origin")
-    return Table(("noise", *head), rows)
+    return ShownTable(("noise", *head), rows)
 
 
 def text(comparison: Comparison) -> str:

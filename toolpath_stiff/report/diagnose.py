@@ -17,7 +17,7 @@ from toolpath_stiff.portrait.words import portrait_text, term_words
 from toolpath_stiff.report import explanations as words
 from toolpath_stiff.report.loops import loops_section
 from toolpath_stiff.report.pages import Head, Hints, Part, Section, markup, page_of
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, significant
 from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, number
 
@@ -94,7 +94,7 @@ def _figures(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     return [*figures, (words.plausible_text(standing), remark) if standing else none]
 
 
-def _candidates(diagnosis: Diagnosis) -> Table:
+def _candidates(diagnosis: Diagnosis) -> ShownTable:
     """As given, strut law refitted, pairs and all candidates."""
     every, rows, kinds = diagnosis.rows, [], []
     for row in (every.as_given, every.refitted, *every.pairs, *every.candidates):
@@ -114,7 +114,7 @@ def _candidates(diagnosis: Diagnosis) -> Table:
         )
     head = ("effect", "size (95 % interval)", ">probability", ">mean error", ">at points left out",
             ">fall in standard errors", "leaves scatter only", "remark")  # fmt: skip
-    return Table(head, rows, kinds)
+    return ShownTable(head, rows, kinds)
 
 
 def _portrait(portrait: Portrait | None) -> list[Part]:
@@ -128,7 +128,7 @@ def _portrait(portrait: Portrait | None) -> list[Part]:
     ]
     head = ("what gives way", "link", "varies with", "size (95 % interval)", ">change of stiffness", "part")
     kinds = ["plausible" if portrait.terms and not place else "" for place in range(len(rows))]
-    return [markup("<p>{}</p>", portrait_text(portrait)), Table(head, rows, kinds)]
+    return [markup("<p>{}</p>", portrait_text(portrait)), ShownTable(head, rows, kinds)]
 
 
 def _sized(sized: Sized, part: str) -> list[str]:
@@ -156,7 +156,7 @@ def _alike(diagnosis: Diagnosis) -> list[Part]:
         "two it is, whatever the noise. Other poses, loads or tools can."
     )
     sets = [f"one set: {', '.join(members)}" for members in given.sets]
-    return [sets, Table(("effects", ">alike"), rows), remark if rows else ""]
+    return [sets, ShownTable(("effects", ">alike"), rows), remark if rows else ""]
 
 
 def _unseen(diagnosis: Diagnosis) -> list[Part]:
@@ -170,29 +170,29 @@ def _unseen(diagnosis: Diagnosis) -> list[Part]:
         for smallest in sorted(diagnosis.detectable, key=lambda smallest: (not smallest.seen, smallest.rms))
     ]
     remark = "Seen with 80 % power at 5 % family-wise; a smaller effect could be there unseen."
-    return [Table(("effect", ">smallest size seen", ">change of stiffness, rms"), rows), remark if rows else ""]
+    return [ShownTable(("effect", ">smallest size seen", ">change of stiffness, rms"), rows), remark if rows else ""]
 
 
-def _next_readings(diagnosis: Diagnosis) -> Table:
+def _next_readings(diagnosis: Diagnosis) -> ShownTable:
     """The readings that tell most."""
     readings = diagnosis.next_measurements
     keys = list(dict.fromkeys(key for reading in readings for key in reading if key != "why"))
     keys = [key for key in keys if any(reading.get(key) not in ("", None) for reading in readings)]
     rows = [[_cell(reading.get(key)) for key in (*keys, "why")] for reading in readings]
     figures = [all(isinstance(reading.get(key), int | float) for reading in readings) for key in keys]
-    return Table([*(f"{'>' * right}{key}" for key, right in zip(keys, figures, strict=True)), "why"], rows)
+    return ShownTable([*(f"{'>' * right}{key}" for key, right in zip(keys, figures, strict=True)), "why"], rows)
 
 
 def _cell(value: object) -> str:
     return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _cannot_test(diagnosis: Diagnosis) -> Table:
+def _cannot_test(diagnosis: Diagnosis) -> ShownTable:
     rows = []
     for name, lacks in sorted(diagnosis.cannot_test.items()):
         columns = Markup(", ").join(markup("<code>{}</code>", column) for column in lacks)
         rows.append((name, columns or "nothing in these data depends on it"))
-    return Table(("effect", "the column that is missing"), rows)
+    return ShownTable(("effect", "the column that is missing"), rows)
 
 
 def _path(diagnosis: Diagnosis) -> list[Part]:
@@ -203,7 +203,7 @@ def _path(diagnosis: Diagnosis) -> list[Part]:
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
     explanations = diagnosis.path.get("explanations", {})
     rows = [(name, *(number(figures[key]) for key in keys)) for name, figures in explanations.items()]
-    listed = Table(("explanation", ">mean N/mm", ">range N/mm", ">weakest N/mm"), rows)
+    listed = ShownTable(("explanation", ">mean N/mm", ">range N/mm", ">weakest N/mm"), rows)
     return [markup("<p>{}.</p>", text[0].upper() + text[1:]), listed]
 
 
@@ -222,7 +222,7 @@ def _noise(diagnosis: Diagnosis) -> list[Part]:
         rows.append((name, reading, judged.verdict, plausible, ", ".join(likely[:4])))
     return [
         markup("<p>Standard deviations: {}. {}</p>", ", ".join(parts), noise.origin),
-        Table(("noise", ">one reading", "verdict", "plausible", "probability"), rows),
+        ShownTable(("noise", ">one reading", "verdict", "plausible", "probability"), rows),
         "The noise is a guess: the verdict is what both guesses have in common." if len(rows) > 1 else "",
     ]
 

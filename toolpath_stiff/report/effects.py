@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.stiffness.catalogue import EffectCatalogue
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 from toolpath_stiff.stiffness.trial import EffectCheck
@@ -46,7 +46,7 @@ def text(catalogue: EffectCatalogue) -> str:
     for effect in catalogue.effects:
         parameters = ", ".join(f"{p.name} ({p.unit})" if p.unit else p.name for p in effect.parameters)
         rows.append((effect.link, effect.name, effect.title, parameters or "-"))
-    lines = Table(("link", "name", "title", "parameters"), rows).lines(least=0, width=WIDE)
+    lines = ShownTable(("link", "name", "title", "parameters"), rows).lines(least=0, width=WIDE)
     if catalogue.broken:
         lines += ["", "plug-ins that do not load:"]
         lines += [f"  {name}: {reason}" for name, reason in catalogue.broken.items()]

@@ -13,7 +13,7 @@ from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.errors import scatter_text
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.portrait.words import portrait_text
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, percent, plain, shortened, significant
 from toolpath_stiff.units import json_number, number
 
@@ -205,7 +205,7 @@ def _table(diagnosis: Diagnosis) -> list[str]:
         )
         for row in shown
     ]
-    head, *lines = Table(("", ">probab.", ">error %", ">left out %", ">gain/SE", ""), cells).lines(least=0)
+    head, *lines = ShownTable(("", ">probab.", ">error %", ">left out %", ">gain/SE", ""), cells).lines(least=0)
     for place, row in reversed([*enumerate(shown, 1)]):
         if below := "; ".join(filter(None, (", ".join(size_texts(row, intervals=False)), plain(row.remark)))):
             lines.insert(place, shortened(f"      {below}", WIDTH))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from toolpath_stiff.readings.history import StrutHistory, StrutOverTime
 from toolpath_stiff.report.pages import Section
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 
 PICTURE = "history.png"
@@ -38,8 +38,8 @@ def _row(strut: StrutOverTime) -> tuple[str, ...]:
     )
 
 
-def _table(history: StrutHistory) -> Table:
-    return Table(HEAD, [*map(_row, history.struts)])
+def _table(history: StrutHistory) -> ShownTable:
+    return ShownTable(HEAD, [*map(_row, history.struts)])
 
 
 def _remark(history: StrutHistory) -> str:

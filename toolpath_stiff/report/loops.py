@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from toolpath_stiff.comparison.loop_readings import BesideTip
 from toolpath_stiff.report.pages import Section
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 
 MOST_ROWS = 40  # on a page; all are in the document
@@ -16,7 +16,7 @@ REMARK = (
 
 def loops_section(loops: BesideTip) -> Section:
     """The section of a page, by loop, then reading by reading."""
-    by_loop = Table.of(
+    by_loop = ShownTable.of(
         loops.by_loop,
         {
             "loop": lambda mean: mean.loop,
@@ -27,7 +27,7 @@ def loops_section(loops: BesideTip) -> Section:
             ">standard deviations": lambda mean: f"{mean.standard_deviations:+.1f}",
         },
     )
-    each = Table.of(
+    each = ShownTable.of(
         loops.readings[:MOST_ROWS],
         {
             "line": lambda reading: f"{reading.file}:{reading.line}",

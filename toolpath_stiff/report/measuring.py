@@ -10,7 +10,7 @@ from toolpath_stiff.readings.raw import Reduction
 from toolpath_stiff.readings.raw_rows import loop_entry
 from toolpath_stiff.report import folder
 from toolpath_stiff.report.history import dated, history_text
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 
 DATA: Mapping[str, Callable[[Reduction], Content]] = {}
 HEAD = ("loop", ">N/mm", ">force N", ">deflection um", ">lost motion um", ">width um", ">linearity %", ">closure um")
@@ -44,4 +44,4 @@ def _loops(entries: Sequence[Document]) -> list[str]:
         )
         for entry in entries
     ]
-    return Table(HEAD, rows).lines(0, 0)
+    return ShownTable(HEAD, rows).lines(0, 0)

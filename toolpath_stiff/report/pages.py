@@ -21,7 +21,7 @@ from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.hints import parted
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import counted, machine_text, plain
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Hints:
 
 
 # Of a section: a table, a list of sentences, a remark, or HTML.
-Part = Table | Hints | Sequence[object] | str | Markup
+Part = ShownTable | Hints | Sequence[object] | str | Markup
 Section = tuple[str, *tuple[Part, ...]] | str  # its title and its parts; or a picture's file name
 
 
@@ -109,7 +109,7 @@ def _section(title: str, parts: Iterable[Part]) -> Markup:
 
 def part(content: Part) -> Markup:
     """A part of a section; nothing where it has nothing to show."""
-    if isinstance(content, Table):
+    if isinstance(content, ShownTable):
         kinds = content.kinds or [""] * len(content.rows)
         rows = [*zip(kinds, content.rows, strict=True)]
         return _macro("table", content.titles, rows, content.right) if rows else Markup()

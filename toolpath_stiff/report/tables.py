@@ -18,7 +18,7 @@ Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
-class Table:
+class ShownTable:
     """Rows under their titles; ">" before a title puts its column to the right.
 
     Attributes
@@ -38,7 +38,7 @@ class Table:
     @classmethod
     def of(
         cls, items: Iterable[Item], columns: Mapping[str, Callable[[Item], object]], kinds: Sequence[str] = ()
-    ) -> Table:
+    ) -> ShownTable:
         """A row for each item; `columns`: what each shows of it, under its title."""
         return cls([*columns], [[show(item) for show in columns.values()] for item in items], kinds)
 
@@ -52,7 +52,7 @@ class Table:
         """Columns that stand to the right."""
         return [i for i, title in enumerate(self.head) if title.startswith(">")]
 
-    def columns(self, *titles: str) -> Table:
+    def columns(self, *titles: str) -> ShownTable:
         """Some of the columns."""
         places = [self.titles.index(title) for title in titles]
         return replace(self, head=[self.head[i] for i in places], rows=[[row[i] for i in places] for row in self.rows])

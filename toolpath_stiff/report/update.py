@@ -14,7 +14,7 @@ from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.correction.strut_law import bar_curve_csv
 from toolpath_stiff.diagnosis.rows import FittedSize, percent_of
 from toolpath_stiff.report.pages import Hints, Section, page_of, readings_head
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, WIDTH, counted, machine_text, percent, plain
 from toolpath_stiff.units import number
 
@@ -95,7 +95,7 @@ def _result(update: Update) -> LadderStep:
     return update.steps[0 if update.verdict == NOTHING else -1]
 
 
-def _by_direction(update: Update) -> Table:
+def _by_direction(update: Update) -> ShownTable:
     first, last = update.steps[0].by_direction, _result(update).by_direction
     rows = [
         (
@@ -110,10 +110,10 @@ def _by_direction(update: Update) -> Table:
         for name, before in first.items()
     ]
     figures = (">as given", ">after", ">after, left out", ">bias as given", ">bias after")
-    return Table(("direction", ">readings", *figures), rows)
+    return ShownTable(("direction", ">readings", *figures), rows)
 
 
-def _fitted(update: Update) -> Table:
+def _fitted(update: Update) -> ShownTable:
     step = _result(update)
     rows = [
         (
@@ -132,10 +132,10 @@ def _fitted(update: Update) -> Table:
                 rows.append((effect, key, f"{_value(value.value)} {value.unit}", f"{low} to {high}"))
             else:
                 rows.append((effect, key, str(value), "chosen"))
-    return Table(("effect", "parameter", ">value", ">95 % interval, or sd"), rows)
+    return ShownTable(("effect", "parameter", ">value", ">95 % interval, or sd"), rows)
 
 
-def _support(update: Update) -> Table:
+def _support(update: Update) -> ShownTable:
     rows = [
         (
             support.effect,
@@ -147,10 +147,10 @@ def _support(update: Update) -> Table:
         for support in (*update.supports, *update.turned_down)
     ]
     head = ("effect", "supported", ">fall at left-out points", ">gain in twice the log likelihood")
-    return Table((*head, "what is against it"), rows)
+    return ShownTable((*head, "what is against it"), rows)
 
 
-def _ladder(update: Update) -> Table:
+def _ladder(update: Update) -> ShownTable:
     """The error of each step, and what scatter alone would leave."""
     rows = [
         (
@@ -162,7 +162,7 @@ def _ladder(update: Update) -> Table:
         for step in update.document["steps"]
     ]
     rows.append(("noise floor", percent(update.noise.floor_percent, 2), "", ""))
-    return Table(("", ">error", ">left out", ">gain/SE"), rows)
+    return ShownTable(("", ">error", ">left out", ">gain/SE"), rows)
 
 
 def _percent(share: float) -> str:

@@ -15,7 +15,7 @@ from toolpath_stiff.case.history import python_line
 from toolpath_stiff.case.steps import Step
 from toolpath_stiff.documents import Document
 from toolpath_stiff.studio.editing import Editing
-from toolpath_stiff.studio.work import Answer, Job
+from toolpath_stiff.studio.work import Job, Reply
 
 READING = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz", "stiffness_N_per_mm", "force_N")
 
@@ -49,7 +49,7 @@ class Session:
         self._version = self._beat = 0
         self._jobs: list[tuple[str, dict[str, Any]]] = []
         self._running: Job | None = None
-        self._found: dict[tuple[str, object], Answer] = {}  # kind and what it was found for -> what was found
+        self._found: dict[tuple[str, object], Reply] = {}  # kind and what it was found for -> what was found
         self._failed: dict[str, tuple[Any, str]] = {}
         self.message = ""
         self.revealed: dict[str, Any] | None = None
@@ -123,7 +123,7 @@ class Session:
         on = self.case.state.on
         return self.once("errors", (self.data_key, on), lambda: self.case.preview.at(on, strut_law=bool(on)))
 
-    def found(self, kind: str) -> Answer | None:
+    def found(self, kind: str) -> Reply | None:
         """What was found last, if it still holds."""
         return self._found.get((kind, self.key(kind)))
 
@@ -184,7 +184,7 @@ class Session:
         self._running = Job(self.case.folder, kind, {"result": result, **first, **given}, given, self.key(kind))
         self._running.follow(lambda: self.tell(state=False), self._done)
 
-    def _done(self, job: Job, answer: Answer | None, error: str) -> None:
+    def _done(self, job: Job, answer: Reply | None, error: str) -> None:
         with self.lock:
             self._running = None
             if job.key == self.key(job.kind):
@@ -196,7 +196,7 @@ class Session:
             self.follow_up()
         self.tell()
 
-    def _take(self, job: Job, answer: Answer) -> None:
+    def _take(self, job: Job, answer: Reply) -> None:
         """An answer into the history; what was fitted or drafted acts from now on."""
         self._found[job.kind, job.key] = answer
         if not self._is_recorded(job.kind, answer.command):
@@ -251,7 +251,7 @@ class Session:
                     self.revealed = document
                     continue
                 accepted = (folder / "machine.toml").is_file()
-                self._found[kind, self.data_key] = Answer(step.text, step.command, document, step.result, accepted)
+                self._found[kind, self.data_key] = Reply(step.text, step.command, document, step.result, accepted)
 
     def cancel(self) -> None:
         """End the work under way, and forget what waits."""

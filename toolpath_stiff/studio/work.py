@@ -100,7 +100,7 @@ def work(folder: str, kind: str, options: Mapping[str, Any], pipe: Connection) -
 
 
 @dataclass(frozen=True)
-class Answer:
+class Reply:
     """What the page needs of a result.
 
     Attributes
@@ -128,7 +128,7 @@ class Answer:
 
 def answer(
     case: Case, kind: str, tell: Callable[[str, int, int], None], result: str, first: str = "", **given: Any
-) -> Answer:
+) -> Reply:
     """What the page needs of a result that is kept in the case; `first`: the machine to hold an analysis against."""
     case.plots = kind == "compare"  # the only one whose page is opened from the studio
     tell(kind, 0, 0)
@@ -146,7 +146,7 @@ def answer(
         before = tps.analyze(case.program, given_machine, origin_mm_deg=origin, partial=True, progress=tell)
         path = _columns(kept, before)
     accepted = kind == "update" and kept.accepted
-    return Answer(repr(kept).strip("<>"), command, kept.to_dict(), result, accepted, file, path)
+    return Reply(repr(kept).strip("<>"), command, kept.to_dict(), result, accepted, file, path)
 
 
 def _columns(analysis: tps.Analysis, before: tps.Analysis) -> Document:

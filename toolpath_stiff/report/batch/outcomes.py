@@ -11,7 +11,7 @@ from toolpath_stiff.analysis.statistics import FIGURES
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.documents import Document
 from toolpath_stiff.report.analysis_tables import only_plunges
-from toolpath_stiff.report.tables import Table
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, duration, plain, shortened
 from toolpath_stiff.units import number
 
@@ -136,7 +136,7 @@ def terminal_summary(outcomes: Sequence[ProgramOutcome]) -> str:
     return "\n".join(lines)
 
 
-def _program_table(good: Sequence[ProgramOutcome]) -> Table:
+def _program_table(good: Sequence[ProgramOutcome]) -> ShownTable:
     compared = good[0].figure("compare_machine") is not None
     rows = []
     for outcome in good:
@@ -155,4 +155,4 @@ def _program_table(good: Sequence[ProgramOutcome]) -> Table:
             ]
         )
     other = (">other mean", ">change") if compared else ()
-    return Table(("program", ">cutting mm", ">time", ">mean N/mm", ">min N/mm", *other, ">weakest line", ""), rows)
+    return ShownTable(("program", ">cutting mm", ">time", ">mean N/mm", ">min N/mm", *other, ">weakest line", ""), rows)
