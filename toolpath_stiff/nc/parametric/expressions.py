@@ -262,7 +262,7 @@ class Scanner:
 
         def work(variables: Variables) -> float:
             left, right = number(first(variables)), number(second(variables))
-            return left**right if name == "POW" else variables.angle(left, right)
+            return math.pow(left, right) if name == "POW" else variables.angle(left, right)
 
         return self._worked_out(name, column, work)
 
@@ -338,5 +338,5 @@ OF_NUMBERS: dict[str, Callable[[float], float]] = {"ABS": abs, "EXP": math.exp, 
 OF_ANGLES = {"SIN": math.sin, "COS": math.cos, "TAN": math.tan}
 TO_ANGLES = {"ACOS": math.acos, "ASIN": math.asin}
 ARITHMETIC: dict[str, Callable[[float, float], float]] = {
-    "**": pow, "*": mul, "/": truediv, "+": add, "-": sub, "GT": gt, "GE": ge, "LT": lt, "LE": le,
+    "**": math.pow, "*": mul, "/": truediv, "+": add, "-": sub, "GT": gt, "GE": ge, "LT": lt, "LE": le,
 }  # fmt: skip
