@@ -396,5 +396,5 @@ def test_a_loop_that_counts_in_a_work_offset_ends():
 @pytest.mark.parametrize("value", ["[[0-8]**0.5]", "[0**[0-1]]", "[10**400]", "POW[-8,0.5]"])
 def test_a_power_that_is_no_real_number_is_refused_with_its_place(value: str) -> None:
     """`python -m benchmarks.hunt --seed 770000` met one: Python's own power of such numbers is complex."""
-    with pytest.raises(InputError, match="program:2:.* cannot be worked out"):
+    with pytest.raises(InputError, match=r"program:2:.* cannot be worked out"):
         parse_program(f"G21 G90 F100\n#1={value}\nG1 X#1\nM2\n")
