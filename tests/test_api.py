@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -249,7 +250,7 @@ def test_every_public_name_and_member_is_in_an_example_that_runs(name):
     """An example is the name's own, a member's, or that of a function that returns the class."""
     public = getattr(tps, name)
     functions = [one for one in (getattr(tps, other) for other in tps.__all__) if inspect.isfunction(one)]
-    makers = [one for one in functions if name in str(inspect.signature(one).return_annotation).split(" | ")]
+    makers = [one for one in functions if name in re.findall(r"\w+", str(inspect.signature(one).return_annotation))]
     members = members_of(public)
     documented = [public, *getattr(public, "__mro__", ()), *makers, *(one for own in members.values() for one in own)]
     lines = [line for one in documented for line in (inspect.getdoc(one) or "").splitlines()]

@@ -13,8 +13,6 @@ Examples
 54353
 """
 
-from __future__ import annotations
-
 import re
 from importlib import import_module
 from pathlib import Path

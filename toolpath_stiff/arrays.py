@@ -1,7 +1,5 @@
 """Types of arrays, each once. They say the kind of number; the shapes stand in the docstrings."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self

@@ -5,8 +5,6 @@ its digits are looked up four at a time, and every cell is as wide as the widest
 bytes that are taken out at the end. Where that cannot hold a number or a word, Python formats the rows.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math

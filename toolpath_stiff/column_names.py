@@ -1,7 +1,5 @@
 """Names of columns: however a heading is spelled, which column it means, and in which unit."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """What holds unless the user says otherwise, each once, with its unit; and constants that several rooms share."""
 
-from __future__ import annotations
-
 import math
 import os
 

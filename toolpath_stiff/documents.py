@@ -1,7 +1,5 @@
 """Results as plain data: dataclasses as JSON has them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace

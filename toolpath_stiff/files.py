@@ -1,7 +1,5 @@
 """Files that are whole or not there: written beside their place and flushed to the disk, then renamed."""
 
-from __future__ import annotations
-
 import errno
 import itertools
 import os

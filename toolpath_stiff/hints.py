@@ -4,8 +4,6 @@ A hint is a sentence and, on a line of its own that no page or terminal breaks, 
 is one text: the sentence, a colon, a line feed, the command.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Sequence

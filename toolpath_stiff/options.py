@@ -4,8 +4,6 @@ From there come the option of the commands, its help, the check for whoever call
 says what is wrong, the same for both.
 """
 
-from __future__ import annotations
-
 import inspect
 import math
 import re

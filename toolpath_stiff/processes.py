@@ -7,8 +7,6 @@ Processes are spawned, not forked: a fork copies the state of threads that linea
 exist on Windows; and a fresh process reads the number of threads that linear algebra may use.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

@@ -10,8 +10,6 @@ as they were. Then the old ones are taken away and the new ones renamed, and mea
 command that reads there asks to run again what was cut off.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -4,8 +4,6 @@ Convention: R = Rz(yaw) Ry(pitch) Rx(roll). The paper's equation 7 (its rotation
 text, so the order is assumed; it is of no consequence while the spindle is vertical.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

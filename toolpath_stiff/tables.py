@@ -5,8 +5,6 @@ that is neither empty nor a comment. Between semicolons and tabs numbers may hav
 or in other units are read where a mapping says which they are.
 """
 
-from __future__ import annotations
-
 import csv
 import difflib
 import io

@@ -1,7 +1,5 @@
 """Sheets of Excel workbooks as cells; openpyxl reads them, and is imported only for that."""
 
-from __future__ import annotations
-
 import io
 import os
 import re

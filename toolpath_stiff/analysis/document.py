@@ -1,7 +1,5 @@
 """`summary.json`: the figures of an analysis in the shop's units, what was assumed, what two machines differ in."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff import defaults

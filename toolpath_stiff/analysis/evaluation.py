@@ -1,7 +1,5 @@
 """Stiffness along a load, strut lengths and reach at many poses, block by block, fast where that is safe."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -9,8 +9,6 @@ Only a tangential load makes the difference. A normal load is always across the 
 softest direction across it), so its figures are all of one kind; the other loads do not look at the motion.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

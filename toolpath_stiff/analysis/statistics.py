@@ -1,7 +1,5 @@
 """Figures and tables of a path: length-weighted mean, extremes, the weakest places, tool by tool; sample by sample."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

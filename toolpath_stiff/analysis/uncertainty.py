@@ -4,8 +4,6 @@ A linear propagation (JCGM 100:2008, Guide to the expression of uncertainty in m
 of the parameters between two slopes of the stiffness, which are differences of whole evaluations.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Effects set by hand: the error of every reading at once, and the machine that carries them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

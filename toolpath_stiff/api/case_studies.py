@@ -1,7 +1,5 @@
 """One tool path in several regions of the workspace: the paper's conclusions checked."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

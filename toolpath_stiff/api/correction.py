@@ -1,7 +1,5 @@
 """The model corrected: effects fitted (update), what no effect explains written as one (draft)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The physical effects that a machine can carry: the catalogue, and one's own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path

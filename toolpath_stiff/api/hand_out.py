@@ -1,7 +1,5 @@
 """Programs handed to processes, or to any executor; what became of each, also where its process gave no answer."""
 
-from __future__ import annotations
-
 import pickle
 import threading
 import uuid

@@ -1,7 +1,5 @@
 """Options that several functions share, and the checks of what arguments say: mm, degrees and N."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """The text of machine files: a template, from LinuxCNC; the geometry that the paper's figures give."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path

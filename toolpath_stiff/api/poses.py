@@ -1,7 +1,5 @@
 """A machine by itself: stiffness at single poses and over planes of the workspace."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

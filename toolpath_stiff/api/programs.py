@@ -1,7 +1,5 @@
 """A program on a machine: its stiffness along the path, what it uses and leaves out, its sampled path."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

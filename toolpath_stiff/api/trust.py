@@ -4,8 +4,6 @@ A case may come from anybody, and its effect files are code. Nothing in a case c
 record stands in the user's configuration folder, a file a sum.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from pathlib import Path

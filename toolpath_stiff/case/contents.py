@@ -1,7 +1,5 @@
 """What a case holds, as its steps have made it: machine, readings, program; the commands that ask of these."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A blind exercise within a case: a simulated machine that hides something, measured and guessed at."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

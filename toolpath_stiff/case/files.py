@@ -1,7 +1,5 @@
 """Files of a case: copies under names that are free, readings that are commented out, sums that tell a change."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """What one finds out on a case: each result as its function gives it, kept in a folder of its own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import count
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The steps of a case, done and undone, and the files that they wrote."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps

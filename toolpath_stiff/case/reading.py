@@ -1,7 +1,5 @@
 """case.toml read again: it may come from anybody, and what no step has written is refused."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The steps of a case: what was done, what it makes of the case's state, as text."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Public functions called by what a command line gives."""
 
-from __future__ import annotations
-
 import inspect
 from argparse import Namespace
 from collections.abc import Callable, Sequence

@@ -11,8 +11,6 @@ for example:
 Machine files carry effects as [[effect]], those that act on readings as [[instrument]].
 """
 
-from __future__ import annotations
-
 from argparse import Namespace
 from pathlib import Path
 from typing import Annotated

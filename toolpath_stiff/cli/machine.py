@@ -8,8 +8,6 @@ for example:
   tps machine recover                               the NIST geometry from the paper's Table 1, fitted anew
 """
 
-from __future__ import annotations
-
 import sys
 from argparse import Namespace
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The commands on measurements: reduce, compare, diagnose, update, plan."""
 
-from __future__ import annotations
-
 import sys
 from argparse import Namespace
 from collections.abc import Sequence

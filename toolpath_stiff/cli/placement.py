@@ -1,7 +1,5 @@
 """The commands on a placement: place, case-study."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The commands on a program: analyze, path, check."""
 
-from __future__ import annotations
-
 import sys
 from argparse import Namespace
 from collections.abc import Iterator, Sequence

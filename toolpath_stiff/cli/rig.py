@@ -9,8 +9,6 @@ for example:
 The rig shares no stiffness code with the model that it tests. The seal is a blindfold, not cryptography.
 """
 
-from __future__ import annotations
-
 from argparse import Namespace
 from pathlib import Path
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """The command that opens a case in the browser."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from collections.abc import Sequence
 from typing import Annotated, cast

@@ -1,7 +1,5 @@
 """Compliance at the measured poses, link by link of the load path."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Readings of indicators beside the tip against the model: how much each loop gives way, and how much it should."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

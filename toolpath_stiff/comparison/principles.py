@@ -9,8 +9,6 @@
 Every check is a combination of ln readings that has mean zero if the principle holds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations

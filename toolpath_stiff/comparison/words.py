@@ -1,7 +1,5 @@
 """A pattern that residuals show, in a sentence."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

@@ -1,7 +1,5 @@
 """What `tps update --add` names: an effect and, if the user says so, what it acts on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """An update as a document: the content of update.json, in shop units; and the residuals as a table."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.column_files import csv_text

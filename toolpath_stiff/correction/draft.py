@@ -5,8 +5,6 @@ the open. It records the readings that it was drawn from, so that no diagnosis t
 (`inference.drawn`). The same readings and options give the same bytes.
 """
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The paper's machine figures: six lengths fitted to the modelled stiffnesses that its Table 1 prints."""
 
-from __future__ import annotations
-
 import csv
 from importlib import resources
 from typing import Any

@@ -15,8 +15,6 @@ An effect is supported if
 Of several effects each is judged beside the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """A fit as a machine: the fitted values, how well they are known, and where they come from."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The outcome of an update: the steps, what the data support of them, and the machine that comes of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -6,8 +6,6 @@ that stand for the platform. The objective has a kink wherever the model meets a
 (Nelder and Mead 1965) from several starts; the paper searched one variable at a time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """A task: the machine that is to be corrected, by which measurements, and what of it may change."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A model corrected: what it lacks is added, fitted, judged, and written to a machine file with its origin."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

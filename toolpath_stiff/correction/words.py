@@ -1,7 +1,5 @@
 """An update in words: the verdict, what was assumed, the heading of the machine file."""
 
-from __future__ import annotations
-
 from textwrap import fill
 
 import numpy as np

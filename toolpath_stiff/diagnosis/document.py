@@ -1,7 +1,5 @@
 """A diagnosis as JSON: the content of diagnose.json, in shop units; None stands for what JSON cannot hold."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a diagnosis has found: judgements under each noise model, fits, errors held out, and what stands behind them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any

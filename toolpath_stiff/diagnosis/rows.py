@@ -1,7 +1,5 @@
 """What became of each hypothesis, in shop units: a row each, for documents, tables and pictures alike."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any

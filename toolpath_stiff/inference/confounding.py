@@ -1,7 +1,5 @@
 """Effects that readings cannot tell apart: canonical correlations of their signatures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

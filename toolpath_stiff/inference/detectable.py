@@ -1,7 +1,5 @@
 """Smallest sizes that readings would have shown."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -13,8 +13,6 @@ A form that says nothing true of new readings, sized by the old ones, loses with
 effect like any other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

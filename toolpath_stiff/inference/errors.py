@@ -1,7 +1,5 @@
 """Errors of a model over some readings, in figures and in words."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import TypedDict
 

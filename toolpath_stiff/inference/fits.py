@@ -4,8 +4,6 @@ The searches run on tables of added compliance; what is reported and written to 
 Everything is dimensionless or scaled: with constants in N/m the gradient would fall below any tolerance at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise

@@ -12,8 +12,6 @@ ones. Compared are
 The bootstrapped distribution of the smallest p value makes one test of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

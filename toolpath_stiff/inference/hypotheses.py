@@ -1,7 +1,5 @@
 """All candidates against the data: searched, grouped by effect, weighed against each other."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import erfc, sqrt

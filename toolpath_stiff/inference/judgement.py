@@ -25,8 +25,6 @@ unexplained   something is missing, and nothing in the catalogue accounts for it
               they were of this machine at all (`question`)
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import comb

@@ -1,7 +1,5 @@
 """Least squares: normal equations, Gauss-Newton steps, and the least quadratic within bounds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar

@@ -6,8 +6,6 @@ least-squares fit of constants in N/m would stop at once, its gradient being tin
 nothing, and its prior holds it at 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -4,8 +4,6 @@ By restricted maximum likelihood of the differences between repeats (Patterson a
 machine does cancels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 SciPy has it, but loading it takes longer than all the tests of a diagnosis.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

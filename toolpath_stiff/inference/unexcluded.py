@@ -1,7 +1,5 @@
 """Effects that readings neither show nor exclude beside an explanation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 

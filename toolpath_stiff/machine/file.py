@@ -4,8 +4,6 @@ Each section names the origin of its figures ("published", "recovered", "assumed
 an error, so that a typing mistake cannot fall back to a default; the message has section, key, value and bound.
 """
 
-from __future__ import annotations
-
 from copy import deepcopy
 from dataclasses import replace
 from functools import cache

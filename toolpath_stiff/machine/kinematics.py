@@ -8,8 +8,6 @@ Forward, by Newton's method: a six-strut platform has up to 40 assembly modes (M
 J dx = dL, strut elongation per twist of the tip.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Reach: how far each pose is from each limit of the machine, and which limit is nearest."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 

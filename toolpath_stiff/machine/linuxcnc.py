@@ -6,8 +6,6 @@ genhexkins(9): `base.N.x|y|z` are the joints of the base, `platform.N.x|y|z` tho
 length for the turning of the screw in its joints; they do not change where the joints are.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a machine file may hold: sections, keys, units, bounds; and values held against it, one fault a message."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

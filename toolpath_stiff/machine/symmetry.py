@@ -6,8 +6,6 @@ or all but one must follow, and both bodies must pair the struts alike. So at le
 a symmetry before it is held against another, and a machine that is meant to be without one shows none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations

@@ -1,7 +1,5 @@
 """`[uncertainty]` of a machine file, checked: which parameters were fitted, and how well they are known."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

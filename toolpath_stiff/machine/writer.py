@@ -1,7 +1,5 @@
 """Machines to commented machine files; what `parse_machine` reads back is the same machine."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

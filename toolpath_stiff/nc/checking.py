@@ -3,8 +3,6 @@
 With `--interpreter linuxcnc`, what LinuxCNC's interpreter says of the program, in the words of the built-in check.
 """
 
-from __future__ import annotations
-
 import copy
 import re
 from dataclasses import replace

@@ -13,8 +13,6 @@ both offset moves meet; outside, up to 90 degrees, to where the tangents of both
 the two is longer by the tool's radius.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -12,8 +12,6 @@ machine that programs were posted for), `setup` (the name of the clamping arrang
 belong to one). LinuxCNC's own parameter file (.var) and tool table (.tbl) are read as controller files too.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 

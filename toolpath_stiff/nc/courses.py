@@ -1,7 +1,5 @@
 """Courses of moves: lengths, frames of arcs, points and tangents along them. SI units, but where mm are said."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

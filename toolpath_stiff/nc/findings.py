@@ -1,7 +1,5 @@
 """What a check says of a program: codes, errors, warnings, notes, and where each stands."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 

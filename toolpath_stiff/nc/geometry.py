@@ -1,7 +1,5 @@
 """Geometry of words: planes, arcs of G2 and G3 within LinuxCNC's tolerances, corners, tool axes. mm, rad."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ The meaning of each code is a function in `codes`, found in the table of `codes.
 (LinuxCNC's manual, "G-Code Overview", "Order of Execution").
 """
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import Code, code_name
 from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle

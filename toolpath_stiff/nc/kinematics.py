@@ -15,8 +15,6 @@ tool's length from the gauge line. Then tables, from the base to the work: c sta
 and She, written with rotations about lines.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

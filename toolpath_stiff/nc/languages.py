@@ -1,7 +1,5 @@
 """Files that are not G code, recognised by their lines: cutter-location files; other languages, refused by name."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from functools import cache

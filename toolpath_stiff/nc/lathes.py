@@ -1,7 +1,5 @@
 """Signs of a lathe's program, whose X is a diameter; two of them, and it is refused."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 

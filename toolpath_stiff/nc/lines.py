@@ -1,7 +1,5 @@
 """A program file to lines: bytes to text, text to lines."""
 
-from __future__ import annotations
-
 import codecs
 import re
 from pathlib import Path

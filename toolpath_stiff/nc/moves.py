@@ -3,8 +3,6 @@
 This is what the reader hands on: geometry with its line, feed and tool; no machine, no sampling.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple

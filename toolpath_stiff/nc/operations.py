@@ -10,8 +10,6 @@ name in one block), Vectric (`Toolpath:- NAME` between lines of dashes), Estlcam
 pcb2gcode, and five-axis demos of LinuxCNC.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

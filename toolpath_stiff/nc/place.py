@@ -1,7 +1,5 @@
 """A line of a file, which an error names."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from toolpath_stiff.errors import ProgramError

@@ -9,8 +9,6 @@ functions that the interpreter calls. A line about which there is anything to sa
 that does not fit) ends the run before it: the interpreter then executes it and reports it. mm, degrees, mm/min inside.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from toolpath_stiff.nc.codes.increments import notice_lengths

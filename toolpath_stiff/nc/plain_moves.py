@@ -4,8 +4,6 @@ By the codes' own rules (`codes`, `frames`) on arrays, digit for digit. Here is 
 word holds until the next one. mm, degrees, mm/min inside.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A program posted for another machine: what of it can be known on the part, and what is reported about it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -6,8 +6,6 @@ reads the first form alike. `M97 P100` (Haas) and `M98 Q100` (Fanuc) call the bl
 Modal state goes through a call unchanged.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """An NC program or a cutter-location file, from file or text, to `ReadProgram`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ Where rotary axes turn, a straight move of the axes is a curve on the part: it i
 axes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import fields, replace

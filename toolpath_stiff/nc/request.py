@@ -1,7 +1,5 @@
 """A program that is to be read, and all that is known of its control: what the readers of every language take."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Strokes of drilling cycles along the tool, as LinuxCNC expands them ("Canned cycles"; interp_cycles.cc). mm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

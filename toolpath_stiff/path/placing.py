@@ -4,8 +4,6 @@ One rule: points p' = o + Q p with Q = Rz(C) Ry(B) Rx(A); orientations R' = Q R 
 work, the vertical platform never yaws. With it the machine's 120-degree symmetry holds exactly.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

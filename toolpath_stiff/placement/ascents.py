@@ -1,7 +1,5 @@
 """Climbs from the best of many placements to the ends of the front and to what each objective recommends."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ Methods of Optimization, 1987, section 14.4, exact penalty functions and second-
 slack for all constraints, so that there is always a solution).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

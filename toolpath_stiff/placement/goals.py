@@ -1,7 +1,5 @@
 """Bounds of a search, rules that a placement has to keep, goals that are to be raised."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Boxes that the tool tip stays out of."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

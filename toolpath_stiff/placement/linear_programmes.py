@@ -1,7 +1,5 @@
 """Small linear programmes, many at once: some ten unknowns and up to some thousand rows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@
 anything has changed since that search.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rows of `placements.csv`: a placement and its figures, in the shop's units."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from typing import Any
 

@@ -5,8 +5,6 @@ evolution on a hundred-odd samples that stand for the path find where it lies; c
 and the recommendation on the whole path. Every figure that is returned was computed on the whole path.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A task: what is to be placed and how; a search that was made, and what it rests on."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields

@@ -1,7 +1,5 @@
 """Rules that no placement keeps: anchored rapids are left out of the search, all else is an error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The means of a search: evaluators of the whole path and of the samples that stand for it, bounds and rules."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 

@@ -7,8 +7,6 @@ degrees about the machine's axis, which only a machine that is not threefold tel
 so that the scatter is known; random order, so that a drift looks like nothing else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product

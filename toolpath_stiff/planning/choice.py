@@ -1,7 +1,5 @@
 """The choice of visits: those that set rivals apart most per minute of work."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

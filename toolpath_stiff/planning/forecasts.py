@@ -1,7 +1,5 @@
 """Forecasts of rivals: the mean of each reading, and how they vary together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product

@@ -1,7 +1,5 @@
 """A map of how far one visit would set the two likeliest rivals apart, over the workspace."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product

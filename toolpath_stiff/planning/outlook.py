@@ -1,7 +1,5 @@
 """The outlook of visits: readings simulated under every rival, judged by Bayes' rule."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -9,8 +9,6 @@ without its term for unlike covariances), and the one is taken that lowers its l
 has been told apart counts no more; one that cannot be told apart takes nothing from the others.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

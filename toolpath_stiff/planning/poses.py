@@ -1,7 +1,5 @@
 """Poses that a plan may ask for: reachable, in round figures."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.random import Generator
 

@@ -1,7 +1,5 @@
 """The rivals that a plan is to tell apart: as a diagnosis left them, as the user names them, or before any data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A plan's visits as a measurement file whose stiffness is left empty."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from itertools import count
 

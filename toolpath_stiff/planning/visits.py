@@ -5,8 +5,6 @@ some directions under one load or two. Visits are what costs time; further direc
 cheap.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import product

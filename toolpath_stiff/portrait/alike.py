@@ -5,8 +5,6 @@ give the same readings: without tilted poses a floor that rocks is a table that 
 is put in the place of the named effect, the strut law refitted, and those that fit as well as it does are told.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

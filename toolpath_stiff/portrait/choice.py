@@ -9,8 +9,6 @@ Which link and which variable it is follows from all of these descriptions: of e
 one, and all that could stand in its place.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ A term's prior weight is even over links, over the variables of a link, over its
 over the constants of a shape, so that no link is preferred for having many terms.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace

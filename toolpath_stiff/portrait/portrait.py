@@ -5,8 +5,6 @@ terms of a dictionary of machine mechanics (`dictionary`, `terms`) are chosen (`
 What else would look the same is said by probabilities over the whole dictionary, summed by link and by variable.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -5,8 +5,6 @@ best are fitted with the compliances added up, c = c_struts(law) + rest + sum si
 series.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A portrait in an engineer's words, and as parts of diagnose.json in shop units."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from toolpath_stiff.documents import Document

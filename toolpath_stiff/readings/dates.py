@@ -4,8 +4,6 @@ A year or a month alone keeps its precision as text ("2021", "2021-03", ISO 8601
 middle. Other forms are said by a mapping of columns.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta

@@ -1,7 +1,5 @@
 """Struts measured alone again and again: which changed, when, at once or slowly; tension against compression."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -9,8 +9,6 @@ A strut measured alone on a bench is not jogged: the force is set and its own st
 the force over D between the extremes of the force.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ ms or s since 1970, or as they are written, DD.MM.YYYY. A heading with commas or
 is one text for all rows. `FILE.columns.toml` beside a file holds the same, as `stiffness = "stiff_mean:N/um"`.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

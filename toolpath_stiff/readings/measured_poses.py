@@ -1,7 +1,5 @@
 """Poses of readings, held against what the machine can be: beyond a limit is doubtful, singular is impossible."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ seating, creep and a warm sensor carry the deflection away slowly; neither is st
 weighing A B A (OIML R 111-1:2004, C.4), and width and linearity are those of the last closed cycle.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Raw records of struts over their dates, and the remarks that follow: which rows of a file are outdated."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

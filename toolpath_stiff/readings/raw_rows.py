@@ -1,7 +1,5 @@
 """Reduced loops as they are written: entries of a document, rows of a measurement file."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The two sides of a loop of raw records: stiffness in tension and in compression, and lost motion between them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

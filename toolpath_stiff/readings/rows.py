@@ -3,8 +3,6 @@
 A bad row is named with its line; all bad rows of a file are reported together.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Tables of struts measured alone whose stiffnesses were worked out elsewhere: a row a strut and date."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

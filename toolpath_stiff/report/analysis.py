@@ -1,7 +1,5 @@
 """The results of an analysis: what a terminal shows, page and files."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator, Sequence
 

@@ -6,8 +6,6 @@ the templates, in the script's data as JSON without `<`, `>`, `&`; the script wr
 content security policy lets only our own script run.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterator, Sequence
 

@@ -1,7 +1,5 @@
 """The figures of an analysis in words and tables, the same on the terminal, in pictures and on pages."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from toolpath_stiff.analysis.document import compare_summaries

@@ -1,7 +1,5 @@
 """The results of a case study, the paper's or one's own: text and table."""
 
-from __future__ import annotations
-
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.documents import Document
 from toolpath_stiff.placement.case_study import FIGURES, HIGH_MM, LOW_MM, REGION_COLUMNS, CaseStudy

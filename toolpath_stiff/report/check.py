@@ -1,7 +1,5 @@
 """The text of `tps check`, with its tables of tools and operations: plain text, at most 100 columns."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from toolpath_stiff.analysis.program_check import Figures, OperationRow, ProgramCheck, ToolRow

@@ -1,7 +1,5 @@
 """The colours of pictures, and of the scale of stiffness on pages."""
 
-from __future__ import annotations
-
 import numpy as np
 
 INK, MUTED, GRID = "#1f2933", "#616e7c", "#e4e7eb"

@@ -1,7 +1,5 @@
 """The results of a comparison with measurements: page, text, and residuals as a table."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stiffness along a path as page and pictures draw it: curves of few points, ends of scales, boxes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff import defaults

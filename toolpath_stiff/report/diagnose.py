@@ -1,7 +1,5 @@
 """The page of a diagnosis, and its residuals as a table."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

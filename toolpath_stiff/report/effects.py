@@ -1,7 +1,5 @@
 """Effects that a machine can carry, and trials of them, as text and for JSON."""
 
-from __future__ import annotations
-
 import math
 
 from toolpath_stiff.report.tables import ShownTable

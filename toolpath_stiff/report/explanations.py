@@ -1,7 +1,5 @@
 """The words and figures of a diagnosis, the same on the terminal, in the pictures and on the page."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from toolpath_stiff.diagnosis.result import Diagnosis

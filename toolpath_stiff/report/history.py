@@ -1,7 +1,5 @@
 """Struts measured alone over their dates: lines for the terminal, a section of a page."""
 
-from __future__ import annotations
-
 from toolpath_stiff.readings.history import StrutHistory, StrutOverTime
 from toolpath_stiff.report.pages import Section
 from toolpath_stiff.report.tables import ShownTable

@@ -1,7 +1,5 @@
 """Readings of indicators beside the tip: on pages and on the terminal."""
 
-from __future__ import annotations
-
 from toolpath_stiff.comparison.loop_readings import BesideTip
 from toolpath_stiff.report.pages import Section
 from toolpath_stiff.report.tables import ShownTable

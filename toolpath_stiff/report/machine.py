@@ -1,7 +1,5 @@
 """A machine's figures, as text and as rows of a table."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple
 

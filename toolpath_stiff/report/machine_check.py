@@ -1,7 +1,5 @@
 """A check of a machine file in words."""
 
-from __future__ import annotations
-
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.machine_check import BEYOND, MACHINING_CENTRE, ROBOT, MachineCheck
 from toolpath_stiff.analysis.poses import PoseStiffness

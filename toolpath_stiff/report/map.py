@@ -1,7 +1,5 @@
 """The results of a stiffness map: figures, table and page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Raw records reduced to stiffnesses: figures for the terminal, names of files."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 from toolpath_stiff.documents import Document

@@ -1,7 +1,5 @@
 """The results of a search for a placement: page, files and text."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from toolpath_stiff.column_files import csv_text

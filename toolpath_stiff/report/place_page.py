@@ -4,8 +4,6 @@ A page cannot hold every sample of a long program at sixty placements. The ends 
 first, then samples evenly along the path; the stiffness is evaluated at just these.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

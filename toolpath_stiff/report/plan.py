@@ -1,7 +1,5 @@
 """A plan in text, and its files."""
 
-from __future__ import annotations
-
 from toolpath_stiff.planning.plan import RivalPlan
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.rows import plan_csv

@@ -1,7 +1,5 @@
 """Stiffness at a pose as text."""
 
-from __future__ import annotations
-
 from toolpath_stiff.analysis.poses import POSE_COLUMNS, PoseStiffness
 from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.stiffness.model import condition_warnings, effects_stated

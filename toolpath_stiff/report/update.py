@@ -1,7 +1,5 @@
 """The results of an update: page and text."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from textwrap import fill
 

@@ -1,7 +1,5 @@
 """How figures are written for people: the same on the terminal, in the pictures and on the page."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """One block of a program, written for another placement: straight moves, homes, arcs, cycles, moves cut into pieces."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

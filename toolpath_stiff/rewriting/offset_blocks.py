@@ -5,8 +5,6 @@ the vertical. So they express a placement of vertical tools in an untilted set-u
 program itself has to be rewritten.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

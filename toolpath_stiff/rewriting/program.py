@@ -6,8 +6,6 @@ marks, line ends, upper and lower case. The rapid with which the tool comes from
 the one move that cannot match.
 """
 
-from __future__ import annotations
-
 import copy
 import re
 from collections.abc import Iterator

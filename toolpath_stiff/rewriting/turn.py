@@ -9,8 +9,6 @@ Cut into pieces are arcs that no plane expresses any more, and turns of the tool
 are in the set-up frame of the untouched program.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

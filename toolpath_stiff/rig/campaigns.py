@@ -3,8 +3,6 @@
 A `Table` maps column names of measurement files to arrays or lists of one length, in shop units.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Each purpose has its own stream of random numbers, so that a case and its contro
 effect alone.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

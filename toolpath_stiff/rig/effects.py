@@ -4,8 +4,6 @@ Names, units and bounds are those of the issue that ordered the catalogue, so th
 mechanics behind them is in `structure` and `hidden`. `strength` runs from 0 (nothing) to 1 (the bound).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ written as JSON, compressed, padded to one length (so that the size tells nothin
 and preceded by a keyed digest.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import hmac

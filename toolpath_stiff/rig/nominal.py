@@ -6,8 +6,6 @@ hides is the rig's to choose. `true_poses` says where the platform really stands
 geometry, commands a pose.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from importlib import resources

@@ -1,7 +1,5 @@
 """Rows of a measuring campaign in SI, as the simulated machine meets them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ The size is the root mean square change of the readings' logarithm. It is drawn 
 campaign (`DETECTABLE`) to 30 %, as far as the effect's bounds allow.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

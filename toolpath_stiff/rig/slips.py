@@ -6,8 +6,6 @@ truth of what it did, so that a search for such slips can be judged.
 A slip of a pose or of a sign is made where a form has it once: in one row, or in all rows of a clamping.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.random import Generator
 

@@ -9,8 +9,6 @@ Joints whose stiffness depends on their load are solved by secant iteration: ass
 the last loads, solve, repeat. Newton's method would meet the infinite slope of a clearance at no load.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple

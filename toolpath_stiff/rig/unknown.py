@@ -7,8 +7,6 @@ work in base axes may sit in the frame as well as under the table; the temperatu
 is a function of the order of the readings.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ Each fault is one `EffectFault` with file and line of the effect's code. The pac
 contract by the tests and go through unchecked.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from typing import Any
 

@@ -7,8 +7,6 @@ Arrays are (component, strut, pose) with poses last, in blocks that stay in cach
 number of poses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations

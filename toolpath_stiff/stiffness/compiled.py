@@ -4,8 +4,6 @@ numba (in `compiled_loops`) is imported when a kernel is first asked for: 0.4 s,
 time on a machine; the result is cached on disk. `core` chooses this route by itself for very many poses.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 import numpy as np

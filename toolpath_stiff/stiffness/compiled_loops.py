@@ -10,8 +10,6 @@ argument that is None, as the rotation of a vertical spindle, takes its branch w
 # mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, untyped-decorator, arg-type, call-overload"
 # ruff: noqa: D103 - the textbook names say it
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numba.extending import overload, register_jitable

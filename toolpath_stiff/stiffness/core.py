@@ -13,8 +13,6 @@ steps in any direction. So the stiffest one is looked for in the planes as well,
 one never lies there: the planes part its basins, and climbs begin in different ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 

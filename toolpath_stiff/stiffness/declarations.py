@@ -1,7 +1,5 @@
 """What an effect declares, held against the contract when it is loaded; each mistake with the line that makes it."""
 
-from __future__ import annotations
-
 import difflib
 import inspect
 import math

@@ -1,7 +1,5 @@
 """The text of a file with an effect."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 from toolpath_stiff.results import TextFile

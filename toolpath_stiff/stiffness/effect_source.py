@@ -1,7 +1,5 @@
 """Where an effect is written: its file, and the lines of what it declares or fails at."""
 
-from __future__ import annotations
-
 import inspect
 import re
 import sys

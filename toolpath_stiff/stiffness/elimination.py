@@ -13,8 +13,6 @@ disk looks at it alone.) In numpy components may be those of several vectors at 
 Terms are added in the order in which they are written, so that numbers are the same to the last bit in every version.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

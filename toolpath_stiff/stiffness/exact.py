@@ -21,8 +21,6 @@ It is convex, because a strut gives more under more force, and its gradient has 
 Whole steps of Newton's method settle most poses; where they cycle between the kinks, parts of them settle the others.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 

@@ -15,8 +15,6 @@ is the case v = u over all links.
 | platform | what the tip reads less what the spindle does |
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ An indicator sees what gives way between the two points that it touches, nothing
 holds the whole load path; an indicator across one joint holds that joint alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 LINKS_ON_THE_PATH = ("tool", "platform", "joints", "struts", "frame", "table")

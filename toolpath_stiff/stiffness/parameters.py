@@ -1,7 +1,5 @@
 """Values of an effect's parameters, as an entry of a machine file or a user's hand gives them, in SI."""
 
-from __future__ import annotations
-
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.stiffness.contract import Effect, Parameter, Values
 

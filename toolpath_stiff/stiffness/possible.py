@@ -1,7 +1,5 @@
 """Compliances that there can be: finite, symmetric, positive definite. Results of the exact route are held to it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

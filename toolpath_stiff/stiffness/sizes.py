@@ -1,7 +1,5 @@
 """Sizes and lists as sentences say them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 

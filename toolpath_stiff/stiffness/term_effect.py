@@ -1,7 +1,5 @@
 """Effects made of terms, each with a size of its own: what the portrait computes with and what an effect file holds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 The terms of a file are one effect; those of the geometry and those of readings have one of their own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What terms do per unit of their sizes: loads of links, compliances of struts, errors of readings."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

@@ -5,8 +5,6 @@ tip. 19 bars: 6 rim bars between neighbouring joints, 6 spokes to the hub, 6 fro
 (Clinton, Zhang, Wavering 1997, Figure 2b and "twenty-five elements" with the six struts).
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

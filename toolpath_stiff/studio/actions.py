@@ -1,7 +1,5 @@
 """What a page may ask a session to do; files that are dropped on it."""
 
-from __future__ import annotations
-
 import tempfile
 import tomllib
 from collections.abc import Callable, Mapping

@@ -4,8 +4,6 @@ A working copy stands in the case's folder `edit/`, outside the case: it becomes
 be undone, each time it is saved without a fault. Code is run of those files alone that the user has loaded before.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from pathlib import Path

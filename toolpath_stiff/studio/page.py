@@ -1,7 +1,5 @@
 """The studio's page: one document of its own scripts and styles, live or, as an export, with the state within it."""
 
-from __future__ import annotations
-
 import html
 import json
 from importlib import resources

@@ -1,7 +1,5 @@
 """Opening a case for the studio, and serving it until it is ended."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

@@ -4,8 +4,6 @@ Only the standard library. A page is one document, as the static reports are; it
 change by an event stream, and posts what is to be done.
 """
 
-from __future__ import annotations
-
 import hmac
 import json
 import secrets

@@ -1,7 +1,5 @@
 """What all tabs of a studio share: the case, what was found, the work under way."""
 
-from __future__ import annotations
-
 import json
 import threading
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """G2, G3: arcs, full circles, helices, by I J K or by R. mm, degrees."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import Code, g_codes
 from toolpath_stiff.nc.codes.increments import increments_hint

@@ -4,8 +4,6 @@ The program keeps its own coordinates: `Frames.position` is the programmed point
 tool centre; the ends of the last moves are set back in the recorder when the next corner is concave.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 Each module here has a group of codes, each a function and a row; `registry` joins the rows to one table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

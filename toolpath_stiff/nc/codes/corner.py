@@ -4,8 +4,6 @@ Fanuc's operator's manuals, "Optional chamfering and corner R": both moves lie i
 corner that is cut off, both ways.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from toolpath_stiff.nc import geometry

@@ -1,7 +1,5 @@
 """G40, G41, G42: cutter compensation by the tool's radius, as LinuxCNC or as Fanuc and Haas have it. mm."""
 
-from __future__ import annotations
-
 import math
 
 from toolpath_stiff.nc import compensation, geometry

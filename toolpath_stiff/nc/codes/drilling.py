@@ -4,8 +4,6 @@ Sources: LinuxCNC's manual ("G80-G89 Canned Cycles", "G73") and interp_cycles.cc
 cycle") where a dialect follows them.
 """
 
-from __future__ import annotations
-
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
 from toolpath_stiff.nc.codes.dwell import time_word

@@ -1,7 +1,5 @@
 """G4, and words of time."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import FANUC, Code, g_codes
 from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State

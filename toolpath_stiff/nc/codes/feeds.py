@@ -1,7 +1,5 @@
 """F and S, feed and spindle modes (G93 G94 G95, G96 G97), and the feed of a move. mm/min inside."""
 
-from __future__ import annotations
-
 import math
 
 from toolpath_stiff.hints import both_names

@@ -1,7 +1,5 @@
 """Which block runs next: subprogram calls (M97, M98, G65), M99, stops and the end; `program_run` carries them out."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, holds_anyway, m_codes
 from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, State
 

@@ -3,8 +3,6 @@
 Sources: Fanuc's operator's manuals, "Decimal point programming"; Haas' "Help with the decimal points".
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from toolpath_stiff.nc.controller import GENERIC, INCREMENT_DEGREE, INCREMENT_INCH, INCREMENT_MM

@@ -1,7 +1,5 @@
 """Units, plane, distance modes: G20 G21, G17 G18 G19, G90 G91, G90.1 G91.1."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import FANUC, Alias, family, g_codes
 from toolpath_stiff.nc.codes.polar import forget_polar
 from toolpath_stiff.nc.codes.unsettled import refuse_while_rotated

@@ -4,8 +4,6 @@ A move is recorded with its ends in the set-up frame, its feed and its tool; bes
 is known.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 

@@ -3,8 +3,6 @@
 What Fanuc's and Haas' programs begin with ("safe start") is here: it switches off what is refused where it is on.
 """
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, family, g_codes, holds_anyway, m_codes
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State

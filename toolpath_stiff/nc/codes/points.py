@@ -1,7 +1,5 @@
 """What the axis words of a block mean: points and steps. mm and degrees."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.polar import at_radius_and_angle, polar_point
 from toolpath_stiff.nc.codes.unsettled import settle
 from toolpath_stiff.nc.geometry import PLANES

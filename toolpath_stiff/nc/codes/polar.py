@@ -4,8 +4,6 @@ Sources: LinuxCNC, "G-Code Overview", "Polar Coordinates"; Fanuc's operator's ma
 coordinate command".
 """
 
-from __future__ import annotations
-
 import math
 
 from toolpath_stiff.nc.codes.code import FANUC, family

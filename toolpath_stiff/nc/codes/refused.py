@@ -1,7 +1,5 @@
 """Codes that are refused, with what they are, what to do instead, and the manual that has them."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, Refused, g_codes
 
 _TIP, _MOVES = "post X, Y, Z, A, B, C of the tool tip", "post the moves of the cycle"

@@ -4,8 +4,6 @@ Codes and modal groups follow LinuxCNC (its manual, "G-Code Overview", modal gro
 the results are compared with; polar words and rotation, which it does not have, follow Fanuc's controls.
 """
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.arc import ARC_CODES
 from toolpath_stiff.nc.codes.code import Alias, Code
 from toolpath_stiff.nc.codes.corner import CORNER_CODES

@@ -4,8 +4,6 @@ They follow Fanuc's milling controls (operator's manuals of the series 16 and 15
 these manuals leave the point to parameters or forbid the block, it is refused. mm and degrees.
 """
 
-from __future__ import annotations
-
 import math
 
 from toolpath_stiff.nc.codes.code import FANUC, Code

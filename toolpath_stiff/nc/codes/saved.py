@@ -1,7 +1,5 @@
 """M70 to M73: modes saved and restored, as LinuxCNC has them (manual, "M-Codes", M70 - M73)."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import family, m_codes
 from toolpath_stiff.nc.codes.polar import forget_polar
 from toolpath_stiff.nc.codes.work_offsets import take_offset

@@ -1,7 +1,5 @@
 """G10: work offsets and tools set by the program, as LinuxCNC or as Fanuc and Haas have it. mm, degrees."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import Code, g_codes
 from toolpath_stiff.nc.codes.motion import know_position
 from toolpath_stiff.nc.codes.points import axis_words

@@ -1,7 +1,5 @@
 """Shifts of program coordinates on top of the work offset: G52, G92 to G92.3. mm, degrees."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import Code, family, g_codes
 from toolpath_stiff.nc.codes.motion import know_position
 from toolpath_stiff.nc.codes.points import axis_words

@@ -1,7 +1,5 @@
 """G33, G33.1: moves whose feed the spindle's turns give, as LinuxCNC has them (manual, "G-Codes", G33, G33.1). mm."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import Code, g_codes
 from toolpath_stiff.nc.codes.feeds import SLOWEST
 from toolpath_stiff.nc.codes.motion import record

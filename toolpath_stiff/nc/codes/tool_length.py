@@ -1,7 +1,5 @@
 """The tool's length and tool centre point control: G43, G43.1, G43.4, G49. mm, degrees inside."""
 
-from __future__ import annotations
-
 import math
 
 from toolpath_stiff.nc.codes.code import HAAS, Alias, Code, g_codes

@@ -1,7 +1,5 @@
 """Tools: T, M6, M61; the numbers of offsets beside them."""
 
-from __future__ import annotations
-
 import math
 
 from toolpath_stiff.nc.codes.code import Code, m_codes

@@ -1,7 +1,5 @@
 """What is refused where controls would take other points: after G68, G69 and G10 turned the coordinates."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
 

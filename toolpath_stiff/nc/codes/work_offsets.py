@@ -1,7 +1,5 @@
 """Work offsets: G54 to G59.3, G54.1, G154, G110 to G129."""
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, family, g_codes
 from toolpath_stiff.nc.codes.polar import forget_polar
 from toolpath_stiff.nc.codes.unsettled import refuse_while_rotated, zero_moved

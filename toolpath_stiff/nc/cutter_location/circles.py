@@ -8,8 +8,6 @@
 - `INDIRV/i,j,k` before `CIRCLE/x,y,z,r` or `TLON,GOFWD/(CIRCLE/...)`: the direction at the start.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

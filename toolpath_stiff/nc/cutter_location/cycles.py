@@ -7,8 +7,6 @@ depends on the system; RAPTO, which Creo counts from CLEAR and others from the s
 go to planes that are not in the file.
 """
 
-from __future__ import annotations
-
 from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number

@@ -1,7 +1,5 @@
 """Words of a cutter-location file that say what holds from here on: units, feed, spindle, frames, tools; and pauses."""
 
-from __future__ import annotations
-
 import math
 
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL

@@ -1,7 +1,5 @@
 """Words of a cutter-location file that move the tool: points, and circles that the next point ends."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

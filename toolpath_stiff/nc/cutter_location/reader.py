@@ -6,8 +6,6 @@ each takes the `state` and a statement. `state` also makes moves of what `circle
 A file is read to `ReadProgram`, the same contract as the reader of G code, or checked, with all its errors.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 import re

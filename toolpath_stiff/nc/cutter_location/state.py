@@ -5,8 +5,6 @@ and belong to the line of the statement being executed. They raise `AxisError` a
 `InputError`, which does. mm, degrees, mm/min.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

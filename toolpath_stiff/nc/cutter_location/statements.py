@@ -3,8 +3,6 @@
 `$` at the end of a line continues a statement on the next one; `$$` begins a comment (APT; ISO 4343).
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ linear interpolation departs by at most an eighth of the largest of them. Along 
 (Clairaut), the y component of its normal.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -3,8 +3,6 @@
 Functions of words that act are in `modes` and `motion`; those of words that are listed, doubted or refused are here.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

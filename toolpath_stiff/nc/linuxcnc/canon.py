@@ -9,8 +9,6 @@ A line of the copy carries its number as a comment, which stays in order with th
 is that of the line being read, which cutter compensation reads ahead.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ and subprograms of other files. A program with these is refused here, before any
 reads has no comments at all, so the first would not run even if it passed.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

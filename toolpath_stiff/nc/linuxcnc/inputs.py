@@ -5,8 +5,6 @@ which ends a program. Lines keep their places, so that a line number in one of i
 Lengths of the tool table and the parameter file are inches to `rs274`, whatever G21 says.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Patterns of what the words of a program's line say, where `rs274` prints too little."""
 
-from __future__ import annotations
-
 import re
 
 MOTION_CODE = re.compile(r"G0*(0|1|2|3|5|33|38|73|74|76|8\d)(?![\d])")

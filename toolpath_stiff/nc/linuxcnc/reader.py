@@ -1,7 +1,5 @@
 """LinuxCNC's own interpreter (`rs274`) as a second reader of NC programs: fence, copy, run, moves."""
 
-from __future__ import annotations
-
 import copy
 import re
 from collections.abc import Sequence

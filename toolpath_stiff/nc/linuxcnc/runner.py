@@ -4,8 +4,6 @@ The kernel's limits, by `prlimit`; bubblewrap makes the whole file system but th
 network. Without it the caller must say that he knows.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """The family of a parametric program: RS274/NGC or Macro B, by its dialect or by its signs."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

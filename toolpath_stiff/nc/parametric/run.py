@@ -4,8 +4,6 @@ LinuxCNC's manual, "O Codes"; Fanuc's operator's manuals, "Custom macro" ("Macro
 Bounded: the blocks that run, and calls within calls.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Each block's words act as those of any program (`interpreter.execute`). Subprogr
 folder that the caller names, and from nowhere else.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

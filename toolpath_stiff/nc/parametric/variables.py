@@ -6,8 +6,6 @@ Haas, mill operator's manual, "Macros". Variables on which a path can depend are
 work offsets and tool lengths where they are in units that the program states. The others are refused by number.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -3,8 +3,6 @@
 The bars stand in the table itself, so that they are sorted with it. They are drawn here; the page's script only sorts.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What became of many programs: the figures that are kept of each, as `summary.csv` and as a table on the terminal."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field

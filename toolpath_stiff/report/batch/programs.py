@@ -1,7 +1,5 @@
 """Many programs: which ones files and folders name, and the report folder of each."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Where model and measurements differ before and after a fit, seen from above; measured against modelled."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

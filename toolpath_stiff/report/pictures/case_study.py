@@ -1,7 +1,5 @@
 """The pictures of a case study: the path in its regions, mean and range over the height."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection

@@ -1,7 +1,5 @@
 """Pictures of a comparison: measured against modelled, residuals in measuring order, by plane and direction."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes

@@ -1,7 +1,5 @@
 """Pictures of a diagnosis: what the missing thing looks like, what the data cannot tell apart, before and after."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

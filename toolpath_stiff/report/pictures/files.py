@@ -1,7 +1,5 @@
 """The house style of pictures, and how a figure becomes a file."""
 
-from __future__ import annotations
-
 import io
 import struct
 import warnings

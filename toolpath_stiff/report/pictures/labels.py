@@ -1,7 +1,5 @@
 """Labels beside places of a picture, and the heading and legend of pictures of a path."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Picture of a diagnosis: every explanation with its error at left-out points and its probability, best first."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Sequence
 

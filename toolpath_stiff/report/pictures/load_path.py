@@ -1,7 +1,5 @@
 """The load path as a waterfall: compliance link by link, and what the measurements add or take."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """The pictures of a machine: at a pose, and of one that was checked with its doubtful joints."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The picture of a stiffness map: every slice, one colour scale for all."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

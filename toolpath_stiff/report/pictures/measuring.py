@@ -1,7 +1,5 @@
 """The pictures of raw records reduced to stiffnesses."""
 
-from __future__ import annotations
-
 from matplotlib.figure import Figure
 
 from toolpath_stiff.readings.raw import Reduction

@@ -1,7 +1,5 @@
 """`path.png`: the path from above, the front and the side, coloured by stiffness."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pictures of a placement: the front, and the set-up sheet."""
 
-from __future__ import annotations
-
 from matplotlib.figure import Figure
 
 from toolpath_stiff.placement.result import Placement

@@ -1,7 +1,5 @@
 """The picture of a plan: how far its rivals would be apart over the workspace, and the planned poses."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from typing import Any

@@ -1,7 +1,5 @@
 """The set-up sheet for the shop floor, one page."""
 
-from __future__ import annotations
-
 import textwrap
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures with their heading, places in inches, axes of figures in thousands, scales of colours."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures of an update: the error step by step, before and after, and the paper's Figure 3."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Residuals against everything that the model does not use."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """Contact nonlinearity: joints whose contacts stiffen with their load."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

@@ -1,7 +1,5 @@
 """Frame compliance: the vertices that the struts hang from give way."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gauge scale: the readings of one direction or one set-up are off by a factor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

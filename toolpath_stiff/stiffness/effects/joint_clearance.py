@@ -1,7 +1,5 @@
 """Joint clearance: every strut loses some motion before it carries its load."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

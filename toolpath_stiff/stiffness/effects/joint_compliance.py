@@ -1,7 +1,5 @@
 """Joint compliance: the joints at both ends of a strut, its nut and bearings, a constant in series with it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

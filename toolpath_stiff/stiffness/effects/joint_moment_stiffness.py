@@ -1,7 +1,5 @@
 """Joint moment stiffness: the joints resist turning, so that the struts are not pinned."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

@@ -1,7 +1,5 @@
 """Platform flexibility: the nineteen bars of the platform truss give way under the joint forces."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

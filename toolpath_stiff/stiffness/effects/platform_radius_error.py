@@ -1,7 +1,5 @@
 """Platform radius error: the platform joints sit on a larger circle than the machine file says."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod

@@ -1,7 +1,5 @@
 """Set-up compliance: a riser block or fixture that only one set-up has."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

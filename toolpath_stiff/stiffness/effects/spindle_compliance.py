@@ -1,7 +1,5 @@
 """Spindle compliance: shaft, bearings, holder and tool give way between platform and tip."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

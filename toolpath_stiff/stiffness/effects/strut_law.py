@@ -1,7 +1,5 @@
 """Strut law: the stiffness of a strut is not linear in its length."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

@@ -1,7 +1,5 @@
 """Table compliance: the workpiece's side of the loop gives way."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

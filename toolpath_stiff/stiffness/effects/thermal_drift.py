@@ -1,7 +1,5 @@
 """Thermal drift: the indicator wanders while the load is applied."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray

@@ -1,7 +1,5 @@
 """Tool length error: the tool is longer than the control believes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod

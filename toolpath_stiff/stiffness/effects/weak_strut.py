@@ -1,7 +1,5 @@
 """Weak strut: one strut is softer than the others."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
