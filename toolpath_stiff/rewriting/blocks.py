@@ -14,7 +14,7 @@ from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import Flow
 from toolpath_stiff.nc.words import AXES, CORNERS, POLAR, Block
 from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
-from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, points_between
+from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, point_at
 
 Piece = tuple[str, list[float], float]  # G0 or G1, end in the set-up frame, dwell after it in s
 SLASH = re.compile(r"\s*/\d*")
@@ -73,8 +73,8 @@ def _lines(controls: Controls, once: str | None, plane: str, first: int) -> tupl
         count = _piece_count(controls)
         if count > 1:
             start, end = (source.frames.to_setup(point) for point in (last.start, last.end))
-            points = points_between(start, end, last.arc, count)
-            return _one_by_one(controls, [("G1", point, 0.0) for point in points]), True
+            points = [point_at(start, end, last.arc, part / count) for part in range(1, count)]
+            return _one_by_one(controls, [("G1", point, 0.0) for point in (*points, end)]), True
         if last.arc is None:
             controls.motion_word(source.motion or "")
             controls.go(controls.target(last.end), controls.axes)
@@ -88,10 +88,10 @@ def _home(controls: Controls) -> None:
     axes = controls.axes
     if not axes:
         return
-    named, mixed = [AXES.index(letter) for letter in axes], controls.matrix != 0.0
+    named = [AXES.index(letter) for letter in axes]
+    mixed = (controls.matrix != 0.0) | (controls.matrix.T != 0.0)
     linear = [axis for axis in named if axis < 3]
-    others = (axis for axis in range(3) if axis not in named)
-    missing = [AXES[axis] for axis in others if mixed[axis, linear].any() or mixed[linear, axis].any()]
+    missing = [AXES[axis] for axis in range(3) if axis not in named and mixed[axis, linear].any()]
     if missing:
         raise controls.refusal(
             f"G28 or G30 of {', '.join(axes)} without {', '.join(missing)}: the turned work has no such axis alone",

@@ -10,14 +10,16 @@ Edits replace, add and take out words of one line; everything else of it stays a
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.interpreter import execute
+from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import CurrentBlock, Segment, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
-from toolpath_stiff.rewriting.turn import Turn, cutting_rows, differences
+from toolpath_stiff.rewriting.turn import Turn, differences
 from toolpath_stiff.units import MM_PER_INCH
 
 SAME = 1e-9  # mm, inch or degrees: a word whose number changes by less keeps its text
@@ -251,11 +253,11 @@ class Controls:
     def check(self, first: int, first_out: int, pieces: bool) -> None:
         """Every cutting move of the block must be the placed one to within the rounding; of `pieces` the two ends."""
         self._coarsest = unit = max(self._coarsest, self.unit)
-        wanted = cutting_rows(self.source.recorder, first)
-        written = cutting_rows(self.out.recorder, first_out)
+        source, out = self.source.recorder.recent[first:], self.out.recorder.recent[first_out:]
+        wanted, written = ([move for move in moves if move.motion != RAPID] for moves in (source, out))
         if pieces and wanted and written:
-            wanted = [wanted[0]._replace(end=wanted[-1].end, arc=None)]
-            written = [written[0]._replace(end=written[-1].end)]
+            wanted = [replace(wanted[0], end=wanted[-1].end, arc=None)]
+            written = [replace(written[0], end=written[-1].end)]
         # The steps of a cycle with L in G91 repeat one rounding.
         repeats = next((word.value for word in self.block.words if word.letter == "L"), 1.0)
         difference = differences(self.turn, wanted, written, unit * max(repeats, 1.0))

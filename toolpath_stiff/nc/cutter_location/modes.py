@@ -114,12 +114,12 @@ def multax(state: CutterLocationState, statement: MajorStatement) -> None:
         raise state.fail(statement.shown, "MULTAX, MULTAX/ON or MULTAX/OFF")
     state.multax = words != ["OFF"]
     if not state.multax and state.next_axis != VERTICAL:
-        state.axis_known = False
+        state.next_axis = None
 
 
 def tlaxis(state: CutterLocationState, statement: MajorStatement) -> None:
     """The tool axis of points that give none."""
-    state.next_axis, state.axis_known = unit_axis(state.numbers(statement, 3)), True
+    state.next_axis = unit_axis(state.numbers(statement, 3))
 
 
 def frame_word(state: CutterLocationState, statement: MajorStatement) -> None:
@@ -163,20 +163,13 @@ def loadtl(state: CutterLocationState, statement: MajorStatement) -> None:
     if number != int(number) or not 0 <= number < 1e9:
         raise state.fail(f"tool {given[0]}", "a whole number")
     state.no_circle(f"{statement.word}/")
-    length = math.nan
-    if "LENGTH" in words[:-1]:
-        length = state.number(statement.arguments[words.index("LENGTH") + 1]) * state.scale
+    length = tool_of(state.tools, int(number)).length
+    if "LENGTH" in words[:-1] and (stated := state.number(words[words.index("LENGTH") + 1]) * state.scale) > 0.0:
+        state.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools takes precedence")
+        length = stated if math.isnan(length) else length
     if len(state.recorder) > state.moves_before_cutter:  # a CUTTER between the last move and this is its own
         state.diameter = math.nan
-    state.tool, state.tool_length = int(number), _length_of(state, int(number), length if length > 0.0 else math.nan)
-
-
-def _length_of(state: CutterLocationState, number: int, given: float) -> float:
-    """The tool table's length, or the one that the file gives; nan: the machine's reference tool."""
-    length = tool_of(state.tools, number).length
-    if not math.isnan(given):
-        state.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools takes precedence")
-    return given if math.isnan(length) else length
+    state.tool, state.tool_length = int(number), length
 
 
 def cutter(state: CutterLocationState, statement: MajorStatement) -> None:
