@@ -10,8 +10,8 @@ from toolpath_stiff.nc.codes.arc import ARCS
 from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
-from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.nc.state import Flow
+from toolpath_stiff.nc.moves import RAPID, Arc
+from toolpath_stiff.nc.state import Flow, Segment
 from toolpath_stiff.nc.words import AXES, CORNERS, POLAR, Block
 from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
 from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, point_at
@@ -29,7 +29,7 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     if not block.words:
         return [text], True
     source, out = controls.source, controls.out
-    controls.block = block
+    controls.edit = LineEdit(text, block)
     controls.trace.clear()
     first, first_out = len(source.recorder.recent), len(out.recorder.recent)
     controls.current = current = begin(source, block)
@@ -50,44 +50,38 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     plane_before = out.plane
     begin(out, block)
     goes_on = finish(source, current) is Flow.NEXT
-    controls.edit = LineEdit(text, block, controls.digits)
-    plane = controls.plane_word(plane_before)
-    lines, pieces = _lines(controls, current.groups.get("non-modal"), plane, first)
-    controls.check(first, first_out, pieces)
+    lines = _lines(controls, current.groups.get("non-modal"), controls.plane_word(plane_before), first)
+    controls.check(first, first_out, pieces=len(lines) > 1)
     return lines, goes_on
 
 
-def _lines(controls: Controls, once: str | None, plane: str, first: int) -> tuple[list[str], bool]:
-    """The lines, and whether they are one move cut into pieces."""
-    source = controls.source
-    if not controls.trace:
-        return [controls.emit()], False
-    last = controls.trace[-1]
-    if once is not None and once != "G53" and CODES[once].takes_axes:
+def _lines(controls: Controls, once: str | None, plane: str, first: int) -> list[str]:
+    source, last = controls.source, controls.trace[-1] if controls.trace else None
+    if last is None or once == "G53":
+        return [controls.emit()]
+    if once is not None and CODES[once].takes_axes:
         _home(controls)
-    elif once != "G53" and source.motion in CYCLES:
+    elif source.motion in CYCLES:
         if controls.matrix[geometry.PLANES[source.plane][2], geometry.PLANES[source.plane][2]] != 1.0:
-            return _one_by_one(controls, _cycle_in_moves(controls, first)), False
+            return _one_by_one(controls, _cycle_in_moves(controls, first))
         _cycle(controls, plane)
-    elif once != "G53":
-        count = _piece_count(controls)
+    else:
+        count = _piece_count(controls, last)
         if count > 1:
             start, end = (source.frames.to_setup(point) for point in (last.start, last.end))
             points = [point_at(start, end, last.arc, part / count) for part in range(1, count)]
-            return _one_by_one(controls, [("G1", point, 0.0) for point in (*points, end)]), True
+            return _one_by_one(controls, [("G1", point, 0.0) for point in (*points, end)])
         if last.arc is None:
             controls.motion_word(source.motion or "")
             controls.go(controls.target(last.end), controls.axes)
         else:
-            _arc(controls, plane)
-    return [controls.emit()], False
+            _arc(controls, plane, last, last.arc)
+    return [controls.emit()]
 
 
 def _home(controls: Controls) -> None:
     """G28, G30: the intermediate point moves with the work, the reference point does not."""
     axes = controls.axes
-    if not axes:
-        return
     named = [AXES.index(letter) for letter in axes]
     mixed = (controls.matrix != 0.0) | (controls.matrix.T != 0.0)
     linear = [axis for axis in named if axis < 3]
@@ -100,38 +94,28 @@ def _home(controls: Controls) -> None:
     controls.go(controls.target(controls.trace[0].end), axes, only=named)
 
 
-def _arc(controls: Controls, plane: str) -> None:
-    source, edit, axes = controls.source, controls.edit, controls.axes
-    image, last = controls.image(source.plane), controls.trace[-1]
-    assert image is not None
-    assert last.arc is not None
-    name, sign = image
+def _arc(controls: Controls, plane: str, move: Segment, arc: Arc) -> None:
+    source, out, edit, axes = controls.source, controls.out, controls.edit, controls.axes
+    name, sign = controls.image(source.plane) or (source.plane, 1.0)
     if name != plane:
         edit.add_code(name)
-    code = source.motion or ""
-    code = code if sign > 0.0 else ARCS[1 - ARCS.index(code)]
-    controls.motion_word(code)
+    controls.motion_word(ARCS[ARCS.index(source.motion or "") ^ (sign < 0.0)])
     first, second, normal = geometry.PLANES[name]
-    start, end = (source.frames.to_program(point)[:3] for point in (last.start, last.end))
-    only = list(range(6))
+    start, end = (source.frames.to_program(point) for point in (move.start, move.end))
+    only: Sequence[int] = range(6)
     if max(abs(start[axis] - end[axis]) for axis in geometry.PLANES[source.plane][:2]) < SAME:
         edit.remove((AXES[first], AXES[second]))  # a circle ends where it begins, whatever is rounded
-        only = [normal, 3, 4, 5]
-    controls.go(controls.target(last.end), [letter for letter in axes if AXES.index(letter) in only], only=only)
-    _center(controls, last.arc.center, (first, second))
-
-
-def _center(controls: Controls, center: Sequence[float], plane: tuple[int, int]) -> None:
-    """I, J, K of a centre (set-up frame of the untouched program), in place of R too."""
-    out, edit = controls.out, controls.edit
-    there = out.frames.to_program(controls.of_setup([*center, 0.0, 0.0, 0.0]))
+        only = (normal, 3, 4, 5)
+    controls.go(controls.target(move.end), axes, only=only)
+    # I, J, K of the centre, in place of R too.
     here = out.frames.to_program(out.frames.position)
-    letters = [geometry.CENTER_WORDS[axis] for axis in plane]
-    edit.remove(("R", *(letter for letter in geometry.CENTER_WORDS if letter not in letters)))
-    for axis, letter in zip(plane, letters, strict=True):
+    there = out.frames.to_program(controls.of_setup([*arc.center, 0.0, 0.0, 0.0]))
+    edit.remove(("R", geometry.CENTER_WORDS[normal]))
+    for axis in (first, second):
+        letter = geometry.CENTER_WORDS[axis]
         value = (there[axis] if out.arc_absolute else there[axis] - here[axis]) / controls.scale(axis)
         if edit.word(letter) is not None or out.arc_absolute or abs(value) > OFF * 10.0**-controls.digits:
-            edit.write(letter, value)
+            edit.write(letter, value, controls.digits)
 
 
 def _cycle(controls: Controls, plane: str) -> None:
@@ -152,7 +136,7 @@ def _cycle(controls: Controls, plane: str) -> None:
             place[normal] = height
             height = out.frames.to_program(controls.target(source.frames.to_control(place)))[normal]
         if edit.word(letter) or abs(height - out.sticky.get(key, math.inf)) > OFF * controls.unit:
-            edit.write(letter, height / controls.scale(normal))
+            edit.write(letter, height / controls.scale(normal), controls.digits)
 
 
 def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
@@ -167,9 +151,9 @@ def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
     return [("G0" if move.motion == RAPID else "G1", move.end, move.dwell) for move in moves]
 
 
-def _piece_count(controls: Controls) -> int:
+def _piece_count(controls: Controls, move: Segment) -> int:
     """Number of pieces into which a move must be cut; those that must be are refused, unless it was asked for."""
-    motion, start, end, arc = controls.trace[-1]
+    motion, start, end, arc = move
     plane, leaning, problem = controls.source.plane, 0.0, ""
     off_plane = arc is not None and controls.image(plane) is None
     if motion != RAPID and controls.turn.turns and start[3:] != end[3:]:

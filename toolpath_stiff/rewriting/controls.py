@@ -38,12 +38,10 @@ class LineEdit:
     ----------
     text, block
         The line without its end, and the words read from it.
-    decimals
-        Of the numbers written.
     """
 
-    def __init__(self, text: str, block: Block, decimals: int) -> None:
-        self.block, self.decimals = block, decimals
+    def __init__(self, text: str, block: Block) -> None:
+        self.block = block
         self._words = list(block.words)
         self._parts, end = list[str](), 0  # what stands before the first word, that, what stands before the next...
         for word in block.words:
@@ -59,11 +57,11 @@ class LineEdit:
         """The block's word of a letter other than G and M; None if it has none."""
         return next((word for word in self._words if word.letter == letter), None)
 
-    def write(self, letter: str, value: float, decimals: int | None = None) -> None:
+    def write(self, letter: str, value: float, decimals: int) -> None:
         """Give a word another number, or add the word."""
         # Fixed digits without idle zeros; a whole number keeps its point where the block writes points: a control that
         # counts `X9` in its least increment reads `X9.` right.
-        text = f"{value:.{self.decimals if decimals is None else decimals}f}"
+        text = f"{value:.{decimals}f}"
         text = (text.rstrip("0") if "." in text else text) if text.strip("-0.") else "0."
         text = text if self._points else text.removesuffix(".")
         word = self.word(letter)
@@ -96,7 +94,7 @@ class LineEdit:
 
     def next_line(self, lead: str) -> LineEdit:
         """A further line in this one's style, with no words yet; `lead` stands before them."""
-        line = LineEdit(lead, Block(self.block.line, ()), self.decimals)
+        line = LineEdit(lead, Block(self.block.line, ()))
         line._between, line._points, line._lower = self._between, self._points, self._lower
         return line
 
@@ -128,8 +126,8 @@ class Controls:
     ----------
     known
         Axes that the program has put somewhere; of the others only the control knows where they stand.
-    block, edit, axes
-        The current one, its line as it will be, the letters of the axes that it names.
+    edit, axes
+        The line of the current block as it will be, the letters of the axes that it names.
     current
         The words of the block by what they do; None for a further line in its place.
     trace
@@ -143,7 +141,7 @@ class Controls:
         self.decimals, self.linearise = decimals, linearise
         self.known = [False, False, False, True, True, True]
         self.notes: list[str] = []
-        self.block, self.edit = Block(0, ()), LineEdit("", Block(0, ()), 0)
+        self.edit = LineEdit("", Block(0, ()))
         self.current: CurrentBlock | None = None
         self.axes: list[str] = []
         self.trace: list[Segment] = []
@@ -157,7 +155,7 @@ class Controls:
 
     def refusal(self, problem: str, hint: str = "") -> InputError:
         """The error for the current block, which cannot be rewritten."""
-        return ProgramError(problem, hint=hint, file=self.source.name, line=self.block.line)
+        return ProgramError(problem, hint=hint, file=self.source.name, line=self.edit.block.line)
 
     @property
     def digits(self) -> int:
@@ -233,13 +231,13 @@ class Controls:
                 if not off or not (self.known[axis] or coupled):
                     continue
             goal = there[axis] if out.absolute else (there[axis] - here[axis]) / parts
-            self.edit.write(letter, goal / scale)
+            self.edit.write(letter, goal / scale, self.digits)
 
     def emit(self) -> str:
         """Have `out` execute the edited line; its text."""
         text = self.edit.render()
         try:
-            block = read_block(text, self.block.line, self.source.name)
+            block = read_block(text, self.edit.block.line, self.source.name)
             execute(self.out, block)
         except InputError as error:
             raise self.refusal(
@@ -251,16 +249,16 @@ class Controls:
         return text
 
     def check(self, first: int, first_out: int, pieces: bool) -> None:
-        """Every cutting move of the block must be the placed one to within the rounding; of `pieces` the two ends."""
-        self._coarsest = unit = max(self._coarsest, self.unit)
+        """Every cutting move of the block must be the placed one within the rounding; of one in `pieces` the ends."""
+        self._coarsest = max(self._coarsest, self.unit)
         source, out = self.source.recorder.recent[first:], self.out.recorder.recent[first_out:]
         wanted, written = ([move for move in moves if move.motion != RAPID] for moves in (source, out))
-        if pieces and wanted and written:
-            wanted = [replace(wanted[0], end=wanted[-1].end, arc=None)]
+        if pieces and len(wanted) == 1 and written:
+            wanted = [replace(wanted[0], arc=None)]
             written = [replace(written[0], end=written[-1].end)]
         # The steps of a cycle with L in G91 repeat one rounding.
-        repeats = next((word.value for word in self.block.words if word.letter == "L"), 1.0)
-        difference = differences(self.turn, wanted, written, unit * max(repeats, 1.0))
+        repeats = next((word.value for word in self.edit.block.words if word.letter == "L"), 1.0)
+        difference = differences(self.turn, wanted, written, self._coarsest * max(repeats, 1.0))
         if difference:
             unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
             hint = "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"

@@ -72,8 +72,6 @@ class Turn:
 
     def in_program(self, rotation: float) -> FloatArray:
         """(3, 3) turn as it looks in program axes that a work offset's rotation (degrees) turned already."""
-        if not rotation or not self.turns:
-            return self.turn
         inner = rotation_about_z(np.radians(rotation))
         return _clean(inner.T @ self.turn @ inner)
 
@@ -136,9 +134,8 @@ def differences(turn: Turn, wanted: list[Move], written: list[Move], unit: float
 
 def _short(move: Move, unit: float) -> bool:
     """Whether rounding to `unit` may make a move vanish."""
-    return (
-        move.arc is None and max(abs(e - s) for s, e in zip(move.start, move.end, strict=True)) < SHORTEST_UNITS * unit
-    )
+    longest = max(abs(e - s) for s, e in zip(move.start, move.end, strict=True))
+    return move.arc is None and longest < SHORTEST_UNITS * unit
 
 
 def _difference(turn: Turn, wanted: Move, written: Move, unit: float) -> str:
