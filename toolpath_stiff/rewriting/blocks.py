@@ -99,7 +99,8 @@ def _arc(controls: Controls, plane: str, move: Segment, arc: Arc) -> None:
     name, sign = controls.image(source.plane) or (source.plane, 1.0)
     if name != plane:
         edit.add_code(name)
-    controls.motion_word(ARCS[ARCS.index(source.motion or "") ^ (sign < 0.0)])
+    code = source.motion or ""
+    controls.motion_word(code if sign > 0.0 else ARCS[1 - ARCS.index(code)])
     first, second, normal = geometry.PLANES[name]
     start, end = (source.frames.to_program(point) for point in (move.start, move.end))
     only: Sequence[int] = range(6)
