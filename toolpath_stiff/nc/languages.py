@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable
-from functools import cache
+from itertools import islice
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import Dialect
@@ -25,8 +25,6 @@ _SIEMENS = "Siemens' own language (Sinumerik)"
 _ISG = "ISG's own language (Beckhoff TwinCAT CNC)"
 _ACRAMATIC = "the language of Acramatic controls (Cincinnati, Vickers)"
 _SUB = "neither LinuxCNC's language (o<name> sub) nor Fanuc's"
-
-
 HINTS = {
     _HEIDENHAIN: "post it as ISO G code, in X, Y, Z, A, B, C of the tool tip",
     _SIEMENS: "post it as ISO G code: no frames (TRANS, ROT), no CYCLE calls, no variables, no X=... words",
@@ -34,11 +32,7 @@ HINTS = {
     _ACRAMATIC: "post it as ISO G code of Fanuc's or LinuxCNC's kind",
     _SUB: "post it as ISO G code, or write its subprograms as LinuxCNC's O words",
 }
-
-
 LONGEST_SIGN = 200  # characters of a line that are looked at
-
-
 # What no G code of the controls read here has at the beginning of a block, blanks and N words apart.
 _SIGNS = (
     (_HEIDENHAIN, r"BEGIN\s+PGM\b"),
@@ -56,11 +50,7 @@ _SIGNS = (
 )
 
 
-@cache
-def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    """Language and pattern of each sign: most programs need none of them."""
-    number = r"\s*(?:N\d+\s+|\d+\s+)?"
-    return tuple((what, re.compile(f"{number}(?:{sign})", re.IGNORECASE)) for what, sign in _SIGNS)
+_PATTERNS = [(what, re.compile(rf"\s*(?:N\d+\s+|\d+\s+)?(?:{sign})", re.IGNORECASE)) for what, sign in _SIGNS]
 
 
 def language_of(line: str) -> str | None:
@@ -73,7 +63,7 @@ def language_of(line: str) -> str | None:
     >>> language_of("G1 X10 Y20")
     """
     head = line.lstrip()[:LONGEST_SIGN]
-    return next((what for what, pattern in _patterns() if pattern.match(head)), None)
+    return next((what for what, pattern in _PATTERNS if pattern.match(head)), None)
 
 
 def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = None) -> InputError | None:
@@ -107,17 +97,8 @@ def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
     """
     if name.lower().endswith(EXTENSIONS):
         return True
-    seen = 0
-    for line in lines:
-        text = line.strip()
-        if not text or text.startswith("$$"):
-            continue
-        if STATEMENT.match(text):
-            return True
-        seen += 1
-        if seen >= HEAD_LINES:
-            break
-    return False
+    texts = (line for line in lines if line.strip() and not line.lstrip().startswith("$$"))
+    return any_statement(islice(texts, HEAD_LINES))
 
 
 def any_statement(lines: Iterable[str]) -> bool:

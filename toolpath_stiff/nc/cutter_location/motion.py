@@ -35,8 +35,9 @@ def goto(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def more_points(state: CutterLocationState, statement: MajorStatement) -> None:
     """A line of numbers alone after GOTO: the next point (Creo writes arcs so)."""
-    if state.last_word != "GOTO":
-        raise state.fail(f"{statement.text[:30]!r} is not a statement", "a word, / and its arguments")
+    state.refuse_if(
+        state.last_word != "GOTO", f"{statement.text[:30]!r} is not a statement", "a word, / and its arguments"
+    )
     state.circle = state.followed
     to_point(state, state.numbers(statement, 3, 6))
 
@@ -58,8 +59,11 @@ def _axis_of(state: CutterLocationState, numbers: list[float]) -> Vector:
     """The tool axis that comes with a point, or that in force."""
     if len(numbers) == 6:
         axis = unit_axis(numbers[3:])
-        if state.multax is False and axis != VERTICAL:
-            raise state.fail("a tilted tool axis after MULTAX/OFF", "MULTAX/ON before it, or x,y,z alone")
+        state.refuse_if(
+            state.multax is False and axis != VERTICAL,
+            "a tilted tool axis after MULTAX/OFF",
+            "MULTAX/ON before it, or x,y,z alone",
+        )
         state.next_axis = axis
     if state.next_axis is None:
         raise state.fail("a point without its tool axis after MULTAX/OFF and a tilted tool", "x,y,z,i,j,k or TLAXIS")
@@ -77,8 +81,7 @@ def godlta(state: CutterLocationState, statement: MajorStatement) -> None:
     if state.point is None:
         raise state.fail("GODLTA/ before any point", "FROM/ or GOTO/ before it")
     numbers = state.numbers(statement, 3, 6)
-    if state.circle is not None or state.hole is not None:
-        raise state.fail("GODLTA/ on a circle or in a cycle", "GOTO/")
+    state.refuse_if(state.circle or state.hole, "GODLTA/ on a circle or in a cycle", "GOTO/")
     axis = _axis_of(state, numbers)
     x, y, z = (p + d for p, d in zip(state.point, state.scaled(numbers[:3]), strict=True))
     _go(state, (x, y, z), axis)
@@ -107,12 +110,9 @@ def gohome(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def rapid(state: CutterLocationState, statement: MajorStatement) -> None:
     """The next motion, and no other, is rapid."""
-    if statement.arguments:
-        raise state.fail(statement.shown, "RAPID alone")
-    if state.circle is not None:
-        raise state.fail("RAPID before the GOTO of a circle", "an arc at a feed")
-    if state.hole is not None:
-        raise state.fail("RAPID within a drilling cycle: is the next point a hole?", "CYCLE/OFF before it")
+    state.refuse_if(statement.arguments, statement.shown, "RAPID alone")
+    state.no_circle("RAPID")
+    state.refuse_if(state.hole, "RAPID within a drilling cycle: is the next point a hole?", "CYCLE/OFF before it")
     state.rapid = statement.line
 
 
@@ -123,12 +123,12 @@ def circle(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def movarc(state: CutterLocationState, statement: MajorStatement) -> None:
     """A circle by the right hand, and the angle that is cut."""
-    if len(statement.words) != 9 or statement.words[7] != "ANGLE":
-        raise state.fail(statement.shown, "MOVARC/x,y,z,i,j,k,r,ANGLE,a")
+    state.refuse_if(
+        len(statement.words) != 9 or statement.words[7] != "ANGLE", statement.shown, "MOVARC/x,y,z,i,j,k,r,ANGLE,a"
+    )
     *arguments, _, last = statement.arguments
     angle = state.number(last)
-    if not 0.0 < angle <= 3.6e6:
-        raise state.fail(f"an arc of {angle:g} degrees", "an angle above 0")
+    state.refuse_if(not 0.0 < angle <= 3.6e6, f"an arc of {angle:g} degrees", "an angle above 0")
     _await_circle(state, [state.number(argument) for argument in arguments], sweep=angle)
 
 
@@ -140,18 +140,17 @@ def indirv(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def _await_circle(state: CutterLocationState, numbers: list[float], sweep: float | None = None) -> Circle:
     """The circle that the next point ends, turned as INDIRV says."""
-    if state.rapid:
-        raise state.fail(f"an arc after the RAPID of line {state.rapid}", "a rapid to a point, or an arc at a feed")
-    if state.hole is not None:
-        raise state.fail("an arc within a drilling cycle", "CYCLE/OFF before it")
+    state.refuse_if(
+        state.rapid, f"an arc after the RAPID of line {state.rapid}", "a rapid to a point, or an arc at a feed"
+    )
+    state.refuse_if(state.hole, "an arc within a drilling cycle", "CYCLE/OFF before it")
     state.no_circle("a circle")
     if state.point is None:
         raise state.fail("an arc before any point", "FROM/ or GOTO/ before it")
-    if len(numbers) not in (4, 6, 7, 11):
-        forms = "x,y,z,i,j,k,r or NX' x,y,z,i,j,k,r,t,f,d,e or x,y,z,r"
-        raise state.fail(f"{state.statement.word}/ with {len(numbers)} numbers", forms)
-    if len(numbers) == 4 and state.direction is None:
-        raise state.fail("CIRCLE/x,y,z,r, which does not say which way round", "INDIRV/ before it, or i,j,k")
+    forms = "x,y,z,i,j,k,r or NX' x,y,z,i,j,k,r,t,f,d,e or x,y,z,r"
+    state.refuse_if(len(numbers) not in (4, 6, 7, 11), f"{state.statement.word}/ with {len(numbers)} numbers", forms)
+    no_way_round = len(numbers) == 4 and state.direction is None
+    state.refuse_if(no_way_round, "CIRCLE/x,y,z,r, which does not say which way round", "INDIRV/ before it, or i,j,k")
     center = state.scaled(numbers[:3])
     axis = VERTICAL if len(numbers) == 4 else unit_axis(numbers[3:6], CIRCLE_AXIS)
     if len(numbers) == 11:
@@ -176,33 +175,35 @@ def _arc_through(state: CutterLocationState, targets: list[Vector], axis: Vector
     assert circle is not None
     state.circle, state.followed = None, circle
     for target in targets:
-        if state.swept and circle.sweep is not None:
-            raise state.fail("a second point of an arc whose ANGLE is given", "one point")
+        state.refuse_if(state.swept and circle.sweep, "a second point of an arc whose ANGLE is given", "one point")
         assert state.point is not None
         arc = circles.arc_to(circle, state.point, target)
         move(state, ARC, target, axis, arc)
         state.swept += arc.sweep
-        if circle.sweep is None and state.swept > math.tau + ROUNDING:
-            raise state.fail(
-                "points of an arc that do not follow each other in its direction", "points in the order of the cut"
-            )
+        state.refuse_if(
+            circle.sweep is None and state.swept > math.tau + ROUNDING,
+            "points of an arc that do not follow each other in its direction",
+            "points in the order of the cut",
+        )
 
 
 def tlon(state: CutterLocationState, statement: MajorStatement) -> None:
     """CATIA's and Creo's arcs in APT's own words."""
-    if state.direction is None:
-        raise state.fail("TLON,GOFWD/ without its direction", "INDIRV/ before it")
+    state.refuse_if(state.direction is None, "TLON,GOFWD/ without its direction", "INDIRV/ before it")
     texts, words, which = list(statement.arguments), statement.words, 1
     if len(words) == 5 and words[2] in ("1", "2") and words[3] == "INTOF":
         texts, which = [texts[0], texts[1], texts[4]], int(words[2])
-    if len(texts) != 3 or words[1] != "ON" or not texts[0].startswith("(") or not texts[2].startswith("("):
-        raise state.fail(statement.shown, "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,(LINE/x,y,z,x,y,z), or CATIA's (CYLNDR/...)")
+    state.refuse_if(
+        len(texts) != 3 or words[1] != "ON" or not texts[0].startswith("(") or not texts[2].startswith("("),
+        statement.shown,
+        "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,(LINE/x,y,z,x,y,z), or CATIA's (CYLNDR/...)",
+    )
     ends = _numbers(END.fullmatch(texts[2]) or PLANE.fullmatch(texts[2]))
-    if len(ends) != 6:
-        raise state.fail(f"TLON,GOFWD/ up to {texts[2][:40]}", "(LINE/x,y,z,x,y,z)")
+    state.refuse_if(len(ends) != 6, f"TLON,GOFWD/ up to {texts[2][:40]}", "(LINE/x,y,z,x,y,z)")
     numbers = _numbers(CIRCLE.fullmatch(texts[0]))
-    if len(numbers) not in (4, 7):
-        raise state.fail(f"TLON,GOFWD/ along {texts[0][:40]}", "(CIRCLE/x,y,z,r) or (CYLNDR/x,y,z,i,j,k,r)")
+    state.refuse_if(
+        len(numbers) not in (4, 7), f"TLON,GOFWD/ along {texts[0][:40]}", "(CIRCLE/x,y,z,r) or (CYLNDR/x,y,z,i,j,k,r)"
+    )
     circle = _await_circle(state, numbers)
     assert state.point is not None
     line = state.scaled(ends[:3]), state.scaled(ends[3:])

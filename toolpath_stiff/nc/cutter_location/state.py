@@ -87,6 +87,11 @@ class CutterLocationState:
         """The error for the statement being executed."""
         return Place(self.name, self.statement.line, self.statement.column).fail(problem, expected, hint)
 
+    def refuse_if(self, refused: object, problem: str, expected: str = "", hint: str = "") -> None:
+        """Raise the error for the statement being executed, if it is to be refused."""
+        if refused:
+            raise self.fail(problem, expected, hint)
+
     def note(self, reason: str, doubtful: bool = False) -> None:
         """Note that the word being executed is not acted upon; `doubtful`: which is a warning."""
         line, column, word = self.statement.line, self.statement.column, self.statement.word
