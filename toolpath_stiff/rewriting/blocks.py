@@ -17,7 +17,7 @@ from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls
 from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, point_at
 
 Piece = tuple[str, list[float], float]  # G0 or G1, end in the set-up frame, dwell after it in s
-SLASH = re.compile(r"\s*/\d*")
+SLASH = re.compile(r"^\s*/\d*")
 LINEARISE = (
     f"give {both_names('--linearise', 'MM')} to have straight moves within MM of it, "
     "or place the work without that turn"
@@ -44,8 +44,7 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
         "a block with a slash in its middle": block.rest is not None,
     }
     for what, holds in refused.items():
-        if holds:
-            raise controls.refusal(f"{what} cannot be rewritten", "post the moves of the tool centre, one a block")
+        controls.refuse_if(holds, f"{what} cannot be rewritten", "post the moves of the tool centre, one a block")
     controls.axes = [letter for letter in AXES if current.has(letter)]
     plane_before = out.plane
     begin(out, block)
@@ -62,8 +61,12 @@ def _lines(controls: Controls, once: str | None, plane: str, first: int) -> list
     if once is not None and CODES[once].takes_axes:
         _home(controls)
     elif source.motion in CYCLES:
-        if controls.matrix[geometry.PLANES[source.plane][2], geometry.PLANES[source.plane][2]] != 1.0:
-            return _one_by_one(controls, _cycle_in_moves(controls, first))
+        normal = geometry.PLANES[source.plane][2]
+        if controls.matrix[normal, normal] != 1.0:
+            out_of_it = f"{source.motion} drills along {AXES[normal]}, and the placement turns the work out of it"
+            controls.refuse_if(controls.linearise is None, out_of_it, LINEARISE)
+            moves = source.recorder.recent[first:]
+            return _one_by_one(controls, [("G0" if m.motion == RAPID else "G1", m.end, m.dwell) for m in moves])
         _cycle(controls, plane)
     else:
         count = _piece_count(controls, last)
@@ -86,11 +89,11 @@ def _home(controls: Controls) -> None:
     mixed = (controls.matrix != 0.0) | (controls.matrix.T != 0.0)
     linear = [axis for axis in named if axis < 3]
     missing = [AXES[axis] for axis in range(3) if axis not in named and mixed[axis, linear].any()]
-    if missing:
-        raise controls.refusal(
-            f"G28 or G30 of {', '.join(axes)} without {', '.join(missing)}: the turned work has no such axis alone",
-            f"name {', '.join(missing)} too",
-        )
+    controls.refuse_if(
+        missing,
+        f"G28 or G30 of {', '.join(axes)} without {', '.join(missing)}: the turned work has no such axis alone",
+        f"name {', '.join(missing)} too",
+    )
     controls.go(controls.target(controls.trace[0].end), axes, only=named)
 
 
@@ -98,7 +101,7 @@ def _arc(controls: Controls, plane: str, move: Segment, arc: Arc) -> None:
     source, out, edit, axes = controls.source, controls.out, controls.edit, controls.axes
     name, sign = controls.image(source.plane) or (source.plane, 1.0)
     if name != plane:
-        edit.add_code(name)
+        edit.write_code(name)
     code = source.motion or ""
     controls.motion_word(code if sign > 0.0 else ARCS[1 - ARCS.index(code)])
     first, second, normal = geometry.PLANES[name]
@@ -124,7 +127,7 @@ def _cycle(controls: Controls, plane: str) -> None:
     source, out, edit = controls.source, controls.out, controls.edit
     first, second, normal = geometry.PLANES[source.plane]
     if source.plane != plane:
-        edit.add_code(source.plane)
+        edit.write_code(source.plane)
     controls.motion_word(source.motion or "")
     repeats = edit.word("L")
     holes = [letter for letter in controls.axes if AXES.index(letter) != normal]
@@ -140,39 +143,25 @@ def _cycle(controls: Controls, plane: str) -> None:
             edit.write(letter, height / controls.scale(normal), controls.digits)
 
 
-def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
-    """The moves, rapids and dwells of a cycle along an axis that is none any more."""
-    source = controls.source
-    if controls.linearise is None:
-        axis = AXES[geometry.PLANES[source.plane][2]]
-        raise controls.refusal(
-            f"{source.motion} drills along {axis}, and the placement turns the work out of it", LINEARISE
-        )
-    moves = source.recorder.recent[first:]
-    return [("G0" if move.motion == RAPID else "G1", move.end, move.dwell) for move in moves]
-
-
 def _piece_count(controls: Controls, move: Segment) -> int:
     """Number of pieces into which a move must be cut; those that must be are refused, unless it was asked for."""
     motion, start, end, arc = move
-    plane, leaning, problem = controls.source.plane, 0.0, ""
+    plane, leaning = controls.source.plane, 0.0
     off_plane = arc is not None and controls.image(plane) is None
     if motion != RAPID and controls.turn.turns and start[3:] != end[3:]:
         written = controls.out.frames.position[3:], controls.target(end)[3:]
         leaning = lean(controls.turn, (start[3:], end[3:]), written)
-    if off_plane:
-        problem = f"an arc of {plane}, turned with the work, lies in none of the planes G17, G18, G19"
-    elif leaning > LEAN:
-        problem = f"as a control interpolates A, B and C, the tool would lean {leaning:.3g} degrees between its ends"
-    if problem and controls.linearise is None:
-        raise controls.refusal(problem, LINEARISE)
+    if controls.linearise is None:
+        off = f"an arc of {plane}, turned with the work, lies in none of the planes G17, G18, G19"
+        controls.refuse_if(off_plane, off, LINEARISE)
+        leans = f"as a control interpolates A, B and C, the tool would lean {leaning:.3g} degrees between its ends"
+        controls.refuse_if(leaning > LEAN, leans, LINEARISE)
     if controls.linearise is None or (not off_plane and leaning == 0.0):
         return 1
     tolerance = controls.linearise - controls.unit
-    if tolerance < controls.unit:
-        option = both_names("--linearise", f"{controls.linearise:g}")
-        problem = f"{option} is no more than the rounding to {controls.digits} decimals"
-        raise controls.refusal(problem, "give more of it, or more --decimals")
+    option = both_names("--linearise", f"{controls.linearise:g}")
+    rounding = f"{option} is no more than the rounding to {controls.digits} decimals"
+    controls.refuse_if(tolerance < controls.unit, rounding, "give more of it, or more --decimals")
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
     if arc is not None and (off_plane or count > 1):
         controls.note(
@@ -186,12 +175,11 @@ def _piece_count(controls: Controls, move: Segment) -> int:
 def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
     """Straight moves, the first in the block's own line."""
     stop, edit = controls.current and controls.current.code("M stop"), controls.edit
-    if stop or controls.out.feed_mode == "G93":
-        what = stop[0] if stop else "inverse-time feed (G93)"
-        raise controls.refusal(f"{what} in a block that is written as several", "give it a block of its own, or G94")
+    what = stop[0] if stop else "inverse-time feed (G93)"
+    several = f"{what} in a block that is written as several"
+    controls.refuse_if(stop or controls.out.feed_mode == "G93", several, "give it a block of its own, or G94")
     edit.remove("IJKRPLQ")
-    slash = SLASH.match(edit.render()) if edit.block.optional else None
-    lead = slash[0] if slash else ""
+    lead = "".join(SLASH.findall(edit.render())) if edit.block.optional else ""
     lines = []
     for number, (code, point, dwell) in enumerate(pieces):
         if number:
@@ -202,7 +190,7 @@ def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
             lines.append(controls.emit())
         if dwell:
             controls.edit = edit.next_line(lead)
-            controls.edit.add_code("G4")
+            controls.edit.write_code("G4")
             controls.edit.write("P", dwell, FEED_DECIMALS)
             lines.append(controls.emit())
     return lines

@@ -68,15 +68,18 @@ class LineEdit:
         if word is None:
             self._add(letter, (letter.lower() if self._lower else letter) + text)
         elif abs(value - word.value) > SAME:
-            self.replace(word, word.text[0] + text)
+            self._put(word, text)
 
-    def replace(self, word: Word, text: str) -> None:
-        """Put other text in a word's place."""
-        self._parts[2 * self._words.index(word) + 1] = text
+    def write_code(self, code: str, word: Word | None = None) -> None:
+        """Add a G code, `G1` say, before the other words, or put it in a word's place."""
+        if word is None:
+            self._add("G", code.lower() if self._lower else code)
+        else:
+            self._put(word, code[1:])
 
-    def add_code(self, code: str) -> None:
-        """Add a G code, `G1` say, before the other words."""
-        self._add("G", code.lower() if self._lower else code)
+    def _put(self, word: Word, text: str) -> None:
+        """Another number in a word."""
+        self._parts[2 * self._words.index(word) + 1] = word.text[0] + text
 
     def remove(self, letters: Iterable[str]) -> None:
         """Take out the words of these letters, and the blanks beside them that are then one too many."""
@@ -157,6 +160,11 @@ class Controls:
         """The error for the current block, which cannot be rewritten."""
         return ProgramError(problem, hint=hint, file=self.source.name, line=self.edit.block.line)
 
+    def refuse_if(self, refused: object, problem: str, hint: str) -> None:
+        """Raise the error for the current block, if it is to be refused."""
+        if refused:
+            raise self.refusal(problem, hint)
+
     @property
     def digits(self) -> int:
         """Decimals of the numbers written."""
@@ -189,20 +197,16 @@ class Controls:
         given = self.current.code("plane") if self.current else None
         if given is None:
             return before
-        image = self.image(given[0])
-        plane = image[0] if image else given[0]
+        plane = (self.image(given[0]) or given)[0]
         if plane != given[0]:
-            self.edit.replace(given[1], given[1].text[0] + plane[1:])
+            self.edit.write_code(plane, given[1])
         return plane
 
     def motion_word(self, wanted: str) -> None:
         """Make sure that the block is executed in the motion mode wanted."""
-        given = self.current.code("motion") if self.current else None
-        if given is None:
-            if self.out.motion != wanted:
-                self.edit.add_code(wanted)
-        elif given[0] != wanted:
-            self.edit.replace(given[1], given[1].text[0] + wanted[1:])
+        mode, word = (self.current.code("motion") if self.current else None) or (self.out.motion, None)
+        if mode != wanted:
+            self.edit.write_code(wanted, word)
 
     def target(self, control: Sequence[float]) -> list[float]:
         """Control coordinates of `out` for a point of `source` in its control coordinates."""
@@ -259,9 +263,7 @@ class Controls:
         # The steps of a cycle with L in G91 repeat one rounding.
         repeats = next((word.value for word in self.edit.block.words if word.letter == "L"), 1.0)
         difference = differences(self.turn, wanted, written, self._coarsest * max(repeats, 1.0))
-        if difference:
-            unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
-            hint = "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
-            if unknown:
-                hint = f"position {unknown} in rapid before the first cutting move"
-            raise self.refusal(f"the block cannot be rewritten: its cutting move {difference}", hint)
+        unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
+        hint = "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
+        hint = f"position {unknown} in rapid before the first cutting move" if unknown else hint
+        self.refuse_if(difference, f"the block cannot be rewritten: its cutting move {difference}", hint)
