@@ -102,6 +102,13 @@ class Scanner:
         """An error at a column, unless given that of the next character."""
         return self.place.fail(problem, expected, hint, column or self.column)
 
+    def refuse_if(
+        self, refused: object, problem: str, expected: str = "", hint: str = "", column: int | None = None
+    ) -> None:
+        """Raise the error, if there is to be one."""
+        if refused:
+            raise self.fail(problem, expected, hint, column)
+
     def rest(self) -> str:
         """The next few characters, for errors."""
         return repr(self.text[self.position : self.position + 12])
@@ -128,8 +135,7 @@ class Scanner:
         return column
 
     def _close(self, column: int) -> None:
-        if not self.next("]"):
-            raise self.fail("a bracket that is not closed", "]", column=column)
+        self.refuse_if(not self.next("]"), "a bracket that is not closed", "]", column=column)
 
     def value(self) -> Value:
         """The value after a letter or an operator: a number, a variable, a function, an expression in brackets."""
@@ -167,9 +173,12 @@ class Scanner:
         """Which variable a `#` means: a number, the number that another one holds, an expression, a name."""
         column = self.column
         name = self.take(NAME)[1:-1]
-        if name and self.family == MACRO_B:
-            problem = f"#<{name}> is a named variable, which Macro B does not have"
-            raise self.fail(problem, "#1 to #999", column=column)
+        self.refuse_if(
+            name and self.family == MACRO_B,
+            f"#<{name}> is a named variable, which Macro B does not have",
+            "#1 to #999",
+            column=column,
+        )
         if name:
             return lambda variables: name
         inner = self._unsigned()
@@ -208,8 +217,11 @@ class Scanner:
         column, family = self.column, self.family
         if name == "EXISTS":
             return self._exists()
-        if name == "ROUND" and self.of_word and family == MACRO_B:
-            raise self.fail("ROUND in a word, where it rounds to the least increment", "it in an assignment")
+        self.refuse_if(
+            name == "ROUND" and self.of_word and family == MACRO_B,
+            "ROUND in a word, where it rounds to the least increment",
+            "it in an assignment",
+        )
         if name in ("ATAN", "POW"):
             return self._of_two(name, column)
         argument = self.bracket()
@@ -236,8 +248,7 @@ class Scanner:
     def _exists(self) -> Value:
         """EXISTS[#<name>]: 1 if the variable has been set."""
         name = self.take(NAME)[1:-1] if self.family == NGC and self.next("[#") else ""
-        if not name or not self.next("]"):
-            raise self.fail(f"EXISTS in {self.family}", "EXISTS[#<name>], on LinuxCNC")
+        self.refuse_if(not name or not self.next("]"), f"EXISTS in {self.family}", "EXISTS[#<name>], on LinuxCNC")
         return lambda variables: float(variables.exists(name))
 
 

@@ -142,8 +142,7 @@ def _steering(scanner: Scanner) -> Steering | None:
     if scanner.begins("WHILE[") and scanner.next("WHILE"):
         condition = scanner.bracket()
         loop = scanner.take(_LOOP)
-        if not loop.startswith("DO"):
-            raise scanner.fail("WHILE without its DO", "WHILE[...]DO1", column=column)
+        scanner.refuse_if(not loop.startswith("DO"), "WHILE without its DO", "WHILE[...]DO1", column=column)
         return Steering("WHILE LOOP", _loop_label(scanner, loop, column), f"WHILE {loop}", column, (condition,))
     if scanner.begins("IF[") and scanner.next("IF"):
         condition = scanner.bracket()
@@ -161,30 +160,30 @@ def _steering(scanner: Scanner) -> Steering | None:
 
 def _loop_label(scanner: Scanner, loop: str, column: int) -> str:
     label = loop.lstrip("DOEN")
-    if label not in ("1", "2", "3"):
-        raise scanner.fail(f"the loop number {label}", "1, 2 or 3", column=column)
+    scanner.refuse_if(label not in ("1", "2", "3"), f"the loop number {label}", "1, 2 or 3", column=column)
     return label
 
 
 def _o_word(scanner: Scanner) -> Steering:
     """`o100 while [...]`, `o<name> call [1] [2]`."""
     column = scanner.column
-    if scanner.family == MACRO_B:
-        raise scanner.fail(f"{scanner.rest()} is no program number", "O and digits, or --dialect linuxcnc")
+    scanner.refuse_if(
+        scanner.family == MACRO_B, f"{scanner.rest()} is no program number", "O and digits, or --dialect linuxcnc"
+    )
     scanner.position += 1
     label = scanner.take(_O_LABEL)
-    if not label:
-        raise scanner.fail(f"{scanner.rest()} is no label of an O word", "O with a number, or a name as <name>")
+    scanner.refuse_if(not label, f"{scanner.rest()} is no label of an O word", "O with a number, or a name as <name>")
     label = label if label[0] == "<" else label.lstrip("0") or "0"
     kind = scanner.take(_NGC_WORD)
-    if not kind:
-        problem = f"the O word {label} without what it does: {scanner.rest()}"
-        raise scanner.fail(problem, ", ".join(NGC_WORDS).lower())
+    scanner.refuse_if(
+        not kind, f"the O word {label} without what it does: {scanner.rest()}", ", ".join(NGC_WORDS).lower()
+    )
     values = []
     while kind == "CALL" and scanner.begins("["):
         values.append(scanner.bracket())
-    if len(values) > MOST_VALUES:
-        raise scanner.fail(f"a call with {len(values)} values", f"at most {MOST_VALUES}", column=column)
+    scanner.refuse_if(
+        len(values) > MOST_VALUES, f"a call with {len(values)} values", f"at most {MOST_VALUES}", column=column
+    )
     if kind in ("IF", "ELSEIF", "WHILE", "REPEAT") or (kind in ("ENDSUB", "RETURN") and not scanner.done):
         values.append(scanner.bracket())
     return Steering(kind, label, f"o{label[:LONGEST_LABEL]} {kind}".lower(), column, tuple(values))
@@ -193,8 +192,7 @@ def _o_word(scanner: Scanner) -> Steering:
 def _word(scanner: Scanner, text: str) -> tuple[Word, Value | None]:
     """A word, and its value if that is computed."""
     column, letter = scanner.column, scanner.text[scanner.position]
-    if letter not in LETTERS:
-        raise scanner.fail(f"{scanner.rest()} is not a word", "a letter and a value, or #1=...")
+    scanner.refuse_if(letter not in LETTERS, f"{scanner.rest()} is not a word", "a letter and a value, or #1=...")
     plain, value = WORD.match(scanner.text, scanner.position), None
     # An operator after a number outside of brackets, `X1+2`: no control takes it for 3.
     if plain is not None and not plain[3] and scanner.text[plain.end() : plain.end() + 1] not in tuple("*/+-"):
@@ -203,21 +201,19 @@ def _word(scanner: Scanner, text: str) -> tuple[Word, Value | None]:
         scanner.position, scanner.of_word = scanner.position + 1, True
         value, scanner.of_word = scanner.value(), False
     written = text[column - 1 : scanner.columns[scanner.position - 1]]
-    if letter == "N":
-        problem = f"line number {written!r} after another word"
-        raise scanner.fail(problem, "N at the beginning of the line", column=column)
+    scanner.refuse_if(
+        letter == "N", f"line number {written!r} after another word", "N at the beginning of the line", column=column
+    )
     return Word(letter, float(plain[2]) if plain is not None and value is None else 0.0, column, written), value
 
 
 def _assignment(scanner: Scanner) -> Assignment:
     place = scanner.place._replace(column=scanner.column)
-    if not scanner.next("#"):
-        raise scanner.fail(f"{scanner.rest()} is not an assignment", "#1=...")
+    scanner.refuse_if(not scanner.next("#"), f"{scanner.rest()} is not an assignment", "#1=...")
     which = scanner.which()
     if not scanner.next("="):
         raise place.fail(f"a variable without its letter or `=`: {scanner.rest()}", "X#1, or #1=...")
-    if scanner.done:
-        raise scanner.fail("an assignment without a value", "#1=...")
+    scanner.refuse_if(scanner.done, "an assignment without a value", "#1=...")
     # A whole expression in Macro B; in NGC one value, so that an operator after it is an error.
     value = scanner.value() if scanner.family == NGC else scanner.expression()
     return lambda variables: partial(variables.set, which(variables), value(variables), place)

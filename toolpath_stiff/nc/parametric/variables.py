@@ -15,7 +15,7 @@ from toolpath_stiff.nc.codes.unsettled import know_place
 from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, ToolEntry, tool_of
+from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
 
 # What a program may set: NGC's numbered parameters below those of the control; Macro B's locals and commons.
@@ -152,8 +152,6 @@ class Variables:
     def _ngc_system(self, number: int, place: Place) -> float | None:
         if NGC_POSITION <= number < NGC_POSITION + 6:
             return self.position(number - NGC_POSITION, f"#{number}", place)
-        if NGC_POSITION + 6 <= number < NGC_POSITION + 9:
-            return 0.0  # U, V, W, which this machine does not have
         return {NGC_TOOL: float(self.state.tool), NGC_OFFSET: float(self.state.frames.active + 1)}.get(number)
 
     def _macro_system(self, number: int, place: Place) -> float | None:
@@ -205,11 +203,6 @@ class Variables:
         if number in (3003, 3004, 3006):
             word = Word("#", float(number), place.column or 1, f"#{number}")
             state.note(place.line, word, "single block, feed hold or a message: the path does not depend on it")
-            return True
-        if number in TOOL_LENGTHS:
-            state.tools = {} if state.tools is None else state.tools
-            tool = number - TOOL_LENGTHS.start + 1
-            state.tools.setdefault(tool, ToolEntry(tool)).length = value * state.length_scale
             return True
         offset_place = self._offset_place(number)
         if offset_place is None:
