@@ -303,9 +303,7 @@ def _tool_change(lines: Sequence[str], stretches: list[tuple[int, int]]) -> tupl
 
 def _name(begin: _Beginning, title: str, remarks: dict[int, str], alone: bool) -> str:
     """The name: what the post marks, else the first heading, else the tool; of a lone one rather the title, or ""."""
-    names: dict[str, list[str]] = {MARKED: [], NAMED: [], TOOL: []}
-    for head in begin.heads:
-        names[head.kind].append(head.name)
+    names = {kind: [head.name for head in begin.heads if head.kind == kind] for kind in (MARKED, NAMED, TOOL)}
     if names[MARKED]:
         return names[MARKED][-1]
     if names[NAMED]:

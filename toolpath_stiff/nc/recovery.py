@@ -111,11 +111,8 @@ def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> Non
 
 def _shorter_way(moves: Moves, kinematics: PostedKinematics) -> Moves:
     """Axes with roll-over go to their angle the shorter way; where they stand then is the same."""
-    rolling = [3 + axis.column for axis in kinematics.axes if axis.rollover]
-    if not rolling:
-        return moves
     end = moves.end.copy()
-    for column in rolling:
+    for column in (3 + axis.column for axis in kinematics.axes if axis.rollover):
         turn = end[:, column] - moves.start[:, column]
         far = np.abs(turn) > math.pi
         end[far, column] -= (2.0 * math.pi * np.round(turn / (2.0 * math.pi)))[far]
@@ -201,12 +198,11 @@ def _linear_bounds(moves: Moves) -> tuple[FloatArray, FloatArray]:
     """(n,) m, bounds of |X'| and |X''| of the linear axes over a move that runs from 0 to 1."""
     speed, bend = move_lengths(moves), np.zeros(len(moves))
     arcs = np.flatnonzero(moves.arc_sweep != 0.0)
-    if len(arcs):
-        frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
-        radius = np.maximum(frame.radius_start, frame.radius_end)
-        growth = np.abs(frame.radius_end - frame.radius_start)
-        bend[arcs] = radius * sweep**2 + 2.0 * growth * sweep
-        speed[arcs] = np.sqrt((radius * sweep) ** 2 + growth**2 + frame.climb**2)
+    frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
+    radius = np.maximum(frame.radius_start, frame.radius_end)
+    growth = np.abs(frame.radius_end - frame.radius_start)
+    bend[arcs] = radius * sweep**2 + 2.0 * growth * sweep
+    speed[arcs] = np.sqrt((radius * sweep) ** 2 + growth**2 + frame.climb**2)
     return speed, bend
 
 
@@ -229,16 +225,12 @@ def _on_the_part(
     arc = moves.arc_sweep != 0.0
     turning = (_turning(moves) > 0.0).any(axis=1)
     stays = arc & (~turning | held)
-    center, normal = moves.arc_center, moves.arc_normal
+    center, normal = moves.arc_center.copy(), moves.arc_normal.copy()
+    # Turned as a whole: the centre as a point of the linear axes, the normal as the way to another one.
     rows = np.flatnonzero(stays & ~held)
-    if len(rows):
-        # Turned as a whole: the centre as a point of the linear axes, the normal as the way to another one.
-        abc = moves.start[rows, 3:]
-        here, there = (
-            tool_poses(kinematics, center[rows] + along, abc, length[rows])[0] for along in (0.0, normal[rows])
-        )
-        center, normal = center.copy(), normal.copy()
-        center[rows], normal[rows] = here, (there - here) / np.linalg.norm(there - here, axis=1)[:, None]
+    abc = moves.start[rows, 3:]
+    here, there = (tool_poses(kinematics, center[rows] + along, abc, length[rows])[0] for along in (0.0, normal[rows]))
+    center[rows], normal[rows] = here, (there - here) / np.linalg.norm(there - here, axis=1)[:, None]
     rows, climb = np.flatnonzero(stays), np.zeros(len(moves))
     climb[rows] = arc_frame(moves, rows).climb
     risen = center[move] + (climb[move] * share)[:, None] * normal[move]  # the plane of the piece's start

@@ -61,15 +61,12 @@ def cycle(state: CutterLocationState, statement: MajorStatement) -> None:
 def _name_in_cycle(state: CutterLocationState, key: str) -> str:
     """The quantity that a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
     name = ALIASES.get(key.upper(), key.upper())
-    if name in FEED_UNITS:
-        return "feed"
-    if is_number(name):
-        problem = "a cycle of numbers without words: their order depends on the CAM system"
-        raise state.fail(problem, "pairs, as DEPTH,5", EXPAND)
-    if name not in PAIRS:
-        expected = "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed"
-        raise state.fail(f"CYCLE/ with {name}, which is not supported", expected, EXPAND)
-    return name
+    by_order = "a cycle of numbers without words: their order depends on the CAM system"
+    state.refuse_if(is_number(name), by_order, "pairs, as DEPTH,5", EXPAND)
+    expected = "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed"
+    unknown = name not in PAIRS and name not in FEED_UNITS
+    state.refuse_if(unknown, f"CYCLE/ with {name}, which is not supported", expected, EXPAND)
+    return "feed" if name in FEED_UNITS else name
 
 
 def _check_cycle(state: CutterLocationState, code: str, values: dict[str, float]) -> None:

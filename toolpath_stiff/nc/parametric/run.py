@@ -63,10 +63,8 @@ class ParametricRun(ProgramRun):
 
     def _place(self, row: int) -> Place:
         """File and line (from 1) of a line that is read."""
-        for first, stop, name in self._files:
-            if first <= row < stop:
-                return Place(name, row - first + 1)
-        return super()._place(row)
+        in_files = (Place(name, row - first + 1) for first, stop, name in self._files if first <= row < stop)
+        return next(in_files, super()._place(row))
 
     def _statement(self, row: int) -> Statement:
         if row not in self._statements:
@@ -242,11 +240,9 @@ class ParametricRun(ProgramRun):
         return number(steering.values[which](self.variables))
 
     def _if(self, row: int, steering: Steering) -> int | None:
-        if self._value(steering):
-            return None
-        for branch in self._structure.branches[row]:
-            other = self._statement(branch).steering
-            if other is None or other.kind != "ELSEIF" or self._value(other):
+        for branch in (row, *self._structure.branches[row]):
+            condition = self._statement(branch).steering
+            if condition is None or condition.kind not in ("IF", "ELSEIF") or self._value(condition):
                 return branch + 1
         raise AssertionError("every if has its endif")
 
