@@ -13,7 +13,7 @@ from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.rig import case
 from toolpath_stiff.rig import exercise as exercise_module
 from toolpath_stiff.stiffness.contract import Conditions
-from toolpath_stiff.stiffness.model import acting_names, build_model, condition_warnings, idle_effects
+from toolpath_stiff.stiffness.model import acting_names, build_model, condition_warnings, waiting_effects
 
 RISER = {"setup": "riser", "x_nm_per_N": 8.0, "y_nm_per_N": 5.0, "z_nm_per_N": 2.0}
 PART = "G21 G90 G94\nG0 X0 Y0 Z20\nG1 Z0 F600\nG1 X30 F1200\nG1 Y30\nM30\n"
@@ -237,7 +237,7 @@ def test_a_tool_that_nobody_gives(here, capsys):
 
 def test_the_model_alone_knows_what_acts():
     model = build_model(with_effects(("setup_compliance", RISER)))
-    assert acting_names(model) == [] and idle_effects(model)[0].waiting
+    assert acting_names(model) == [] and list(waiting_effects(model)) == ["setup_compliance"]
     in_place = build_model(with_effects(("setup_compliance", RISER)), conditions=Conditions(setup="riser"))
     assert acting_names(in_place) == ["setup_compliance"] and condition_warnings(in_place) == []
 

@@ -266,7 +266,7 @@ def _prepare(model: StiffnessModel, data: Readings, timed: bool) -> _Prepared:
     path = measured_path(model, distinct)
     wrenches = np.zeros((len(distinct), 6, 1))
     wrenches[:, :3, 0] = distinct.direction
-    _, forces = exact.respond(path, exact.assemble_links(model, path), wrenches)
+    _, forces = exact.respond(path, *exact.assemble_links(model, path), wrenches)
     products = forces[..., 0] ** 2
     if distinct.beside is not None:
         few = distinct.beside

@@ -240,7 +240,7 @@ class Ground:
         machine = machine.with_changes(strut_law=scaled_law(machine.strut_law, self.law))
         path = replace(self.path, machine=machine)
         links = exact.assemble_links(replace(self.predictor.base, machine=machine), path)
-        return exact.respond(path, links, np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
+        return exact.respond(path, *links, np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
 
     @cached_property
     def _seen(self) -> FloatArray:

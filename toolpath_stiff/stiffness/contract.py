@@ -15,31 +15,27 @@ Everything is SI and batched over n poses. A method that an effect does not impl
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.sizes import about
-
-if TYPE_CHECKING:
-    from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
-
+from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
+from toolpath_stiff.stiffness.sizes import about, sizes_in_words
+from toolpath_stiff.units import mm_from_m
 
 Values = Mapping[str, Any]  # name of a parameter -> SI value, or what is chosen: a number, a name
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
-
-
 HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading")
 
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
-
-
 SETUP = "setup"  # the condition, and the name of every parameter that names a set-up
+EXPERIENCE = "engineering experience, no source"
+IDLE = 1e-3  # N in a strut: below, powers of the force would diverge, and the strut adds nothing that shows
 
 
 @dataclass(frozen=True)
@@ -145,7 +141,7 @@ class Size(float):
 
 
 @dataclass(frozen=True)
-class LoadPath:
+class LoadPath(ArrayColumns):
     """What an effect sees of n poses under load. SI, base axes.
 
     Attributes
@@ -186,11 +182,15 @@ class LoadPath:
     def __len__(self) -> int:
         return len(self.position)
 
-    def take(self, rows: IntArray) -> LoadPath:
-        """Some of the poses, by index; repeated as the index says."""
-        struts = Struts(*(getattr(self.struts, field.name)[rows] for field in fields(self.struts)))
-        arrays: Any = {name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return replace(self, struts=struts, **arrays)
+    def take(self, rows: IntArray | BoolArray | slice) -> LoadPath:
+        """Some of the poses; repeated as an index says."""
+        return replace(super().take(rows), struts=self.struts.take(rows))
+
+
+def at_pose(path: LoadPath, i: int) -> str:
+    """Pose i in words, as " at X0 Y0 Z800 mm" with the space before it."""
+    x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[i])
+    return f" at X{x:g} Y{y:g} Z{z:g} mm"
 
 
 def at_the_tip(path: LoadPath, compliances: FloatArray) -> FloatArray:
@@ -222,10 +222,8 @@ class Conditions:
 
     def columns(self, n: int) -> dict[str, Any]:
         """The same for n poses, as `LoadPath` holds it."""
-        return {
-            "setup": None if self.setup is None else np.full(n, self.setup),
-            "temperature": None if self.temperature is None else np.full(n, self.temperature),
-        }
+        given = {"setup": self.setup, "temperature": self.temperature}
+        return {name: np.full(n, value) for name, value in given.items() if value is not None}
 
 
 class Effect:
@@ -280,6 +278,7 @@ class Effect:
     load_dependent: bool = False
     unknown_to_control: bool = False
     clause: str = ""  # what a fit has found, parameters by name: "the tool is {error} mm {error:longer/shorter}"
+    parts: tuple[tuple[str, str], ...] = ()  # parameter, words after its size, where the clause says {sizes}
     described_from: tuple[str, ...] = ()
     file: str = ""  # that declares it without code
 
@@ -402,7 +401,7 @@ class Effect:
         >>> setup.conditions(values), setup.acts_on(path, values), setup.is_instrument  # the path names no set-up
         (('setup',), False, False)
         """
-        if type(self).geometry is not Effect.geometry:
+        if "geometry" in self.hooks:
             return ()
         named = (q.name for q in self.parameters if q.kind == "text" and p.get(q.name))
         return tuple(dict.fromkeys(name for name in (*self.needs, *named) if name in CONDITIONS))
@@ -417,12 +416,14 @@ class Effect:
         `p`: parameter name -> value in the units of files, choices as they are.
         """
         if self.clause:
-            return self.clause.format(**{q.name: p[q.name] if q.discrete else Size(p[q.name]) for q in self.parameters})
-        sizes = []
+            sizes = sizes_in_words([(p[name], words) for name, words in self.parts])
+            words = {q.name: p[q.name] if q.discrete else Size(p[q.name]) for q in self.parameters}
+            return self.clause.format(sizes=sizes, **words)
+        named = []
         for q in self.parameters:
             value = p[q.name] if q.discrete else f"{float(f'{p[q.name]:.3g}'):g} {q.unit}".rstrip()
-            sizes.append(f"{q.name.replace('_', ' ')} {value}")
-        return f"{self.title}, {', '.join(sizes)}"
+            named.append(f"{q.name.replace('_', ' ')} {value}")
+        return f"{self.title}, {', '.join(named)}"
 
     @property
     def hooks(self) -> list[str]:

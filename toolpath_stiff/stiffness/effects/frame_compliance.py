@@ -5,10 +5,10 @@ from functools import lru_cache
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, choice, compliance
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Values, choice, compliance
 from toolpath_stiff.stiffness.sizes import sizes_in_words
 
-EXPERIENCE = "engineering experience, no source: stiff machine frames are built for 100 to 500 N/um"
+BUILT = f"{EXPERIENCE}: stiff machine frames are built for 100 to 500 N/um"
 
 
 class FrameCompliance(Effect):
@@ -25,8 +25,8 @@ class FrameCompliance(Effect):
     source = "springs in series; the octahedral frame's vertices carry two struts each"
     parameters = (
         choice("vertex", (0, 3), "numbered by the lowest strut that they hold", "which vertex; 0 is all three"),
-        compliance("radial", 200.0, (2.0, 10.0), EXPERIENCE, "compliance of a vertex towards the machine's axis"),
-        compliance("vertical", 200.0, (2.0, 10.0), EXPERIENCE, "compliance of a vertex up and down"),
+        compliance("radial", 200.0, (2.0, 10.0), BUILT, "compliance of a vertex towards the machine's axis"),
+        compliance("vertical", 200.0, (2.0, 10.0), BUILT, "compliance of a vertex up and down"),
     )
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
