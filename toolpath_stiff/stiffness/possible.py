@@ -57,7 +57,7 @@ def is_compliance(tensor: FloatArray) -> BoolArray:
 
 
 def refuse_struts_without_stiffness(model: StiffnessModel, path: LoadPath, strut: FloatArray) -> None:
-    """Raise `InputError` where the compliances (n, 6) m/N of struts, with all that effects add, are 0 or less, or infinite."""
+    """Raise `InputError` where the compliances (n, 6) m/N of struts with all effects are 0 or less, or infinite."""
     bad = (strut <= 0.0) | (strut == np.inf)
     if bad.any():
         row = int(np.argmax(bad.any(axis=1)))
