@@ -25,7 +25,6 @@ from toolpath_stiff.stiffness.terms import (
     SHAPES,
     SWINGS,
     Constants,
-    Factor,
     Term,
 )
 from toolpath_stiff.toml_reader import TomlReader, is_text
@@ -72,7 +71,7 @@ def entry_of(term: Term, size: str, meaning: str) -> Document:
     }
 
 
-def _shape_entry(term: Term | Factor) -> Document:
+def _shape_entry(term: Term) -> Document:
     of = {"of": term.column} if term.column else {}
     keys = [(constant_key(name, term.variable), value) for name, value in term.at]
     constants = {key: float(f"{value / si:.12g}") for (key, si), value in keys}
@@ -121,11 +120,11 @@ def _entry(toml: TomlReader, where: str, row: Document) -> tuple[Term, Parameter
     parameter = _parameter(toml, where, row, action)
     toml.only(where, row, (*KEYS, *_range_keys(parameter)))
     variable, shape, constants, column = _shape(toml, where, row, action, action)
-    place, times = _place(toml, where, row, action), None
+    term = Term(link, along, variable, shape, action, _place(toml, where, row, action), constants, column)
     if "times" in row:
         toml.only(f"{where}.times", toml.table(f"{where}.times", row["times"], "a table"), SHAPE_KEYS)
-        times = Factor(*_shape(toml, f"{where}.times", row["times"], "", action))
-    return Term(link, along, variable, shape, action, place, constants, column, times=times), parameter
+        term = term.with_second(*_shape(toml, f"{where}.times", row["times"], "", action))
+    return term, parameter
 
 
 def _choice(toml: TomlReader, where: str, row: Document, key: str, choices: Sequence[str]) -> str:

@@ -161,16 +161,6 @@ SHAPES = tuple(dict.fromkeys(shape for shape, _ in FORMULAS))
 
 
 @dataclass(frozen=True)
-class Factor:
-    """A further variable that a term depends on, times the first: shape and so on as of `Term`."""
-
-    variable: str
-    shape: str
-    at: Constants = ()
-    column: str = ""
-
-
-@dataclass(frozen=True)
 class Term:
     """One term of a description.
 
@@ -195,7 +185,7 @@ class Term:
     size
         In SI.
     times
-        A second variable with its shape: c(v, w) = size * s(v) * t(w).
+        The same term of a second variable with its shape: c(v, w) = size * s(v) * t(w).
     """
 
     link: str
@@ -207,7 +197,7 @@ class Term:
     at: Constants = ()
     column: str = ""
     size: float = field(default=0.0, compare=False)
-    times: Factor | None = None
+    times: Term | None = None
 
     @property
     def unit(self) -> str:
@@ -245,13 +235,6 @@ class Term:
         return (self.variable,) if self.times is None else (self.variable, self.times.variable)
 
     @property
-    def second(self) -> Term | None:
-        """The same with its second variable as the only one."""
-        if self.times is None:
-            return None
-        return replace(self, **vars(self.times), times=None)
-
-    @property
     def constants(self) -> dict[str, float]:
         """`at` by name."""
         return dict(self.at)
@@ -262,9 +245,11 @@ class Term:
         numbers = [f"{name}={value:.6g}" for name, value in self.at]
         named = [self.link, str(self.where or ""), self.action, self.direction, self.variable, self.column, self.shape]
         words = " ".join(part for part in (*named, *numbers) if part)
-        if self.second is None:
-            return words
-        return f"{words} times {self.second.key.removeprefix(f'{self.link} ')}"
+        return words if self.times is None else f"{words} times {self.times.key.removeprefix(f'{self.link} ')}"
+
+    def with_second(self, variable: str, shape: str, at: Constants = (), column: str = "") -> Term:
+        """The same times the share of a second variable, which is not below 0."""
+        return replace(self, times=replace(self, variable=variable, shape=shape, at=at, column=column, times=None))
 
     def sized(self, size: float) -> Term:
         """The same with a size (SI)."""
@@ -294,9 +279,9 @@ def shaped(term: Term, values: Callable[[str, str], FloatArray]) -> FloatArray:
     term has one.
     """
     first = shape_values(term.shape, values(term.variable, term.column), term.constants, len(term.signs) > 1)
-    if (factor := term.times) is None:
+    if (other := term.times) is None:
         return first
-    second = shape_values(factor.shape, values(factor.variable, factor.column), dict(factor.at), False)
+    second = shape_values(other.shape, values(other.variable, other.column), other.constants, signed=False)
     if first.ndim == second.ndim:
         return np.asarray(first * second)
     wide, narrow = (first, second) if first.ndim == 2 else (second, first)
@@ -319,4 +304,4 @@ def _share_formula(term: Term, signed: bool) -> str:
         names = tuple(name for name, _ in term.at if name not in PAIR)
         share = re.sub(r"\bv\b", " ".join((term.variable, term.column)).strip(), FORMULAS[term.shape, names][0])
         share = f"max(0, {share})" if names == ("start", "end") and not signed else share
-    return share if term.second is None else f"{share} {_share_formula(term.second, signed=False)}"
+    return share if term.times is None else f"{share} {_share_formula(term.times, signed=False)}"
