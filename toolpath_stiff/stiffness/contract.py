@@ -14,6 +14,7 @@ Everything is SI and batched over n poses. A method that an effect does not impl
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -127,19 +128,6 @@ def choice(
     return Parameter(name, "", 1.0, bounds, (low, high), source, neutral, meaning, kind="integer")
 
 
-class Size(float):
-    """A size in a sentence: without words to two digits, with two of them the first above zero, else the second.
-
-    Examples
-    --------
-    >>> "{0} mm too {0:long/short}".format(Size(-0.123))
-    '0.12 mm too short'
-    """
-
-    def __format__(self, words: str) -> str:
-        return words.split("/")[not self > 0.0] if words else about(self)
-
-
 @dataclass(frozen=True)
 class LoadPath(ArrayColumns):
     """What an effect sees of n poses under load. SI, base axes.
@@ -224,6 +212,24 @@ class Conditions:
         """The same for n poses, as `LoadPath` holds it."""
         given = {"setup": self.setup, "temperature": self.temperature}
         return {name: np.full(n, value) for name, value in given.items() if value is not None}
+
+
+def _told(clause: str, values: Values) -> str:
+    """A clause with its values: numbers to two digits; of two words the first where the number is above zero.
+
+    Examples
+    --------
+    >>> _told("{error} mm too {error:long/short}", {"error": -0.123})
+    '0.12 mm too short'
+    """
+
+    def word(place: re.Match[str]) -> str:
+        value, words = values[place[1]], place[2]
+        if words:
+            return str(words.split("/")[not value > 0.0])
+        return about(value) if isinstance(value, float) else str(value)
+
+    return re.sub(r"\{(\w+)(?::(.*?))?\}", word, clause)
 
 
 class Effect:
@@ -417,8 +423,7 @@ class Effect:
         """
         if self.clause:
             sizes = sizes_in_words([(p[name], words) for name, words in self.parts])
-            words = {q.name: p[q.name] if q.discrete else Size(p[q.name]) for q in self.parameters}
-            return self.clause.format(sizes=sizes, **words)
+            return _told(self.clause, {"sizes": sizes, **{q.name: p[q.name] for q in self.parameters}})
         named = []
         for q in self.parameters:
             value = p[q.name] if q.discrete else f"{float(f'{p[q.name]:.3g}'):g} {q.unit}".rstrip()
