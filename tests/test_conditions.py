@@ -225,16 +225,6 @@ def test_what_no_program_has_is_named_as_such(here, capsys):
     assert any("creeping does not act" in text and "no program has" in text for text in found["warnings"])
 
 
-def test_a_tool_that_nobody_gives(here, capsys):
-    file = effect_file(here, "long_tool", "tool_extension_mm", "path.tool_extension")
-    (here / "tool.toml").write_text(machine_toml(with_effects(("long_tool", {"compliance_nm_per_N": 2.0}))))
-    options = ("--machine", "tool.toml", "--effects", file)
-    assert any("long_tool acts as with the reference tool" in text for text in analyzed(capsys, *options)["warnings"])
-    (here / "part.nc").write_text(PART.replace("G0 X0", "T1 M6\nG43 H1\nG0 X0", 1))
-    (here / "tools.csv").write_text("tool,length_mm,diameter_mm\n1,320,10\n")
-    assert not any("long_tool" in text for text in analyzed(capsys, *options, "--tools", "tools.csv")["warnings"])
-
-
 def test_the_model_alone_knows_what_acts():
     model = build_model(with_effects(("setup_compliance", RISER)))
     assert acting_names(model) == [] and list(waiting_effects(model)) == ["setup_compliance"]

@@ -86,7 +86,11 @@ def well_conditioned(kernel: ClosedForm, first: FloatArray, second: FloatArray) 
 
 
 def compliance_along_columns(
-    kernel: ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
+    kernel: ClosedForm,
+    position: FloatArray,
+    direction: FloatArray,
+    rotation: FloatArray | None = None,
+    strut_forces: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Compliance along one direction a pose, with what the limits ask for.
 
@@ -98,6 +102,8 @@ def compliance_along_columns(
         (3, n) m and unit vectors, poses last; or (k, 3, n) vectors, k a pose.
     rotation
         (9, n) rows of the rotation matrices one after the other; None: vertical spindle.
+    strut_forces
+        (n, 6), to be filled with the forces in the machine's struts, N per N along the last of the directions.
 
     Returns
     -------
@@ -119,26 +125,11 @@ def compliance_along_columns(
             softness = np.divide(1.0, stiffness, out=stiffness)
             for along, force in zip(compliance, balanced, strict=True):
                 along[rows] = over_struts(force, force, softness)
+            if strut_forces is not None:
+                strut_forces[rows, kernel.order] = np.array(balanced[-1]).T
             del balanced, in_order, stiffness, softness  # the next block takes their room in the cache
     good &= np.isfinite(compliance).all(axis=0)
     return compliance if direction.ndim == 3 else compliance[0], determinant, lengths, good
-
-
-def strut_forces_columns(
-    kernel: ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
-) -> tuple[FloatArray, BoolArray]:
-    """Strut forces (n, 6) N per N along one direction a pose, and where they may be trusted (n,).
-
-    Arguments as of `compliance_along_columns`, with one direction.
-    """
-    n = position.shape[1]
-    force, good = np.empty((n, 6)), np.empty(n, dtype=bool)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for start in range(0, n, BLOCK):
-            rows = slice(start, start + BLOCK)
-            (balanced,), _, _, good[rows] = _balanced(kernel, position, direction[None], rotation, rows)
-            force[rows, kernel.order] = np.array(balanced).T
-    return force, np.asarray(good & np.isfinite(force).all(axis=1))
 
 
 def _balanced(

@@ -135,9 +135,9 @@ def compliance_with_effects(
     upright = rotation is None and model.control is None  # else the platform may stand elsewhere
     for rows, path in _paths(model, position.T, turns, tool_length, force):
         turn = None if upright else path.rotation.reshape(-1, 9).T
-        forces, good = closed_form.strut_forces_columns(kernel, path.position.T, direction[:, rows], turn)
-        some, along = np.flatnonzero(good), direction[:, rows].T
-        compliance[rows][good] = exact.compliance_along(model, path.take(some), along[some], forces[some])
+        forces, along = np.empty((len(path), 6)), direction[:, rows]
+        good = closed_form.compliance_along_columns(kernel, path.position.T, along, turn, forces)[3]
+        compliance[rows][good] = exact.compliance_along(model, path.take(good), along.T[good], forces[good])
     return compliance
 
 

@@ -27,10 +27,8 @@ from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.stiffness.parameters import read_parameters
-from toolpath_stiff.units import mm_from_m
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
-TOOL = "tool_extension_mm"
 WORDS = {
     "temperature_C": f"the temperature, which nobody gives ({both_names('--temperature')})",
     "time_min": "the time since an indicator was zeroed, which no program has",
@@ -278,26 +276,17 @@ def acting_names(model: StiffnessModel) -> list[str]:
     return [active.effect.name for active in acting_effects(model)]
 
 
-def condition_warnings(model: StiffnessModel, tool_given: bool = False) -> list[str]:
-    """What of the model does not act on a program, for want of a condition or as an instrument; plain sentences.
-
-    `tool_given`: whether the length of the tool is known; else it is the reference tool's.
-    """
-    warnings, acting = list(model.unchecked), acting_effects(model)
+def condition_warnings(model: StiffnessModel) -> list[str]:
+    """What of the model does not act on a program, for want of a condition or as an instrument; plain sentences."""
+    warnings = list(model.unchecked)
     if model.instruments:
         names = ", ".join(active.effect.name for active in model.instruments)
         warnings.append(f"instruments set aside, they act on readings and not on the machine: {names}")
     warnings += [f"{name} does not act: {reason}" for name, reason in waiting_effects(model).items()]
-    asking = [active.effect.name for active in acting if TOOL in active.effect.needs and not tool_given]
-    length = mm_from_m(model.machine.reference_tool_length)
-    tool = f"acts as with the reference tool ({length:g} mm): nobody gives the tool's length"
-    warnings += [f"{name} {tool}" for name in asking]
-    secant = ", ".join(active.effect.name for active in acting if active.effect.load_dependent)
-    if secant:
+    if secant := ", ".join(active.effect.name for active in acting_effects(model) if active.effect.load_dependent):
         warnings.append(f"softest and stiffest directions are those without {secant}, the stiffness along them is with")
     setup, machine = model.conditions.setup, model.given or model.machine
-    belonging = any(SETUP in active.waits_for for active in model.effects)
-    if setup and setup != machine.setup and not belonging:
+    if setup and setup != machine.setup and not any(SETUP in active.waits_for for active in model.effects):
         warnings.append(f"set-up {setup!r} changes nothing: no effect of machine {machine.name} depends on it")
     return warnings
 

@@ -26,7 +26,7 @@ from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import effects_from_file
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
-from toolpath_stiff.stiffness.model import TOOL, StiffnessModel, build_model, load_path
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model, load_path
 from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 POSES, DRAWN = 24, 600
 LEANING = rad_from_deg(10.0)  # largest roll, pitch and yaw of the poses
-LONGER = 0.1  # m, of the longest tool, for effects that ask for it
 SETUPS = ("riser", "table")
 ALLOW = "--allow-unchecked-effects"
 SAME = 1e-9  # relative: of results that must agree
@@ -91,7 +90,7 @@ def _failure(effect: Effect, machine: bytes) -> str:
 
 
 def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> list[TrialOutcome]:
-    """Try an effect on a machine, by itself: at its neutral value, typical values and finite bounds.
+    """Try an effect on a machine, by itself: at its neutral value and typical values.
 
     Parameters
     ----------
@@ -105,32 +104,23 @@ def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> list[TrialOut
     outcomes = [_unit(parameter) for parameter in effect.parameters if parameter.kind == "real"]
     try:
         outcomes += _behaviour(effect, machine.with_changes(effects=(), instruments=()), seed)
-    except EffectFault as fault:
-        outcomes.append(TrialOutcome("shapes", False, str(fault)))
+    except (EffectFault, InputError) as error:
+        outcomes.append(TrialOutcome("shapes" if isinstance(error, EffectFault) else "stiffness", False, str(error)))
     return outcomes
 
 
 def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOutcome]:
     """What it does at some poses with one set of parameters after the other."""
-    plain, poses = build_model(machine), _poses(effect, machine, seed)
+    plain, poses = build_model(machine), _poses(machine, seed)
     before, after = _shown(plain, _path(plain, poses)), {}
     for words, values in _parameter_sets(effect):
         model = build_model(machine, extra=[ActiveEffect(effect, values)])
         path = _path(model, poses)
-        try:
-            exact.tip_compliance(model, path)  # refused if there can be no such one
-            after[words] = _shown(model, path)
-        except EffectFault:
-            raise
-        except InputError as error:  # at its bounds an effect may ask more than a machine can give
-            if "bounds" not in words:
-                yield TrialOutcome("stiffness", False, f"{words}: {error}")
-                return
-        if words == "typical, high":
-            each = (path.take(slice(i, i + 1)) for i in range(len(path)))
-            alone = np.concatenate([_shown(model, pose) for pose in each])
-    count = f"{len(after)} sets of parameters, {len(poses)} poses"
-    yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}")
+        exact.tip_compliance(model, path)  # refused if there can be no such one
+        after[words] = _shown(model, path)
+    each = (path.take(slice(i, i + 1)) for i in range(len(path)))
+    alone = np.concatenate([_shown(model, pose) for pose in each])
+    yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {len(poses)} poses")
     change = float(np.abs(after["neutral"] / before - 1.0).max())
     mistake = f"there it changes the stiffness by up to {100.0 * change:.3g} %; it must not"
     yield TrialOutcome("neutral value", change <= SAME, "there the effect vanishes" if change <= SAME else mistake)
@@ -153,8 +143,8 @@ def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOut
         yield TrialOutcome("sign", False, mistake)
 
 
-def _poses(effect: Effect, machine: Hexapod, seed: int) -> FloatArray:
-    """(n, 7) m and rad within reach, the default origin first, and how much longer the tool is, if the effect asks."""
+def _poses(machine: Hexapod, seed: int) -> FloatArray:
+    """(n, 6) m and rad within reach, the default origin first."""
     origin = np.array(machine.default_origin)
     low, high = machine.limits.workspace
     size = 0.25 * float(solve_struts(machine, origin[:3]).lengths.mean())
@@ -164,32 +154,27 @@ def _poses(effect: Effect, machine: Hexapod, seed: int) -> FloatArray:
     drawn = np.vstack([origin, np.column_stack([place, lean])[1:]])
     turn = rotation_matrices(drawn[:, 3:])
     within = reach(machine, drawn[:, :3], solve_struts(machine, drawn[:, :3], turn), turn).reachable
-    poses = drawn[within][:POSES] if within.any() else drawn[:1]
-    return np.column_stack([poses, np.linspace(0.0, LONGER if TOOL in effect.needs else 0.0, len(poses))])
+    return drawn[within][:POSES] if within.any() else drawn[:1]
 
 
 def _parameter_sets(effect: Effect) -> Iterator[tuple[str, Values]]:
-    """Words -> SI values. A bound that is not finite is left out."""
-    sets = (("neutral", "neutral", 0), ("typical, low", "typical", 0), ("typical, high", "typical", 1))
-    for words, attribute, index in (*sets, ("lower bounds", "bounds", 0), ("upper bounds", "bounds", 1)):
+    """Words -> SI values."""
+    for words, index in (("neutral", None), ("typical, low", 0), ("typical, high", 1)):
         values: dict[str, str | float] = {}
         for p in effect.parameters:
-            if p.discrete:
-                values[p.name] = SETUPS[0] if p.kind == "text" else int(p.bounds[index])
+            if p.kind == "real":
+                values[p.name] = p.si * (p.neutral if index is None else p.typical[index])
             else:
-                values[p.name] = p.si * (p.neutral if words == "neutral" else getattr(p, attribute)[index])
-        if "bounds" not in words or np.isfinite([value for value in values.values() if isinstance(value, float)]).all():
-            yield words, values
+                values[p.name] = SETUPS[0] if p.kind == "text" else int(p.bounds[index or 0])
+        yield words, values
 
 
 def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
     """Everything that an effect may ask for: half of the poses on the riser, an hour of time, 5 K."""
     n = len(poses)
-    length = np.where(poses[:, 6] > 0.0, model.machine.reference_tool_length + poses[:, 6], np.nan)
-    ramp = np.linspace(0.0, 1.0, n)
+    ramp, turns = np.linspace(0.0, 1.0, n), rotation_matrices(poses[:, 3:])
     seen = {"setup": np.resize(SETUPS, n), "time": 3600.0 * ramp, "temperature": 20.0 + 5.0 * ramp}
-    axes = np.resize(np.eye(3), (n, 3))
-    return load_path(model, poses[:, :3], rotation_matrices(poses[:, 3:6]), length, direction=axes, **seen)
+    return load_path(model, poses[:, :3], turns, direction=np.resize(np.eye(3), (n, 3)), **seen)
 
 
 def _shown(model: StiffnessModel, path: LoadPath) -> FloatArray:
