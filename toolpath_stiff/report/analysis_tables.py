@@ -50,7 +50,6 @@ def facts(summary: Document) -> list[tuple[str, str]]:
 
 
 def _plunges(summary: Document) -> list[tuple[str, str]]:
-    """The plunges beside the headline figures, or that these are of plunges."""
     if only_plunges(summary):
         return [("plunges", "this program only plunges: every figure is of cuts along the tool axis")]
     if (plunges := beside(summary)) is None:
@@ -64,7 +63,6 @@ def _plunges(summary: Document) -> list[tuple[str, str]]:
 
 
 def _band(summary: Document) -> list[tuple[str, str]]:
-    """What the uncertainty of fitted parameters leaves open, where the machine file tells of it."""
     if not (band := summary.get("parameter_uncertainty")):
         return []
     mean, lowest = (" to ".join(map(number, band[f"{name}_95_N_per_mm"])) for name in ("mean", "min"))
@@ -108,12 +106,10 @@ def headline_text(figures: Document, between: str) -> str:
 
 
 def _figures(figures: Document) -> list[str]:
-    """Mean, smallest, largest, range and deflection."""
     return [number(figures[name], 2 if name.endswith("_um") else 0) for name in FIGURES]
 
 
 def _part_figures(row: Document) -> tuple[object, ...]:
-    """Length, time, stiffness, plunges beside it and weakest place of a tool or an operation."""
     place, plunges = row["weakest"] or {"line": "-", "text": ""}, beside(row) or {}
     return (
         number(row["cutting_length_mm"], 1),

@@ -122,9 +122,8 @@ def verdict(session: Session) -> Document | None:
 
 def effects(session: Session) -> list[Document]:
     """The catalogue with what a diagnosis says of each, the likeliest first."""
-    candidates = (session.document("diagnose") or {"candidates": []})["candidates"]
-    judged = {row["effect"]: row for row in candidates}
-    order = {name: number for number, name in enumerate(judged)}
+    judged = {row["effect"]: row for row in (session.document("diagnose") or {"candidates": []})["candidates"]}
+    order = [*judged]
     rows = [
         {
             "probability": None,
@@ -136,7 +135,7 @@ def effects(session: Session) -> list[Document]:
         for effect in session.catalogue().effects
         if effect.name not in session.machine.effects
     ]
-    return sorted(rows, key=lambda row: order.get(row["name"], len(order)))
+    return sorted(rows, key=lambda row: order.index(row["name"]) if row["name"] in order else len(order))
 
 
 def _slider(parameter: tps.Parameter, candidate: Document, session: Session) -> Document:

@@ -70,7 +70,6 @@ def _headline(good: Sequence[ProgramOutcome]) -> str:
 
 
 def _about(good: Sequence[ProgramOutcome]) -> list[str]:
-    """What all programs have in common."""
     if not good:
         return []
     first = good[0].figures
@@ -190,13 +189,11 @@ def _figure(title: str, name: str, hint: str = "", digits: int = 0, flag: bool =
 
 
 def _sorted_by(outcome: ProgramOutcome, name: str) -> str:
-    """The figure to sort by; "" where there is none."""
     figure = outcome.figure(name)
     return "" if figure is None else repr(figure)
 
 
 def _table(good: Sequence[ProgramOutcome]) -> Document | None:
-    """What the template makes the table of; None where there is nothing to draw."""
     scale = _scale(good)
     if scale is None:
         return None
@@ -242,7 +239,6 @@ def _plunges(outcome: ProgramOutcome) -> Cell:
 
 
 def _place(outcome: ProgramOutcome) -> Cell:
-    """Number and text of the weakest line."""
     line = outcome.figure("weakest_line")
     if line is None:
         return "", "-"
