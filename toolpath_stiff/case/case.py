@@ -13,15 +13,15 @@ No file is written twice: a change is a new file and a step that names it, so to
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Unpack, cast
+from typing import Any, Unpack
 
 import toolpath_stiff as tps
-from toolpath_stiff.api.by_hand import Preview, preview, with_effects
 from toolpath_stiff.api.inputs import finite, pose_si
-from toolpath_stiff.api.trust import agree, is_agreed
+from toolpath_stiff.api.trust import agree
+from toolpath_stiff.case.contents import Contents
 from toolpath_stiff.case.files import (
     copied,
     free_name,
@@ -35,7 +35,7 @@ from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, CaseState, Ste
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import is_file, read_bytes, write_atomically, writing_errors
+from toolpath_stiff.files import read_bytes, write_atomically, writing_errors
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.file import packaged_machines
 from toolpath_stiff.machine.model import EffectEntry
@@ -49,7 +49,7 @@ from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.parameters import read_parameters
 
 
-class Case:
+class Case(Contents):
     r"""A folder that holds a machine, measurements, a program, and every step that was done with them.
 
     Attributes
@@ -77,12 +77,6 @@ class Case:
     ['machine', 'exercise']
     (('exercise/measurements.csv', 'data/measured.csv'), 'right')
     """
-
-    plots = False
-    _preview: tuple[object, Preview] | None = None
-
-    def __init__(self, folder: Path, history: Sequence[Step] = ()) -> None:
-        self.folder, self.history = folder, list(history)
 
     @classmethod
     def open(cls, folder: str | Path, machine: str | Path = MACHINE, trust: Iterable[str] = ()) -> Case:
@@ -130,92 +124,6 @@ class Case:
 
     def __repr__(self) -> str:
         return f"<Case {self.folder.name}: {len(self.history)} steps>"
-
-    @property
-    def state(self) -> CaseState:
-        """What holds now."""
-        return self.history[-1].state if self.history else CaseState()
-
-    def path(self, name: str) -> str:
-        """A file of the case, as functions and commands take it."""
-        return str(self.folder / name)
-
-    @property
-    def effect_files(self) -> tuple[str, ...]:
-        """The files of own effects; raises `InputError` for one whose code this user has not agreed to run."""
-        for name in self.state.effects:
-            file = self.folder / name
-            if not is_file(file) or not is_agreed(file.read_bytes()):
-                raise InputError(
-                    f"{file} is code that came with the case, and you have not agreed to run it",
-                    hint=f"read it, then `{command_line('studio', *options(case=self.folder, trust=name))}`",
-                )
-        return tuple(map(self.path, self.state.effects))
-
-    @property
-    def machine(self) -> tps.Machine:
-        """The machine, effects of one's own included."""
-        return self.machine_of(self.state.machine)
-
-    def machine_of(self, file: str) -> tps.Machine:
-        """A machine file of the case with the effects of one's own.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> import toolpath_stiff as tps
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     case = tps.Case.open(folder)
-        ...     case.machine_of(case.state.machine)
-        <Machine nist: 6 struts, no effects>
-        """
-        return tps.Machine.load(self.path(file), effects=self.effect_files)
-
-    def machine_with(self, on: Mapping[str, Document]) -> tps.Machine:
-        """The machine with effects of these sizes; where there are readings, the strut law is refitted beside them.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> import toolpath_stiff as tps
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     tps.Case.open(folder).machine_with({"weak_strut": {"strut": 4, "factor": 0.8}})
-        <Machine nist: 6 struts, weak_strut>
-        """
-        if not on:
-            return self.machine
-        return self.preview.machine(on) if self.state.data else with_effects(self.machine, on)
-
-    @property
-    def data(self) -> tps.Measurements:
-        """The readings in use. Raises `InputError` where there are none."""
-        if not self.state.data:
-            raise InputError("this case has no measurements", hint="add a file with add_data, or start an exercise")
-        return tps.Measurements(list(map(self.path, self.state.data_files)))
-
-    @property
-    def preview(self) -> Preview:
-        """The error of the readings in use with effects of any size, as `tps.preview`; made once for these readings."""
-        if self._preview is None or self._preview[0] != self.state.judged:
-            self._preview = (self.state.judged, preview(self.data, self.machine))
-        return self._preview[1]
-
-    @property
-    def program(self) -> tps.Program:
-        """The program. Raises `InputError` where there is none."""
-        if not self.state.program:
-            raise InputError("this case has no program", hint="add one with add_program")
-        return self._program(self.state)
-
-    def _program(self, state: CaseState) -> tps.Program:
-        reading = {key: self.path(value) if key in TABLES else value for key, value in state.reading.items()}
-        if not state.program:  # the tables are read all the same
-            return tps.Program.from_text("M2", **cast("Reading", reading))
-        return tps.Program.read(self.path(state.program), **cast("Reading", reading))
-
-    def latest(self, kind: str) -> str:
-        """Folder of the latest result of a kind; "" without one."""
-        return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
 
     def record(
         self, kind: str, text: str, command: str, python: str, state: CaseState | None = None, result: str = ""

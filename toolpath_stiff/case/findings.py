@@ -1,12 +1,11 @@
 """The results of a case: each as its public function gives it, kept in a folder, and the command that gives it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import toolpath_stiff as tps
+from toolpath_stiff.case.contents import Contents
 from toolpath_stiff.case.files import write_files
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
@@ -14,14 +13,11 @@ from toolpath_stiff.hints import options
 from toolpath_stiff.options import words_of
 from toolpath_stiff.results import Progress
 
-if TYPE_CHECKING:
-    from toolpath_stiff.case.case import Case
-
 PLACE = ("x_mm", "y_mm", "z_mm", "tilt_a_deg", "tilt_b_deg", "rotate_deg")  # as of an origin
 DRAFT = "missing"
 
 
-def find(case: Case, kind: str, result: str, progress: Progress | None = None, **given: Any) -> tuple[Any, str]:
+def find(case: Contents, kind: str, result: str, progress: Progress | None = None, **given: Any) -> tuple[Any, str]:
     """A result of this kind, kept in a folder of the case without a step; and the command that gives it."""
     if kind in FINDERS:
         return FINDERS[kind](case, result, progress, **given)
@@ -33,7 +29,7 @@ def find(case: Case, kind: str, result: str, progress: Progress | None = None, *
     return kept, case.state.question(kind, "", *words_of(getattr(tps, kind), given))
 
 
-def _analyze(case: Case, result: str, progress: Progress | None, machine: str = "") -> tuple[tps.Analysis, str]:
+def _analyze(case: Contents, result: str, progress: Progress | None, machine: str = "") -> tuple[tps.Analysis, str]:
     state = case.state
     on = case.machine_of(machine) if machine else case.machine_with(state.on)
     asked: Document = {"origin_mm_deg": state.origin or None, "require_N_per_mm": state.require or None}
@@ -45,14 +41,14 @@ def _analyze(case: Case, result: str, progress: Progress | None, machine: str = 
     return analysis, state.program_line(machine=machine)
 
 
-def _place(case: Case, result: str, progress: Progress | None, **bounds: Any) -> tuple[tps.Placement, str]:
+def _place(case: Contents, result: str, progress: Progress | None, **bounds: Any) -> tuple[tps.Placement, str]:
     origin = case.state.origin or None
     placement = tps.place(case.program, case.machine, origin_mm_deg=origin, progress=progress, **bounds)
     placement.save(case.folder / result, plots=case.plots)
     return placement, case.state.program_line("place", **bounds)
 
 
-def _set_up(case: Case, result: str, progress: Progress | None) -> tuple[tps.Placement, str]:
+def _set_up(case: Contents, result: str, progress: Progress | None) -> tuple[tps.Placement, str]:
     state = case.state
     if len(state.origin) < 3:
         raise InputError("the program sits where it always did", hint="put it somewhere with place_at first")
@@ -70,7 +66,7 @@ def _set_up(case: Case, result: str, progress: Progress | None) -> tuple[tps.Pla
     return placement, " ".join([line, *options(out=result)])
 
 
-def _draft(case: Case, result: str, progress: Progress | None) -> tuple[tps.EffectDraft, str]:
+def _draft(case: Contents, result: str, progress: Progress | None) -> tuple[tps.EffectDraft, str]:
     number = 1 + sum(Path(file).stem.startswith(DRAFT) for file in case.state.effects)
     file = f"{result}/{DRAFT}{f'_{number}' if number > 1 else ''}.toml"
     draft = tps.draft_effect(case.data, case.machine, file, progress=progress)
