@@ -28,7 +28,6 @@ from toolpath_stiff.case.files import (
     kept_if_read,
     measurements_csv,
     without_lines,
-    write_files,
 )
 from toolpath_stiff.case.findings import find
 from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, CaseState, Step, call, case_text, read_steps
@@ -242,7 +241,7 @@ class Case(Contents):
         used = {name: copy for name, copy in state.used.items() if name != file}
         if lines:
             used[file] = free_name(self.folder, f"used/{Path(file).name}")
-            write_files(self.folder, {used[file]: without_lines(self.folder / file, lines)})
+            write_atomically(self.folder / used[file], without_lines(self.folder / file, lines))
         aside = (*(other for other in state.aside if other != entry), *([] if back else [entry]))
         state = replace(state, aside=aside, used=used)
         text = f"{file} line {line} {'used again' if back else 'set aside'}"
@@ -292,7 +291,7 @@ class Case(Contents):
         'machines/nist-updated.toml'
         """
         name = free_name(self.folder, f"machines/{Path(self.state.machine).stem.removesuffix('-updated')}-updated.toml")
-        write_files(self.folder, {name: read_bytes(file, "the machine file")})
+        write_atomically(self.folder / name, read_bytes(file, "the machine file"))
         command = next((f"{step.command} -o {name}" for step in reversed(self.history) if step.kind == "update"), "")
         state = replace(self.state, machine=name, on={})
         self.record("accept", f"goes on with {name}", command, call("accept", file), state)
@@ -321,9 +320,8 @@ class Case(Contents):
         (<Program slot.nc>, True, 'results/006-analyze', 'tps analyze programs/slot.nc -')
         """
         state, files, kept = self.state, list[str](), dict(self.state.reading)
-        text = "programs are read with " + ", ".join(
-            f"{TABLES.get(key, key)} {value}" for key, value in reading.items()
-        )
+        shown = (f"{TABLES.get(key, key)} {Path(str(value)).name}" for key, value in reading.items())
+        text = f"programs are read with {', '.join(shown)}"
         with kept_if_read(self.folder, files):
             for key, value in reading.items():
                 if key not in READING:
@@ -411,7 +409,7 @@ class Case(Contents):
         name = free_name(self.folder, "data/measured.csv")
         visit = 1 + sum(step.kind == "measure" for step in self.history)
         readings, count = measured_again(self.folder / self.state.exercise, str(plan_file), visit)
-        write_files(self.folder, {name: readings})
+        write_atomically(self.folder / name, readings)
         line = command_line("rig", "measure", self.state.exercise, *options(at=plan_file, out=name, visit=visit))
         state = replace(self.state, data=(*self.state.data, name))
         text = f"{counted(count, 'reading')} measured"
@@ -421,7 +419,7 @@ class Case(Contents):
         """Open the seal of the exercise and score a claim: names of effects with commas, "none" or "outside"."""
         score = reveal(self.folder / self.state.exercise, effects)
         result = self.next_result("reveal")
-        write_files(self.folder, {f"{result}/reveal.json": json_text(score)})
+        write_atomically(self.folder / result / "reveal.json", json_text(score))
         line = command_line("rig", "reveal", self.state.exercise, *options(claim=effects))
         self.record("reveal", f"claimed {effects}: {score['verdict']}", line, call("claim", effects), None, result)
         return score

@@ -1,7 +1,7 @@
 """Files of a case: copies under names that are free, readings that are commented out."""
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -26,12 +26,6 @@ def free_name(folder: Path, name: str) -> str:
     return name
 
 
-def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> None:
-    """Write files of a folder, each whole or not at all."""
-    for name, content in contents.items():
-        write_atomically(folder / name, content)
-
-
 @contextmanager
 def kept_if_read(folder: Path, names: Sequence[str]) -> Iterator[None]:
     """Take new files of the case away again where they cannot be read."""
@@ -49,7 +43,7 @@ def copied(folder: Path, file: str | Path, room: str, content: bytes | None = No
     source = Path(str(file).partition("#")[0])
     suffix = ".csv" if room == "data" else UNSAFE.sub("_", source.suffix)
     name = free_name(folder, f"{room}/{UNSAFE.sub('_', source.stem)[:LONGEST_NAME].lstrip('.') or 'file'}{suffix}")
-    write_files(folder, {name: content})
+    write_atomically(folder / name, content)
     return name
 
 

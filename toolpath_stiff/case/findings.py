@@ -6,9 +6,9 @@ from typing import Any
 
 import toolpath_stiff as tps
 from toolpath_stiff.case.contents import Contents
-from toolpath_stiff.case.files import write_files
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.hints import options
 from toolpath_stiff.options import words_of
 from toolpath_stiff.results import Progress
@@ -56,12 +56,12 @@ def _set_up(case: Contents, result: str, progress: Progress | None) -> tuple[tps
     name, written = Path(state.program).name, {}
     try:
         placement = tps.place(case.program, case.machine, write=name, progress=progress, **place)
-        beside, written = {name: placement.program_bytes}, {"write": f"{result}/{name}"}
+        content, written = placement.program_bytes, {"write": f"{result}/{name}"}
     except InputError as error:
         placement = tps.place(case.program, case.machine, progress=progress, **place)
-        beside = {"not_written.txt": f"{error}\n".encode()}
+        name, content = "not_written.txt", f"{error}\n".encode()
     placement.save(case.folder / result)
-    write_files(case.folder / result, beside)
+    write_atomically(case.folder / result / name, content)
     line = state.program_line("place", origin_mm_deg=None, **place, **written)
     return placement, " ".join([line, *options(out=result)])
 
@@ -71,7 +71,7 @@ def _draft(case: Contents, result: str, progress: Progress | None) -> tuple[tps.
     file = f"{result}/{DRAFT}{f'_{number}' if number > 1 else ''}.toml"
     draft = tps.draft_effect(case.data, case.machine, file, progress=progress)
     if draft.text:
-        write_files(case.folder, {file: draft.text})
+        write_atomically(case.folder / file, draft.text)
     return draft, case.state.question("effects draft", "", *options(output=file))
 
 

@@ -92,8 +92,7 @@ def only_plunges(figures: Document) -> bool:
 
 def beside(figures: Document) -> Document | None:
     """The plunges that the headline figures leave out; None where there are none, or where there is nothing else."""
-    plunges: Document | None = figures["plunges"]
-    return None if only_plunges(figures) else plunges
+    return None if only_plunges(figures) else figures["plunges"]
 
 
 def headline_text(figures: Document, between: str) -> str:
@@ -185,8 +184,7 @@ def comparison(summary: Document, other: Document) -> ShownTable:
     shown = ["-" if change is None else f"{change:+.1f} %" for change in changes]
     rows = [list(row) for row in zip(TITLES, *map(_figures, sides), shown, strict=False)]
     if any(map(beside, sides)):
-        means = [number((beside(side) or {}).get("mean_N_per_mm")) for side in sides]
-        rows.append([PLUNGES, *means, shown[-1]])
+        rows.append([PLUNGES, *(number((beside(side) or {}).get("mean_N_per_mm")) for side in sides), shown[-1]])
     rows.append(["weakest line", *(str((side["weakest"] or {"line": "-"})["line"]) for side in sides), ""])
     rows.append(["extrapolated", *(f"{side['extrapolated_share']:.1%}" for side in sides), ""])
     if any(side["out_of_reach_samples"] for side in sides):

@@ -66,8 +66,8 @@ def hidden_name(smallest: Detectable) -> str:
 
 def smallest_text(smallest: Detectable) -> str:
     """The smallest size of an effect that would have been seen."""
-    value = json_number(smallest.value / smallest.parameter.si)
-    return plain(f"{significant(value)} {smallest.parameter.unit}".rstrip())
+    size = significant(json_number(smallest.value / smallest.parameter.si))
+    return plain(f"{size} {smallest.parameter.unit}".rstrip())
 
 
 def floor_text(diagnosis: Diagnosis) -> str:

@@ -145,11 +145,7 @@ def _axis(scale: StiffnessScale) -> Markup:
 def _bar(outcome: ProgramOutcome, scale: StiffnessScale) -> Markup:
     low, mean, high = (outcome.figure(f"{name}_N_per_mm") for name in ("min", "mean", "max"))
     lines = "".join(scale.line(tick, "tick") for tick in scale.ticks)
-    if low is not None and (low > scale.high or high < scale.low):  # only plunges, and these are not on the scale
-        words, above = f"{number(low)} to {number(high)}", low > scale.high
-        end, place, text = ("end", "100%", f"{words} →") if above else ("start", "0", f"← {words}")
-        lines += f'<text class="beyond {end}" x="{place}" y="15">{text}</text>'
-    elif low is not None:
+    if low is not None and low <= scale.high and high >= scale.low:  # those of plunges alone may lie beyond
         kind = "span plunge" if outcome.plunges_only else "span"
         kind += " below" if outcome.figure("lines_below_required") else ""
         x, width = scale.at(low), max(scale.at(high) - scale.at(low), 0.4)

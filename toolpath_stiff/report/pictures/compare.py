@@ -110,8 +110,8 @@ def _key(figure: Figure, comparison: Comparison) -> None:
     present = [axis for axis in DIRECTIONS if (directions(comparison.data) == axis).any()]
     style: Look = {"size": 11, "weight": "bold", "ha": "right"}
     for i, axis in enumerate(reversed(present)):
-        place = 1.0 - (0.4 + 0.5 * i) / width, 1.0 - 0.4 / height
-        figure.text(*place, f"\u25cf {axis}", color=DIRECTIONS[axis], **style)
+        left, low = 1.0 - (0.4 + 0.5 * i) / width, 1.0 - 0.4 / height
+        figure.text(left, low, f"\u25cf {axis}", color=DIRECTIONS[axis], **style)
 
 
 def _about(test: PatternTest, name: str) -> bool:
