@@ -110,7 +110,6 @@ def _errors(axes: Axes, rows: Sequence[HypothesisRow], diagnosis: Diagnosis) -> 
 
 
 def _chances(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
-    axes.set_xlim(0.0, 1.0)
     for y, row in enumerate(rows):
         value = row.probability or 0.0
         axes.barh(y, value, height=0.5, color=BLUE if row.offered else GREY, zorder=2)
@@ -118,8 +117,13 @@ def _chances(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
         look: Look = {"ha": "right", "color": "white"} if inside else {"ha": "left", "color": INK}
         place = value + (-0.03 if inside else 0.03), y
         axes.text(*place, probability_text(row.probability), va="center", size=9, zorder=3, **look)
-    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100 %"])
+    _probability_axis(axes, 1.0)
     axes.set_xlabel("probability", size=9)
+
+
+def _probability_axis(axes: Axes, end: float) -> None:
+    axes.set_xlim(0.0, end)
+    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100 %"])
 
 
 def looks(diagnosis: Diagnosis) -> Figure | None:
@@ -164,8 +168,8 @@ def _bars(axes: Axes, portrait: Portrait) -> None:
         text = probability_text(value)
         axes.annotate(text, (value, y), xytext=(4, 0), textcoords="offset points", va="center", size=9)
     axes.set_yticks(range(len(rows)), [name for name, *_ in rows], color=INK)
-    axes.set(ylim=(max(len(rows), 5) - 0.5, -0.5), xlim=(0.0, 1.15))
-    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100 %"])
+    axes.set_ylim(max(len(rows), 5) - 0.5, -0.5)
+    _probability_axis(axes, 1.15)
     axes.set_title("which link (blue), what it varies with (orange)", size=9.5, loc="right", weight="normal")
     axes.grid(visible=False, axis="y")
     open_frame(axes, "left")

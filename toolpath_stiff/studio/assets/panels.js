@@ -208,8 +208,8 @@ function nextPanel(state, act) {
     p ? [list(p.text),
       h("p", {}, `${p.poses} poses, ${p.readings} readings, about ${Math.round(p.minutes)} minutes. `
         + `Diamonds in the machine.`),
-      h("div", { class: "actions live" }, h("a", { class: "button", id: "plan-file", href: `/case/${p.result}/plan.csv` },
-        "Download plan.csv"), button("Print", () => print()),
+      h("div", { class: "actions live" }, h("a", { class: "button", id: "plan-file",
+        href: `/case/${p.result}/plan.csv` }, "Download plan.csv"), button("Print", () => print()),
         state.exercise.folder ? button("Measure on the exercise's machine", () => act({ do: "measure" }),
           { id: "measure", class: "main live" }) : h("span", { class: "muted" },
           "fill in the stiffness and drop the file on the page")),
@@ -291,9 +291,9 @@ function setUp(p, state, act) {
       : "move the work first")),
     made ? h("div", { id: "set-up-files" }, made.warnings.map((text) => h("p", { class: "warning" }, text)),
       offsets(made.offset_blocks),
-      h("p", { class: "actions live" }, [["sheet", "Set-up sheet", `${made.result}/setup.pdf`], ["written", made.written.endsWith("not_written.txt")
-        ? "Why the program was not written" : "Program for this placement", made.written],
-        ["page", "Report", `${made.result}/report.html`]]
+      h("p", { class: "actions live" }, [["sheet", "Set-up sheet", `${made.result}/setup.pdf`],
+        ["written", made.written.endsWith("not_written.txt") ? "Why the program was not written"
+          : "Program for this placement", made.written], ["page", "Report", `${made.result}/report.html`]]
         .map(([key, label, file]) => h("a", { class: "button", id: `set-up-${key}`, href: `/case/${file}`,
           target: key === "page" ? "_blank" : null, rel: "noreferrer" }, label)))) : null,
   ];
@@ -399,7 +399,8 @@ function historyPanel(state, act) {
   const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, words(text)), copy(text)) : null);
   const step = (one) => h("div", { class: "step" }, h("b", {}, one.text), line(one.command), line(one.python));
   return [h("h2", {}, "What was done"), h("p", { class: "muted" },
-    "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."), [...state.history].reverse().map(step)];
+    "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."),
+    [...state.history].reverse().map(step)];
 }
 const PANELS = [["effects", "Effects", effectsPanel], ["why", "Why believe it?", whyPanel], ["next", "Next", nextPanel],
   ["program", "Program", programPanel], ["placement", "Placement", placementPanel], ["exercise", "Exercise",
