@@ -116,7 +116,7 @@ def test_a_program_that_cannot_be_read_is_one_of_the_failures(shop, capsys):
     ("arguments", "words"),
     [
         (["jobs", "--jobs", "0"], "--jobs 0"),
-        (["jobs", "--jobs", "two"], "expected 1 or more"),
+        (["jobs", "--jobs", "two"], "expected at least 1"),
         (["jobs", "--machine", "none"], "neither a packaged machine nor a file"),
         (["jobs", "--compare", "none"], "neither a packaged machine nor a file"),
         (["jobs", "--effects", "none.py"], "does not exist"),

@@ -41,14 +41,10 @@ from toolpath_stiff.correction.result import Update as Update
 from toolpath_stiff.diagnosis.result import Diagnosis as Diagnosis
 from toolpath_stiff.errors import EffectError as EffectError
 from toolpath_stiff.errors import EffectFault as EffectFault
-from toolpath_stiff.errors import FileError as FileError
 from toolpath_stiff.errors import InputError as InputError
 from toolpath_stiff.errors import InputErrors as InputErrors
-from toolpath_stiff.errors import MachineFileError as MachineFileError
 from toolpath_stiff.errors import MeasurementError as MeasurementError
-from toolpath_stiff.errors import PoseError as PoseError
 from toolpath_stiff.errors import ProgramError as ProgramError
-from toolpath_stiff.errors import TableError as TableError
 from toolpath_stiff.errors import TpsError as TpsError
 from toolpath_stiff.errors import UnreachableError as UnreachableError
 from toolpath_stiff.nc.program import Program as Program

@@ -85,7 +85,7 @@ def machine_from_linuxcnc(
     >>> import toolpath_stiff as tps
     >>> tps.machine_from_linuxcnc("nowhere.hal")
     Traceback (most recent call last):
-    toolpath_stiff.errors.FileError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
+    toolpath_stiff.errors.InputError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
     """
     path = Path(file)
     text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")

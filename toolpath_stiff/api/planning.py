@@ -12,7 +12,7 @@ from toolpath_stiff.api.measurements import COMMON, Data, NoisePercent, Question
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.options import Option, checked, distinct_numbers, finite_number, names, words_of
+from toolpath_stiff.options import Option, checked, finite_number, names, numbers, words_of
 from toolpath_stiff.planning.menu import Costs
 from toolpath_stiff.planning.result import Plan, usual_menu
 from toolpath_stiff.planning.result import plan as plan_visits
@@ -30,10 +30,10 @@ def plan(
     between: Annotated[Sequence[str], Option("--between", "A,B", read=names)] = (),
     n: Annotated[int | None, Option("--n")] = None,
     radius_mm: Annotated[float | None, Option("--radius", "mm", above=0, at_most=1e5)] = None,
-    heights_mm: Annotated[Sequence[float] | None, Option("--heights", "Z,Z,...", read=distinct_numbers)] = None,
+    heights_mm: Annotated[Sequence[float] | None, Option("--heights", "Z,Z,...", read=numbers)] = None,
     max_tilt_deg: Annotated[float | None, Option("--max-tilt", "deg", at_least=0, below=90)] = None,
-    loads_N: Annotated[Sequence[float] | None, Option("--loads", "N,N,...", read=distinct_numbers)] = None,
-    tool_extensions_mm: Annotated[Sequence[float] | None, Option("--tools", "MM,MM,...", read=distinct_numbers)] = None,
+    loads_N: Annotated[Sequence[float] | None, Option("--loads", "N,N,...", read=numbers)] = None,
+    tool_extensions_mm: Annotated[Sequence[float] | None, Option("--tools", "MM,MM,...", read=numbers)] = None,
     setups: Annotated[Sequence[str] | None, Option("--setups", "NAME,...", read=names)] = None,
     indicators: Annotated[bool, Option("--indicators")] = False,
     minutes: Annotated[Mapping[str, float] | None, Option("--cost", "WHAT=MINUTES", read=_cost, count="append")] = None,

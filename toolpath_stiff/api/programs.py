@@ -13,7 +13,6 @@ from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.options import Option, arguments_of, checked
@@ -183,7 +182,7 @@ def check(
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
     if on is None and strut_speed_mm_per_min is not None:
-        raise InputError(f"{both_names('--strut-speed')} without a machine", hint="name one with --machine")
+        raise InputError("--strut-speed without a machine", hint="name one with --machine")
     speed = None
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
