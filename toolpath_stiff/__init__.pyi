@@ -7,19 +7,13 @@ from toolpath_stiff.analysis.program_check import ProgramCheck as ProgramCheck
 from toolpath_stiff.analysis.results import Analysis as Analysis
 from toolpath_stiff.api.by_hand import Preview as Preview
 from toolpath_stiff.api.by_hand import preview as preview
-from toolpath_stiff.api.case_studies import case_study as case_study
-from toolpath_stiff.api.comparison import compare as compare
-from toolpath_stiff.api.correction import draft_effect as draft_effect
-from toolpath_stiff.api.correction import update as update
-from toolpath_stiff.api.diagnosis import diagnose as diagnose
 from toolpath_stiff.api.effects import check_effects as check_effects
 from toolpath_stiff.api.effects import effect_template as effect_template
 from toolpath_stiff.api.effects import effects as effects
-from toolpath_stiff.api.machine_files import MachineFile as MachineFile
-from toolpath_stiff.api.machine_files import machine_from_linuxcnc as machine_from_linuxcnc
-from toolpath_stiff.api.machine_files import machine_template as machine_template
-from toolpath_stiff.api.machine_files import recover_geometry as recover_geometry
 from toolpath_stiff.api.machines import Machine as Machine
+from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
+from toolpath_stiff.api.machines import machine_template as machine_template
+from toolpath_stiff.api.machines import recover_geometry as recover_geometry
 from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
 from toolpath_stiff.api.many import analyze_many as analyze_many
 from toolpath_stiff.api.measurements import Measurements as Measurements
@@ -27,13 +21,18 @@ from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
 from toolpath_stiff.api.placements import place as place
 from toolpath_stiff.api.placements import rewrite as rewrite
 from toolpath_stiff.api.placements import try_placement as try_placement
-from toolpath_stiff.api.planning import plan as plan
 from toolpath_stiff.api.poses import map_stiffness as map_stiffness
 from toolpath_stiff.api.poses import pose as pose
 from toolpath_stiff.api.poses import read_poses as read_poses
 from toolpath_stiff.api.programs import analyze as analyze
+from toolpath_stiff.api.programs import case_study as case_study
 from toolpath_stiff.api.programs import check as check
 from toolpath_stiff.api.programs import sample_path as sample_path
+from toolpath_stiff.api.questions import compare as compare
+from toolpath_stiff.api.questions import diagnose as diagnose
+from toolpath_stiff.api.questions import draft_effect as draft_effect
+from toolpath_stiff.api.questions import plan as plan
+from toolpath_stiff.api.questions import update as update
 from toolpath_stiff.case.case import Case as Case
 from toolpath_stiff.comparison.compare import Comparison as Comparison
 from toolpath_stiff.correction.draft import EffectDraft as EffectDraft
@@ -57,11 +56,11 @@ from toolpath_stiff.planning.next_visit import next_visit as next_visit
 from toolpath_stiff.planning.result import Plan as Plan
 from toolpath_stiff.readings.raw import Reduction as Reduction
 from toolpath_stiff.readings.raw import reduce as reduce
+from toolpath_stiff.results import TextFile as TextFile
 from toolpath_stiff.rewriting.program import RewrittenProgram as RewrittenProgram
 from toolpath_stiff.stiffness.catalogue import EffectCatalogue as EffectCatalogue
 from toolpath_stiff.stiffness.contract import Effect as Effect
 from toolpath_stiff.stiffness.contract import Parameter as Parameter
-from toolpath_stiff.stiffness.effect_file import EffectFile as EffectFile
 from toolpath_stiff.stiffness.trial import EffectCheck as EffectCheck
 
 __version__: str

@@ -17,6 +17,7 @@ from typing import Annotated
 import toolpath_stiff as tps
 from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
 from toolpath_stiff.cli.run import call, given, run_to_folder, show, tell, write_single, written_text
+from toolpath_stiff.correction.geometry import recovery_text
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, hint
 from toolpath_stiff.options import Option, finite_number, numbers
@@ -163,4 +164,5 @@ def from_linuxcnc(
 @command("machine recover", "recover_geometry", JSON)
 def recover(args: Namespace) -> int:
     """Fit the NIST geometry to the paper's Table 1 anew."""
-    return show(args, call(args, tps.recover_geometry))
+    recovery = call(args, tps.recover_geometry)
+    return show(args, recovery_text(recovery), document=lambda: recovery)

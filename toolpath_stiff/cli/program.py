@@ -98,7 +98,7 @@ def analyze(
         executor = _executor(cluster) if cluster else None
         with progress_line() as progress:
             analyses = tps.analyze_many(
-                files, machine_for(args), args.out or "reports", executor=executor, progress=progress, **options
+                programs, machine_for(args), args.out or "reports", executor=executor, progress=progress, **options
             )
         if counts and not args.json:
             print(*counts, sep="\n")
