@@ -214,21 +214,7 @@ NO_EXAMPLE = {
         *("machine", "moves", "path", "operations", "operation", "parameter_band", "figures", "weakest_rows"),
         *("counted", "along_axis", "plunging", "headline", "set_aside", "out_of_reach", "charted", "central_range"),
     },
-    "Case": {
-        *(
-            "compare",
-            "diagnose",
-            "draft",
-            "find",
-            "place",
-            "plan",
-            "preview",
-            "program_line",
-            "record",
-            "set_up",
-        ),
-        "update",
-    },
+    "Case": {"preview", "record", "next_result"},
     "Update": {  # steps and fits in SI, and what follows from them
         *("described", "last", "changed", "worse", "supported", "verdict", "widening", "corrected", "fitted"),
         "document",

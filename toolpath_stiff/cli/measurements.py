@@ -69,8 +69,8 @@ def compare(args: Namespace) -> int:
 
     The machine file is compared as it stands; `tps diagnose` asks which effect it lacks. A finding is a pattern in the
     residuals that fewer than 5 % of campaigns of mere scatter would show anywhere among all patterns looked for.
-    Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, strips.png, planes.png,
-    machine.png, variables.png, load_path.png.
+    Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, machine.png,
+    variables.png.
     """
     return run.to_folder(args, tps.compare, tps.Comparison, args.data)
 
@@ -109,7 +109,7 @@ def update(
 
     An effect that the data do not support is refused, with the reason, unless --force is given; the exit code is 0 all
     the same. Files written to --out: update.json, residuals.csv, machine.toml (unless refused or -o names another
-    place), ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
+    place), before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
     """
     args.replace |= args.force
     run.check_single(args, output)

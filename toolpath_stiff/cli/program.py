@@ -185,7 +185,7 @@ def place(args: Namespace) -> int:
     found.
 
     A placement is where program zero sits and how the work is turned about it: the numbers of --origin. Files written
-    to --out: placements.csv (the front), placement.json, front.png, setup.pdf, report.html
+    to --out: placements.csv (the front), placement.json, setup.pdf, report.html
     (click a placement of the front, see the path there).
     """
     run.check_single(args, args.write)

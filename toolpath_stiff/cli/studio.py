@@ -65,5 +65,5 @@ def studio(
     if program:
         opened.add_program(program, **cast("Reading", reading))
     elif reading:
-        opened.read_programs(**cast("Reading", reading))
+        opened.add_program(**cast("Reading", reading))
     return serve(opened, port, browser=not no_browser)
