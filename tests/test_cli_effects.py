@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from importlib import resources
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ import pytest
 
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine, parse_machine
-from toolpath_stiff.stiffness import catalogue as registry
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import LINKS
@@ -82,17 +80,6 @@ def test_several_effect_files(template, tmp_path, capsys):
     assert main(["effects", "list", "--json", "--effects", str(template), "--effects", str(other)]) == 0
     names = {effect["name"] for effect in json.loads(capsys.readouterr().out)["effects"]}
     assert {"my_screw", "other"} <= names
-
-
-def test_a_plug_in_that_does_not_load_is_listed_with_its_reason(monkeypatch, capsys):
-    point = EntryPoint("gone", "no_such_package:Thing", registry.ENTRY_POINTS)
-    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [point])
-    registry.installed_effects.cache_clear()
-    try:
-        assert main(["effects", "list"]) == 0
-        assert "gone: ModuleNotFoundError" in capsys.readouterr().out
-    finally:
-        registry.installed_effects.cache_clear()
 
 
 def test_new_never_overwrites(template, capsys):

@@ -227,14 +227,12 @@ def _evaluate_rows(task: _Task, rows: slice | IntArray) -> None:
     within = stand.reachable
     compliance = np.full((len(tip), 3, 3), np.nan)
     turned = None if rotation is None else rotation[within]
-    compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force, task.route)
+    compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force)
     refuse_no_number(machine, tip, within & np.isnan(compliance[:, 0, 0]))
 
     direction, substituted = load_directions(task.load, compliance, tip, rotation, task.tangent[rows])
     if model.load_dependent:
         there = (tip[within], turned, tool[within], force)
-        if task.load.kind == "softest":
-            direction[within] = core.extreme_directions(model, *there)
         along = np.full(len(tip), np.nan)
         along[within] = core.compliance_along(model, direction[within], *there)
     else:

@@ -213,8 +213,7 @@ def analyze(
     evaluation = evaluate(
         model, samples.position, samples.abc, samples.tangent, samples.tool_length, direction, force, progress
     )
-    tool_given = not np.isnan(samples.tool_length[samples.cutting]).any()
-    warnings = [*map(str, program.warnings), *condition_warnings(model, tool_given), *_warnings(samples, evaluation)]
+    warnings = [*map(str, program.warnings), *condition_warnings(model), *_warnings(samples, evaluation)]
     analysis = Analysis(
         program=program, model=model, origin=place_at, origin_source=source, load=direction, force=force, step=step,
         samples=samples, at=evaluation, warnings=warnings,

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.stiffness.catalogue import EffectCatalogue, effects_from_file, installed_effects, known_effects
+from toolpath_stiff.stiffness.catalogue import EffectCatalogue, effects_from_file, known_effects
 from toolpath_stiff.stiffness.effect_file import EffectFile
 from toolpath_stiff.stiffness.trial import EffectCheck, try_effect
 
 
 def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
-    """The effects that a machine can carry: the catalogue's, plug-ins', those in files of one's own.
+    """The effects that a machine can carry: the catalogue's, and those in files of one's own.
 
     Raises
     ------
@@ -25,7 +25,7 @@ def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
     >>> tps.effects()["weak_strut"].title
     'one strut is weak'
     """
-    return EffectCatalogue(list(known_effects(list(map(str, files))).values()), installed_effects()[1])
+    return EffectCatalogue(list(known_effects(list(map(str, files))).values()))
 
 
 def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> EffectCheck:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import ArrayColumns, FloatArray
 from toolpath_stiff.errors import PoseError
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
@@ -27,7 +27,7 @@ LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.3  # m, rad
 
 
 @dataclass(frozen=True)
-class Struts:
+class Struts(ArrayColumns):
     """The struts at n poses.
 
     Attributes
