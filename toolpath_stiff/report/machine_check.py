@@ -60,5 +60,5 @@ def symmetry_words(symmetry: Symmetry) -> str:
     """What holds for the joints that follow."""
     if not symmetry.kind:
         return "the joints follow neither a three-fold symmetry nor a mirror plane: nothing to hold one against"
-    count = 12 - len(symmetry.strays)
-    return f"{count} of 12 joints follow a {symmetry.kind} symmetry within {mm_from_m(symmetry.residual):.2g} mm"
+    within = f"within {mm_from_m(symmetry.residual):.2g} mm"
+    return f"{12 - len(symmetry.strays)} of 12 joints follow a {symmetry.kind} symmetry {within}"
