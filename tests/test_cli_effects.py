@@ -96,7 +96,6 @@ def test_new_never_overwrites(template, capsys):
         (["list", "--effects", "none.py"], "'none.py' does not exist"),
         (["new", "my screw.py"], "such as my_screw.py"),
         (["new", "screw.txt"], "such as my_screw.py"),
-        ([], "Say one of list, show, new, draft, check"),
     ],
 )
 def test_wrong_input_is_one_message_and_exit_code_2(words, message, capsys, tmp_path, monkeypatch):

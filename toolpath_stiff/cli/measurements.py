@@ -1,15 +1,22 @@
 """The commands on measurements: reduce, compare, diagnose, update, plan."""
 
-import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli.calls import call, run_to_folder
-from toolpath_stiff.cli.outputs import check_single, destination, show, tell, write_single, written_text
 from toolpath_stiff.cli.parser import DATA, FILES, FOLDER, JSON, NO_PLOTS, REPLACE, command
+from toolpath_stiff.cli.run import (
+    call,
+    check_single,
+    destination,
+    run_to_folder,
+    show,
+    tell,
+    write_single,
+    written_text,
+)
 from toolpath_stiff.options import Option
 from toolpath_stiff.workbooks import split_name
 
@@ -54,12 +61,10 @@ def reduce(
     name = first.stem if first.is_file() else first.resolve().name
     target = Path(out or f"{name or 'raw'}_measurements.csv")
     written = [str(file) for file in write_single(args, reduction.files(target, plots=not args.no_plots))]
-    for line in reduction.read_as:
-        print(f"tps: {line}", file=sys.stderr)
+    tell("read", reduction.read_as)
     tell("note", reduction.notes)
-    return show(
-        args, reduction, f"\nwrote {' and '.join(written)}", document=lambda: {**reduction.to_dict(), "files": written}
-    )
+    document = {**reduction.to_dict(), "files": written}
+    return show(args, reduction, f"\nwrote {' and '.join(written)}", document=lambda: document)
 
 
 @command("compare", DATA, "Machine.load", "compare", *FOLDER)
@@ -117,13 +122,12 @@ def update(
     """
     args.replace |= args.force
     check_single(args, output)
-    target = destination(args, tps.Update, args.data, () if output is None else ("machine.toml",))
-    fitted = call(args, tps.update, machine_file=output or target.folder / "machine.toml")
-    after = [target.write(fitted, plots=not args.no_plots, machine=output is None)]
+    folder, rules = destination(args, tps.Update, args.data, () if output is None else ("machine.toml",))
+    fitted = call(args, tps.update, machine_file=output or folder / "machine.toml")
+    written = fitted.save(folder, plots=not args.no_plots, rules=rules, machine=output is None)
     if output and fitted.accepted:
-        write_single(args, {Path(output): fitted.machine_text()})
-        after.append(f"  {output}")
-    return show(args, fitted, *after, *(["", *fitted.next] if fitted.next else []))
+        written += write_single(args, {Path(output): fitted.machine_text()})
+    return show(args, fitted, written_text(written), *(["", *fitted.next] if fitted.next else []))
 
 
 @command("plan", "Machine.load", "plan", *FOLDER)

@@ -19,7 +19,7 @@ from toolpath_stiff.machine.writer import value_text
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.portrait.words import portrait_text, size_words, term_words
 from toolpath_stiff.readings.measurements import reading_marks
-from toolpath_stiff.stiffness.effect_file import EffectFile
+from toolpath_stiff.results import TextFile
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.stiffness.term_effect import ENDINGS
 from toolpath_stiff.stiffness.term_file import entry_of
@@ -30,7 +30,7 @@ WIDTH = 116  # columns of running text in the file
 MARKS_A_LINE = 10
 
 
-class EffectDraft(EffectFile):
+class EffectDraft(TextFile):
     """What a diagnosis leaves unexplained, as the text of an effect file.
 
     Attributes

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves, held_once
 from toolpath_stiff.path.placing import place_orientations
@@ -252,7 +251,7 @@ def _pieces(moves: Moves, length: FloatArray, step: float) -> FloatArray:
         raise ProgramError(
             f"a step of {mm_from_m(step):g} mm gives {total:.0f} samples",
             expected=f"at most {MOST_SAMPLES}",
-            hint=f"use {both_names('--step', f'{mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g}')} or more",
+            hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",
         )
     return np.asarray(pieces)
 

@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Sequence
 
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.arc import ARCS
 from toolpath_stiff.nc.codes.drilling import CYCLES
@@ -18,10 +17,7 @@ from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, point_at
 
 Piece = tuple[str, list[float], float]  # G0 or G1, end in the set-up frame, dwell after it in s
 SLASH = re.compile(r"^\s*/\d*")
-LINEARISE = (
-    f"give {both_names('--linearise', 'MM')} to have straight moves within MM of it, "
-    "or place the work without that turn"
-)
+LINEARISE = "give --linearise MM to have straight moves within MM of it, or place the work without that turn"
 
 
 def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str], bool]:
@@ -159,7 +155,7 @@ def _piece_count(controls: Controls, move: Segment) -> int:
     if controls.linearise is None or (not off_plane and leaning == 0.0):
         return 1
     tolerance = controls.linearise - controls.unit
-    option = both_names("--linearise", f"{controls.linearise:g}")
+    option = f"--linearise {controls.linearise:g}"
     rounding = f"{option} is no more than the rounding to {controls.digits} decimals"
     controls.refuse_if(tolerance < controls.unit, rounding, "give more of it, or more --decimals")
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))

@@ -27,7 +27,7 @@ from dataclasses import replace
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.errors import EffectError, PoseError
+from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.stiffness.contract import LoadPath, at_pose
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.stiffness.possible import possible, refuse_struts_without_stiffness
@@ -82,7 +82,7 @@ def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
     if holds.all():
         return
     worst = np.unravel_index(np.argmin(np.where(holds, np.inf, stiffness)), stiffness.shape)
-    raise PoseError(
+    raise InputError(
         f"strut {worst[1] + 1} would be {mm_from_m(float(lengths[worst])):.1f} mm long, where the machine's strut law "
         f"gives {n_per_um_from_n_per_m(float(stiffness[worst])):.4g} N/um{at_pose(path, int(worst[0]))}",
         expected="a finite stiffness above 0",

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from toolpath_stiff import defaults
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
@@ -30,7 +29,7 @@ from toolpath_stiff.stiffness.parameters import read_parameters
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
 WORDS = {
-    "temperature_C": f"the temperature, which nobody gives ({both_names('--temperature')})",
+    "temperature_C": "the temperature, which nobody gives (--temperature)",
     "time_min": "the time since an indicator was zeroed, which no program has",
     "direction": "the direction of a reading, which no program has",
 }

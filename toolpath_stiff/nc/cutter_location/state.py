@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.courses import point_on_arc
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, dot, minus
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
@@ -168,7 +167,7 @@ def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, 
         if state.feed is None:
             raise state.fail(
                 "a cut before any feed",
-                f"FEDRAT/ with a feed above 0, or {both_names('--feed', 'MM_PER_MIN')} for such cuts",
+                "FEDRAT/ with a feed above 0, or --feed MM_PER_MIN for such cuts",
             )
         # Of a tip that stands still the same number of degrees per minute.
         feed = state.feed_per_minute(state.feed, state.per_revolution)

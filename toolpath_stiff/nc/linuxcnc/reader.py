@@ -5,7 +5,6 @@ import re
 from collections.abc import Sequence
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import LISTED
 from toolpath_stiff.nc.linuxcnc.canon import Follower
@@ -120,7 +119,7 @@ class _Session:
             "machine coordinates (G53, G28, G30) in a program whose zero lies elsewhere than its G10 says, or is "
             "turned: LinuxCNC's interpreter knows the machine by its offsets alone",
             expected="G54 as the program or the offsets file sets it",
-            hint=f"leave {both_names('--origin')} out, or read the program with --interpreter builtin",
+            hint="leave --origin out, or read the program with --interpreter builtin",
             file=self.request.name,
             line=next((line.number for line in self.lines if MACHINE_CODES.search(line.plain)), None),
         )
