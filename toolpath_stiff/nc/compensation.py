@@ -16,7 +16,7 @@ the two is longer by the tool's radius.
 import math
 from dataclasses import dataclass, field
 
-from toolpath_stiff.nc.geometry import ArcError, Point2
+from toolpath_stiff.nc.geometry import ArcError, Point2, arc_sweep
 from toolpath_stiff.nc.moves import Move
 
 CORNER = 0.05  # rad; less than this is no corner (LinuxCNC's TOLERANCE_CONCAVE_CORNER)
@@ -46,6 +46,10 @@ class OffsetArc:
     turn: int
     turns: int = 1
     programmed: float = 0.0
+
+    def sweep_to(self, start: Point2, end: Point2) -> float:
+        """Signed angle from one point to another, rad."""
+        return arc_sweep(start, end, self.center, self.turn < 0, self.turns)
 
 
 @dataclass
@@ -99,7 +103,17 @@ class Cutter:
     def center(self) -> Point2:
         """Tool centre in the plane."""
         assert self.position is not None
-        return self.position[self.axes[0]], self.position[self.axes[1]]
+        return self.in_plane(self.position)
+
+    def in_plane(self, point: list[float]) -> Point2:
+        """A point's two coordinates of the plane."""
+        return point[self.axes[0]], point[self.axes[1]]
+
+    def moved(self, point: list[float], to: Point2) -> list[float]:
+        """A point with other coordinates in the plane."""
+        point = list(point)
+        point[self.axes[0]], point[self.axes[1]] = to
+        return point
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ machine that programs were posted for), `setup` (the name of the clamping arrang
 belong to one). LinuxCNC's own parameter file (.var) and tool table (.tbl) are read as controller files too.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -37,6 +38,7 @@ UNITS_OR_CYCLE = (
     "inch or metric units on some controls, a cycle on others",
     'write G20 or G21, or give a controller file with inch_metric = "G70 G71"',
 )
+INCH_METRIC = {"G70": "G20", "G71": "G21"}
 HOLE_PATTERN = ("a pattern of holes", "post the holes one by one")
 
 
@@ -65,16 +67,16 @@ class Dialect:
         Whether `;` begins a comment; else it ends the block, and nothing may follow it.
     arc_absolute
         Whether I, J, K are absolute at the start (G90.1).
-    g70, inch_metric
-        Why G70 and G71 are refused; whether they are inch and metric units.
+    aliases
+        Its other names of codes.
+    g70
+        Why G70 and G71 are refused, where they are no such names.
     additional
         The codes that take additional work offsets.
     local_calls
         Whether M97 calls a block by its N number.
     feed_needs_point
         Units in which F without a decimal point depends on a parameter, and is refused.
-    holds_tip
-        Its code for tool centre point control.
     """
 
     name: str
@@ -87,11 +89,10 @@ class Dialect:
     semicolon: bool = True
     arc_absolute: bool = False
     g70: tuple[str, str] = UNITS_OR_CYCLE
-    inch_metric: bool = False
+    aliases: Mapping[str, str] = field(default_factory=dict)
     additional: tuple[str, ...] = ("G54.1", "G154")
     local_calls: bool = False
     feed_needs_point: tuple[str, ...] = ()
-    holds_tip: str = "G43.4"
 
 
 GENERIC = Dialect("generic")
@@ -109,7 +110,7 @@ DIALECTS = {
             repeats_in_p=True,
             cycle_repeats="KL",
             semicolon=False,
-            inch_metric=True,
+            aliases=INCH_METRIC,
             additional=("G54.1",),
             feed_needs_point=("inch",),
         ),
@@ -125,7 +126,7 @@ DIALECTS = {
             additional=("G154",),
             local_calls=True,
             feed_needs_point=("mm", "inch"),
-            holds_tip="G234",
+            aliases={"G234": "G43.4"},
         ),
     )
 }
@@ -275,6 +276,7 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
     base = dialect_named(dialect or name)
     absolute = choice("arc_centers", "incremental", "absolute") == "absolute"
     by_g70 = choice("inch_metric", "G20 G21", "G70 G71") == "G70 G71"
+    aliases = {**base.aliases, **INCH_METRIC} if by_g70 else base.aliases
     setup, feed, folder = given.get("setup"), given.get("feed_mm_per_min"), given.get("subprograms")
     if setup is not None and not is_text(setup):
         raise toml.error(f"setup = {setup!r}", "the name of a set-up", where="setup")
@@ -286,7 +288,7 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
             raise toml.error(f"subprograms = {folder!r}", "a folder beside this file", where="subprograms")
         folder = str(beside)
     return Controller(
-        replace(base, arc_absolute=base.arc_absolute or absolute, inch_metric=base.inch_metric or by_g70),
+        replace(base, arc_absolute=base.arc_absolute or absolute, aliases=aliases),
         _switches(toml),
         offsets_of(toml),
         tools_of(toml),

@@ -13,8 +13,8 @@ Group = Literal[
     "units", "feed mode", "F", "S", "T", "M tool change", "dwell", "plane", "polar", "tool length", "M subprogram",
     "work offset", "path control", "exact stop", "look-ahead", "dynamic offset", "spindle mode", "distance",
     "arc distance", "cycle return", "cutter compensation", "lathe diameter", "scaling", "mirror image", "stroke check",
-    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M rigid tapping", "M modal state",
+    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M rigid tapping",
     "rotation", "non-modal", "M stop", "motion", "corner",
 ]  # fmt: skip
 STEPS: dict[Group, int] = {group: place for place, group in enumerate(get_args(Group))}
-LAST_MODE = STEPS["M modal state"]
+LAST_MODE = STEPS["M rigid tapping"]

@@ -7,14 +7,13 @@ The meaning of each code is a function in `codes`, found in the table of `codes.
 from toolpath_stiff.nc.codes.code import Code, code_name
 from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
-from toolpath_stiff.nc.codes.increments import read_numbers
+from toolpath_stiff.nc.codes.increments import increments_hint, read_numbers
 from toolpath_stiff.nc.codes.motion import homes_standing
 from toolpath_stiff.nc.codes.passive import m_parameters
-from toolpath_stiff.nc.codes.refused import REFUSED
-from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC
-from toolpath_stiff.nc.codes.tool_length import HOLDS_TIP
+from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.codes.tools import list_numbers
-from toolpath_stiff.nc.groups import LAST_MODE
+from toolpath_stiff.nc.geometry import ArcError
+from toolpath_stiff.nc.groups import LAST_MODE, Group
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Flow, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
@@ -22,6 +21,7 @@ from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
 
 COORDINATES = frozenset((*AXES, "@"))
 WORDS_THAT_ACT = ("F", "S", "T")
+TAKERS: tuple[Group, ...] = ("non-modal", "rotation", "tool length")  # groups whose codes may take the axis words
 
 
 def execute(state: State, block: Block) -> Then:
@@ -49,14 +49,15 @@ def finish(state: State, block: CurrentBlock) -> Then:
     for code in _in_order(block, ahead=False):
         code.act(state, block, code.name)
     pending = state.corner
-    _move(state, block)
+    try:
+        _move(state, block)
+    except ArcError as error:
+        raise block.fail(None, error.found, error.expected, increments_hint(state)) from None
     for letter in CORNERS:
         if block.has(letter):
             CODES[letter].act(state, block, letter)
     if pending is not None and state.corner is pending:
-        raise block.fail(
-            None, f"line {pending.line} makes a corner ({pending.letter}) with this block", "a feed move (G1)"
-        )
+        raise block.fail(None, f"line {pending.line} makes a corner with this block", "a feed move (G1)")
     list_numbers(state, block)
     for letter in sorted(block.free):
         raise block.fail(letter, "is not used by any code of its block", hint="remove it")
@@ -96,13 +97,8 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
 
 
 def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
-    name, dialect = code_name(word.letter, word.value), state.dialect
-    if name == dialect.holds_tip:
-        name = HOLDS_TIP
-    if name in INCH_METRIC:
-        if not dialect.inch_metric:
-            raise block.fail(word, f"is {dialect.g70[0]}, which is not supported", hint=dialect.g70[1])
-        name = INCH_METRIC[name]
+    written, dialect = code_name(word.letter, word.value), state.dialect
+    name = dialect.aliases.get(written, written)
     if name in REFUSED:
         raise block.fail(word, f"is {REFUSED[name].what}, which is not supported", hint=REFUSED[name].hint)
     code = CODES.get(name)
@@ -120,24 +116,21 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
     if code.listed:
         state.note(block.line, word, code.listed)
     before = block.groups.get(code.group)
-    if before is not None:
-        # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
-        if name == "G80" != before:
-            return
-        if before != "G80" or name == "G80":
-            group = code.group.removeprefix("M ")
-            problem = f"and {before} are both of the modal group {group!r}, or act once in their block"
-            raise block.fail(word, problem, "one of them in a block")
-    block.groups[code.group] = name
-    block.codes[name] = word
+    # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
+    if before is not None and (before == name or "G80" not in (before, name)):
+        problem = (
+            f"and {before} are both of the modal group {code.group.removeprefix('M ')!r}, or act once in their block"
+        )
+        raise block.fail(word, problem, "one of them in a block")
+    if before is None or name != "G80":
+        block.groups[code.group] = name
+        block.codes[name] = word
 
 
 def _check_axis_words(block: CurrentBlock) -> None:
     """Two codes that use the axis words of their block are an error."""
-    present = [
-        name for group in ("non-modal", "rotation", "tool length") if (name := block.groups.get(group)) is not None
-    ]
-    takers = [name for name in present if CODES[name].takes_axes]
+    present = [block.groups.get(group) for group in TAKERS]
+    takers = [name for name in present if name is not None and CODES[name].takes_axes]
     moving = block.groups.get("motion")
     if takers in (["G28"], ["G30"]) and moving in ("G0", "G1"):  # it homes, and that motion mode holds afterwards
         return

@@ -14,7 +14,6 @@ from typing import TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
-from toolpath_stiff.nc.codes.saved import leave_level
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.moves import Jump, Remark
 from toolpath_stiff.nc.place import Place
@@ -146,7 +145,6 @@ class ProgramRun:
                     self._check_head(block, numbered)
                     numbered = True
                 if not (block.optional and block.switch in self.switches):
-                    self.state.level = len(self._levels)
                     if self.tally is not None:
                         self.tally.add(block)
                     on: Then = Flow.NEXT
@@ -292,21 +290,13 @@ class ProgramRun:
         to = self._block_numbered(row, "M99 P goes to", flow.number, flow.column)
         if not self._levels:
             return to if to > row else None
-        self._restore(row)
         level = self._levels.pop()
         if level.again or to < level.back:
             problem = f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram"
             raise self._fail(row, problem, "a block after the call, which is not repeated", column=flow.column)
         return to
 
-    def _restore(self, row: int) -> None:
-        """The caller's modes, where M73 has saved them."""
-        fault = leave_level(self.state, len(self._levels))
-        if fault:
-            raise self._fail(row, f"the subprogram that saved modes with M73 returns where {fault}")
-
     def _leave(self, row: int) -> int:
-        self._restore(row)
         level = self._levels[-1]
         if level.again:
             level.again -= 1

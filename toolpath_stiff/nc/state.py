@@ -148,17 +148,6 @@ class Segment(NamedTuple):
     arc: Arc | None
 
 
-class SavedModes(NamedTuple):
-    """What M70 and M73 save: attributes of `State`; length and control of the tool must be the same at the return."""
-
-    modes: dict[str, object]
-    plane: str
-    feed: float | None
-    offset: int
-    tool: tuple[float, bool]
-    at_return: bool
-
-
 @dataclass(frozen=True)
 class Corner:
     """A corner that waits for its second move: `,C` or `,R`, its size in mm, and the line that asks for it."""
@@ -229,8 +218,6 @@ class State:
         Cutter compensation in force (G41, G42); None: G40.
     beside
         After G40, until the next move: from the programmed point to where the tool centre stands (6, set-up frame).
-    level, saved
-        Calls within each other that run; what M70 or M73 saved, by level.
     named_length
         H of a block without G43, which a later G43 without H may mean.
     turning
@@ -274,8 +261,6 @@ class State:
     corner: Corner | None = None
     cutter: Cutter | None = None
     beside: list[float] | None = None
-    level: int = 0
-    saved: dict[int, SavedModes] = field(default_factory=dict)
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.arc import ARCS
 from toolpath_stiff.nc.codes.drilling import CYCLES
+from toolpath_stiff.nc.codes.motion import ARCS
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
 from toolpath_stiff.nc.moves import RAPID
@@ -36,8 +36,6 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     letters = {word.letter for word in block.words}
     refused = {
         "a subprogram (M98, M99), which may run at several places,": current.flow is not Flow.NEXT,
-        "saved modes (M70 to M73)": "M modal state" in current.groups,
-        "spindle-synchronised motion (G33)": bool({source.motion, current.groups.get("motion")} & {"G33", "G33.1"}),
         "cutter compensation (G41, G42)": source.cutter is not None,
         "polar words (G16, @, ^)": source.polar is not None or bool(letters & set(POLAR)),
         "a corner with the next block (,R ,C)": bool(letters & set(CORNERS)),

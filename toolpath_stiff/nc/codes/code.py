@@ -75,17 +75,6 @@ class Refused:
     source: str
 
 
-@dataclass(frozen=True)
-class Alias:
-    """Another name that some dialects have for a code."""
-
-    name: str
-    code: str
-    meaning: str
-    source: str
-    controls: tuple[str, ...]
-
-
 def family(
     meanings: Mapping[str, str],
     group: Group,

@@ -37,12 +37,9 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     state.corner = None
     begin, vertex, end = before.start, frames.to_setup(frames.position), frames.to_setup(target)
     normal = frames.turn_direction(geometry.normal_of(state.plane))
-    try:
-        if begin[3:] != vertex[3:] or vertex[3:] != end[3:]:
-            raise geometry.ArcError("a corner while the rotary axes turn", "X, Y and Z alone")
-        ends = geometry.corner(begin[:3], vertex[:3], end[:3], normal, pending.size, pending.letter == ",R")
-    except geometry.ArcError as error:
-        raise block.fail(None, f"{error.found} ({pending.letter} of line {pending.line})", error.expected) from None
+    if begin[3:] != vertex[3:] or vertex[3:] != end[3:]:
+        raise geometry.ArcError("a corner while the rotary axes turn", "X, Y and Z alone")
+    ends = geometry.corner(begin[:3], vertex[:3], end[:3], normal, pending.size, pending.letter == ",R")
     if ends is None:  # the path goes straight on
         return
     first, last, center, sweep = ends

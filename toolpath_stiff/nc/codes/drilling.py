@@ -6,10 +6,9 @@ cycle") where a dialect follows them.
 
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
-from toolpath_stiff.nc.codes.dwell import time_word
+from toolpath_stiff.nc.codes.feeds import time_word
 from toolpath_stiff.nc.codes.motion import record
-from toolpath_stiff.nc.codes.points import destination, point_words
-from toolpath_stiff.nc.codes.polar import xy_of_polar_words
+from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_polar_words
 from toolpath_stiff.nc.moves import CYCLE, RAPID
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM, Drilling, strokes

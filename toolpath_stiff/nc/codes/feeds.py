@@ -1,14 +1,14 @@
-"""F and S, feed and spindle modes (G93 G94 G95, G96 G97), and the feed of a move. mm/min inside."""
+"""Feed, speed and time: F and S, G93 G94 G95, G96 G97, the feed of a move; G4 and words of time. mm/min, s inside."""
 
 import math
 
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.codes.code import Code, family, g_codes, holds_anyway
-from toolpath_stiff.nc.codes.dwell import dwells_by
+from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes, holds_anyway
+from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
 from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc
-from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.units import MM_PER_INCH
+from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
 SLOWEST = 1e-6  # mm/min, or 1/min: slower is a slip, and its time beyond all numbers
 
@@ -98,6 +98,50 @@ def _length(start: list[float], end: list[float], arc: Arc | None) -> float:
     return math.hypot(arc.sweep * (first + last) / 2.0, climb, last - first)
 
 
+def dwells_by(state: State, block: CurrentBlock) -> str:
+    """The word that holds the time of a block's G4: P; X on Fanuc's controls, S in Marlin; "" for no such word."""
+    if "G4" not in block.codes:
+        return ""
+    letters = {"linuxcnc": "P", "generic": "PXS"}.get(state.dialect.name, "XP")
+    return next((letter for letter in letters if letter in block.values), "")
+
+
+def dwell(state: State, block: CurrentBlock, code: str) -> None:
+    """G4: a pause, before the block's own moves."""
+    letter = dwells_by(state, block)
+    seconds = time_word(state, block, letter) if letter else None
+    if not letter and state.dialect.name in ("generic", "fanuc") and "F" not in block.values:  # F: Siemens' seconds
+        state.assume("G4 without a time is no pause: an exact stop (Fanuc), the end of the moves before it (Marlin)")
+        seconds = 0.0
+    if state.dialect.name == GENERIC.name and letter in ("X", "S"):
+        word = block.values[letter]
+        if letter == "X" and ("." not in word.text or any(block.has(axis) for axis in POINT_WORDS)):
+            raise block.fail(
+                word,
+                "beside G4 is not certainly a time: without a point it counts milliseconds on Fanuc's controls",
+                f"{word.text.rstrip('.')}. alone, for seconds",
+                "name the control with --dialect",
+            )
+        state.assume(f"the {letter} of G4 is a time in seconds, as {'Fanuc' if letter == 'X' else 'Marlin'} means it")
+    if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
+        raise block.fail(code, "needs its time", "P with the seconds, 0 or more")
+    state.recorder.add_dwell(seconds)
+
+
+def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
+    """A time word in s; what its number counts is the dialect's."""
+    value = block.take(letter)
+    if value is None or state.dialect.dwell == SECONDS:
+        return value
+    written = block.as_written(letter)
+    if "." not in written.text:
+        return written.value / 1e3
+    if letter == "P" and state.dialect.dwell == MILLISECONDS:
+        raise block.fail(written, f"has a decimal point, which {state.dialect.name} does not allow", "milliseconds")
+    return value
+
+
+_DWELL = f"{g_codes('G4')}; {FANUC}, Dwell (G04); Marlin, G004"
 _FEEDS = {"G93": "inverse-time feed", "G94": "feed per minute", "G95": "feed per revolution"}
 _SPINDLE, _UNUSED = g_codes("G96 G97"), "constant surface speed: the spindle speed does not enter"
 FEED_CODES = (
@@ -105,5 +149,6 @@ FEED_CODES = (
     Code("S", "S", speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
     *family(_FEEDS, "feed mode", feed_mode, g_codes("G93 G94 G95")),
     Code("G96", "spindle mode", surface_speed, "constant surface speed", _SPINDLE, listed=_UNUSED),
+    Code("G4", "non-modal", dwell, "dwell", _DWELL, step="dwell"),
     Code("G97", "spindle mode", holds_anyway, "spindle speed in revolutions", _SPINDLE),
 )

@@ -1,4 +1,4 @@
-"""G0, G1, G53, G28, G30, G80: straight moves, from the words of a block. mm, degrees.
+"""G0 to G3, G53, G28, G30, G80: moves along lines and arcs, from the words of a block. mm, degrees.
 
 A move is recorded with its ends in the set-up frame, its feed and its tool; beside it stands whether the present height
 is known.
@@ -7,18 +7,32 @@ is known.
 import math
 from collections.abc import Collection
 
-from toolpath_stiff.nc.codes.center_path import offset_move
+from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import FANUC, Code, g_codes
 from toolpath_stiff.nc.codes.corner import cut_corner
+from toolpath_stiff.nc.codes.cutter import offset_move
 from toolpath_stiff.nc.codes.feeds import feed_of_move
-from toolpath_stiff.nc.codes.points import axis_words, cartesian, control_point, point_words
-from toolpath_stiff.nc.codes.polar import forget_polar
-from toolpath_stiff.nc.codes.unsettled import XY, know_place, refuse_while_rotated
+from toolpath_stiff.nc.codes.points import (
+    XY,
+    axis_words,
+    cartesian,
+    control_point,
+    destination,
+    forget_polar,
+    know_place,
+    point_words,
+    refuse_while_rotated,
+)
 from toolpath_stiff.nc.frames import standing
-from toolpath_stiff.nc.moves import FEED, RAPID, Arc, Move
+from toolpath_stiff.nc.geometry import ArcError, Point2
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Segment, State
 from toolpath_stiff.nc.tables import tool_of
 from toolpath_stiff.nc.words import Word
+
+ARCS = ("G2", "G3")
+MOST_TURNS = 10_000
+INCREMENTAL_AXES = "UVW"  # X, Y, Z in steps, on lathes and as G28 U0 W0 on mills
 
 
 def record(
@@ -47,7 +61,7 @@ def record(
         start, state.beside = [s + b for s, b in zip(start, state.beside, strict=True)], None
     move = Move(block.line, motion, start, end, feed, state.tool, state.tool_length, (was, frames.bound), arc)
     if state.cutter is not None and state.cutter.radius:
-        added = offset_move(state, block, move, control)
+        added = offset_move(state, state.cutter, move, control)
     else:
         added = state.recorder.add(move)
     if state.trace is not None:
@@ -101,6 +115,58 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
         find_height(state, block, FEED, named=False)
 
 
+def arc(state: State, block: CurrentBlock, code: str) -> None:
+    """G2, G3: clockwise and counter-clockwise in the plane in force, to the point that the axis words name."""
+    if not (any(block.has(letter) for letter in (*POINT_WORDS, *geometry.CENTER_LETTERS)) or "motion" in block.groups):
+        return
+    if state.beside is not None:
+        raise block.fail(block.block.words[0], "is an arc as the first move after cutter compensation", "G0 or G1")
+    first, second, _ = geometry.PLANES[state.plane]
+    frames, clockwise = state.frames, code == "G2"
+    here = frames.to_program(frames.position)
+    words = point_words(state, block)
+    target = destination(state, block, here, words)
+    start, end = (here[first], here[second]), (target[first], target[second])
+    turns = block.whole("P", block.block.words[0]) or 1
+    if turns > MOST_TURNS:
+        raise block.fail("P", "is not a number of turns", f"a whole number from 1 to {MOST_TURNS}")
+    center = _center(state, block, start, end, clockwise, words)
+    sweep = geometry.sweep_about(center, start, end, clockwise, state.inch, turns)
+    middle = list(here)
+    middle[first], middle[second] = center
+    x, y, z = frames.to_setup(frames.to_control(middle))[:3]
+    turned = frames.turn_direction(geometry.normal_of(state.plane))
+    record(state, block, ARC, control_point(state, block, here, words), words, arc=Arc((x, y, z), turned, sweep))
+
+
+def _center(
+    state: State, block: CurrentBlock, start: Point2, end: Point2, clockwise: bool, words: dict[int, float]
+) -> Point2:
+    """Centre by R, or by the two of I, J, K that belong to the plane. Raises `InputError`, `ArcError`."""
+    first, second, normal = geometry.PLANES[state.plane]
+    radius = block.take("R")
+    off_plane = geometry.CENTER_WORDS[normal]
+    in_plane = (geometry.CENTER_WORDS[first], geometry.CENTER_WORDS[second])
+    if block.has(off_plane) and block.values[off_plane].value == 0.0:
+        block.take(off_plane)  # posts write all three
+    if block.has(off_plane):
+        raise block.fail(off_plane, f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
+    offsets = [block.take(letter) for letter in in_plane]
+    if state.polar is not None and offsets != [None, None]:
+        raise ArcError("an arc with I, J or K in polar mode (G16)", "R")
+    if radius is not None:
+        if offsets != [None, None]:
+            raise block.fail("R", "and a centre (I, J, K) are both given", "one of them")
+        if not {first, second} & words.keys():
+            raise ArcError("an arc with R and without an end point", "an axis word of the plane")
+        return geometry.center_from_radius(start, end, radius * state.length_scale, clockwise)
+    if offsets == [None, None] or (state.arc_absolute and None in offsets):
+        expected = f"{in_plane[0]} and {in_plane[1]}, or R"
+        raise ArcError("an arc without a centre, or with one word of an absolute one (G90.1)", expected)
+    a, b = ((offset or 0.0) * state.length_scale for offset in offsets)
+    return (a, b) if state.arc_absolute else (start[0] + a, start[1] + b)
+
+
 def motion_off(state: State, block: CurrentBlock, code: str) -> None:
     """G80: no motion mode; axis words have none to move in. On Fanuc's and Haas' controls G0 or G1 hold on."""
     state.motion = state.group_01 if state.group_01 in ("G0", "G1") else None
@@ -121,9 +187,6 @@ def machine_move(state: State, block: CurrentBlock, code: str) -> None:
         point[axis] = value
     motion = RAPID if state.motion == "G0" else FEED
     record(state, block, motion, frames.control_of_machine(point), machine=words)
-
-
-INCREMENTAL_AXES = "UVW"  # X, Y, Z in steps, on lathes and as G28 U0 W0 on mills
 
 
 def homes_standing(block: CurrentBlock, letter: str) -> bool:
@@ -177,9 +240,11 @@ def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, ax
 
 _G28, _G30 = g_codes("G28 - G28.1"), g_codes("G30 - G30.1")
 _OFF = "motion mode off; on Fanuc's and Haas' controls the cycle alone"
-STRAIGHT_CODES = (
+MOTION_CODES = (
     Code("G0", "motion", straight, "rapid", g_codes("G0"), many=True),
     Code("G1", "motion", straight, "feed", g_codes("G1"), many=True),
+    Code("G2", "motion", arc, "clockwise arc", g_codes("G2 G3"), many=True),
+    Code("G3", "motion", arc, "counter-clockwise arc", g_codes("G2 G3"), many=True),
     Code("G80", "motion", motion_off, _OFF, f"{g_codes('G80')}; {FANUC}, Canned cycle cancel (G80)"),
     Code("G53", "non-modal", machine_move, "machine coordinates", g_codes("G53"), step="motion"),
     Code("G28", "non-modal", go_home, "to the first reference point", _G28, takes_axes=True),
