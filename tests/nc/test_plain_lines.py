@@ -41,7 +41,6 @@ def outcome(lines, dialect, fast):
         warnings = run.run()
     except InputError as found:
         error, warnings = str(found), []
-    control.bare = control.bare and (control.bare[0], control.bare[1].text)
     state = {
         name: repr(value)
         for name, value in vars(control).items()

@@ -9,14 +9,29 @@ functions that the interpreter calls. A line about which there is anything to sa
 that does not fit) ends the run before it: the interpreter then executes it and reports it. mm, degrees, mm/min inside.
 """
 
+import math
 from collections.abc import Sequence
 
-from toolpath_stiff.nc.codes.increments import notice_lengths
-from toolpath_stiff.nc.plain_moves import Lines
-from toolpath_stiff.nc.plain_words import BARE, POINTED, PlainWords, lex
-from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.words import read_block
+import numpy as np
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.feeds import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
+from toolpath_stiff.nc.codes.increments import ANGLES, assume_increments, increment
+from toolpath_stiff.nc.codes.motion import note_tool
+from toolpath_stiff.nc.codes.points import LINEAR
+from toolpath_stiff.nc.codes.registry import CODES
+from toolpath_stiff.nc.frames import STILL
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Moves
+from toolpath_stiff.nc.plain_words import BARE, FIRST_F, LAST_F, LETTERS, NO_CODE, NONE, PlainWords, lex
+from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
+from toolpath_stiff.nc.words import AXES
+
+MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_words` reads
+MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}
+NO_MODE = -1
+CLOCKWISE = MODES["G2"]
 FEWEST = 8  # lines; below, one by one is as fast
 CHUNK = 8192  # lines: their words fit into a processor's cache
 
@@ -47,18 +62,7 @@ class PlainRun:
             self._pause = first + done + 4 * FEWEST
         if not done:
             return None
-        self._notice_lengths(first, words, done)
         return words.part(0, done)
-
-    def _notice_lengths(self, first: int, words: PlainWords, done: int) -> None:
-        """As `increments.read_numbers`, of all lines executed: the first of each form decides."""
-        state = self.state
-        if state.dialect.increments:
-            return
-        wanted = [form for form, known in ((BARE, state.bare), (POINTED, state.pointed)) if not known]
-        firsts = ([int(rows.argmax()) for rows in words.lengths(form, done) if rows.any()] for form in wanted)
-        for row in sorted({min(rows) + first for rows in firsts if rows}):
-            notice_lengths(state, row + 1, read_block(self.lines[row], row + 1, self.name).words)
 
 
 def _suits(state: State) -> bool:
@@ -76,3 +80,232 @@ def _suits(state: State) -> bool:
         and not frames.bound
         and not frames.rotated
     )
+
+
+class Lines:
+    """The words of lines in columns, and what they make of the state; the line `end` is left to the interpreter."""
+
+    def __init__(self, state: State, words: PlainWords) -> None:
+        self.state, self.words = state, words
+        self.n = self.end = len(words.code)
+        self.values = {letter: words.values[letter] for letter in LETTERS if letter in words.values}
+        self.given = {letter: words.forms[letter] != NONE for letter in self.values}
+        self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
+        for letter, values in self.values.items():
+            self._stop(np.abs(values) > (LARGEST_MM if letter in AXES else LARGEST_WORD))
+        if "S" in words.values:
+            self._stop(words.values["S"] > LARGEST_WORD)
+        if state.dialect.increments:
+            self._count_increments()
+
+    def _stop(self, where: BoolArray) -> None:
+        """Leave the first such line, and all after it, to the interpreter."""
+        if where.any():
+            self.end = min(self.end, int(np.argmax(where)))
+
+    def _count_increments(self) -> None:
+        for letter in self.values:
+            bare = (self.words.forms[letter] == BARE) & (self.values[letter] != 0.0)
+            unit = increment(letter in ANGLES, self.state.inch)
+            self.values[letter] = np.where(bare, self.values[letter] * unit, self.values[letter])
+            self.counted |= bare
+
+    def execute(self, first: int) -> int:
+        """Move; returns how many lines were executed. `first`: the first one's number, from 0."""
+        self._modes()
+        axes, centers = self._any(AXES), self._any(geometry.CENTER_LETTERS)
+        is_arc = self.mode >= CLOCKWISE
+        self._stop(~is_arc & centers)
+        self._stop((self.mode == NO_MODE) & axes)
+        arc = is_arc & (axes | centers | self.coded)
+        moving = (axes & (self.mode != NO_MODE)) | arc
+        self.cutting = moving & (self.mode != MODES["G0"])
+        self._feed_words()
+        self._stop(self._no_feed())
+        if not moving[: self.end].any():
+            return self._leave(None)
+        control = self._control()
+        start, end = self._set_up(control)
+        center, sweep = self._arcs(np.flatnonzero(arc[: self.end]), control)
+        done = slice(self.end)
+        self._record(first, (start[done], end[done]), (center[done], sweep[done]), moving[done])
+        return self._leave(control if moving[done].any() else None)
+
+    def _record(
+        self, first: int, ends: tuple[FloatArray, FloatArray], arc: tuple[FloatArray, FloatArray], moving: BoolArray
+    ) -> None:
+        """Hand over the moves of the lines that are done, those that go anywhere."""
+        state, (start, end), (center, sweep) = self.state, ends, arc
+        goes = np.logical_or.reduce([start[:, axis] != end[:, axis] for axis in range(6)])
+        rows = np.flatnonzero(moving & (goes | (sweep != 0.0)))
+        motion = np.where(sweep != 0.0, ARC, np.where(self.mode[: self.end] == MODES["G1"], FEED, RAPID))[rows]
+        vector = state.frames.turn_direction(geometry.normal_of(state.plane))
+        n = len(rows)
+        state.recorder.add_many(
+            Moves(
+                line=rows + (first + 1),
+                motion=motion,
+                start=start[rows],
+                end=end[rows],
+                arc_sweep=sweep[rows],
+                arc_center=center[rows],
+                arc_normal=np.where((motion == ARC)[:, None], vector, 0.0),
+                feed=np.where(motion == RAPID, math.nan, self._feeds(ends, arc)[rows]),
+                dwell=np.zeros(n),
+                tool=np.full(n, state.tool),
+                tool_length=np.full(n, state.tool_length),
+                from_machine=np.zeros((n, 2), dtype=bool),
+            )
+        )
+        if n:
+            note_tool(state)
+
+    def _modes(self) -> None:
+        """The motion mode of each line."""
+        self.coded = self.words.code != NO_CODE
+        before = MODES.get(self.state.motion or "", NO_MODE)
+        self.mode = np.concatenate([[before], self.words.code[self.coded]])[np.cumsum(self.coded)]
+
+    def _any(self, letters: str) -> BoolArray:
+        columns = [self.given[letter] for letter in letters if letter in self.given]
+        return np.asarray(np.logical_or.reduce([np.zeros(self.n, dtype=bool), *columns]))
+
+    def _feed_words(self) -> None:
+        """F in force on each line, and the line that set it (-1: a line before these)."""
+        state = self.state
+        has_feed, values, bare = np.zeros(self.n, dtype=bool), np.full(self.n, math.nan), np.zeros(self.n, dtype=bool)
+        for key in (FIRST_F, LAST_F):
+            if key in self.words.forms:
+                form = self.words.forms[key]
+                self._stop(has_feed & (form != NONE))  # a second one
+                values = np.where(has_feed, values, self.words.values[key])
+                has_feed, bare = has_feed | (form != NONE), bare | (form == BARE)
+        order = np.cumsum(has_feed)
+        self.feed_row = np.concatenate([[-1], np.flatnonzero(has_feed)])[order]
+        before = math.nan if state.feed is None else state.feed
+        self.feed = np.concatenate([[before], values[has_feed] * state.feed_scale])[order]
+        self._stop((self.feed < SLOWEST) | (self.feed > LARGEST_WORD))
+        if bare_feed_is_open(state):
+            self._stop(bare)
+
+    def _no_feed(self) -> BoolArray:
+        """Cutting lines without a feed."""
+        if self.state.feed_mode == "G94":
+            return np.asarray(self.cutting & np.isnan(self.feed))
+        rows = np.flatnonzero(self.cutting)  # G93: each needs its own
+        missing = np.zeros(self.n, dtype=bool)
+        used = np.concatenate([[-2], rows[:-1]])
+        missing[rows] = (self.feed_row[rows] <= used) | np.isnan(self.feed[rows])
+        return missing
+
+    def _control(self) -> FloatArray:
+        """(n + 1, 6) control coordinates before the first line and after each (`points.control_point`)."""
+        state, frames = self.state, self.state.frames
+        control = np.empty((self.n + 1, 6))
+        for axis, letter in enumerate(AXES):
+            here = frames.position[axis]
+            if letter not in self.values:
+                control[:, axis] = here
+                continue
+            scaled = self.values[letter] * (state.length_scale if letter in LINEAR else 1.0)
+            given = self.given[letter]
+            if state.absolute:
+                named = frames.axis_to_control(axis, scaled[given])
+                control[:, axis] = np.concatenate([[here], named])[np.append(0, np.cumsum(given))]
+            else:
+                control[:, axis] = np.cumsum(np.concatenate([[here], np.where(given, scaled, 0.0)]))
+        return control
+
+    def _set_up(self, control: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Set-up coordinates of each line's start and end; an axis that stands keeps its number (`motion.record`)."""
+        setup = control - np.array([*self.state.frames.fix_reference(), 0.0, 0.0, 0.0])
+        start, end = setup[:-1], setup[1:]
+        still = np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start))
+        return start, np.where(still, start, end)
+
+    def _arcs(self, rows: IntArray, control: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) centres in the set-up frame and (n,) sweeps, 0 but for these lines; the first unfit ends the run."""
+        state, frames = self.state, self.state.frames
+        center, sweep = np.zeros((self.n, 3)), np.zeros(self.n)
+        if not len(rows):
+            return center, sweep
+        first, second, normal = geometry.PLANES[state.plane]
+        centers = geometry.CENTER_LETTERS
+        letters = (AXES[first], AXES[second], centers[first], centers[second], "R", centers[normal])
+        nothing = np.full(self.n, math.nan)
+        words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters])
+        points = np.stack([frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
+        middles, sweeps = self._all_arcs(rows, points[:, [first, second]], words)
+        done = rows[: len(sweeps)]
+        points = points[: len(sweeps)]
+        points[:, [first, second]] = middles
+        setup = np.stack([frames.axis_to_control(axis, points[:, axis]) for axis in range(3)], axis=1)
+        center[done], sweep[done] = setup - np.array(frames.fix_reference()), sweeps
+        return center, sweep
+
+    def _all_arcs(self, rows: IntArray, start: FloatArray, words: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(m, 2) centres and (m,) sweeps of the first m of some lines; what is wrong with the next one ends the run.
+
+        `words` (6, n): X, Y, I, J of the plane, R and the offset off the plane, nan where there is none.
+        """
+        state, scale = self.state, self.state.length_scale
+        x, y, i, j, radius, off_plane = words
+        end = np.stack([x, y], axis=1) * scale
+        end = np.where(np.isnan(end), start, end if state.absolute else start + end)
+        center = start + np.stack([np.where(np.isnan(i), 0.0, i), np.where(np.isnan(j), 0.0, j)], axis=1) * scale
+        clockwise = self.mode[rows] == CLOCKWISE
+        sweep = geometry.arc_sweeps(start, end, center, clockwise)
+        by_radius, by_center = ~np.isnan(radius), ~(np.isnan(i) & np.isnan(j))
+        unfit = (np.abs(off_plane) > 0.0) | (by_radius == by_center) | (by_radius & np.isnan(x) & np.isnan(y))
+        clear = ~unfit & by_center & geometry.radii_clearly_agree(start, end, center, state.inch)
+        for row in np.flatnonzero(~clear).tolist():
+            (a, b), (c, d), turn = start[row].tolist(), end[row].tolist(), bool(clockwise[row])
+            try:
+                if unfit[row]:
+                    raise geometry.ArcError("words that do not fit", "")
+                if by_radius[row]:
+                    center[row] = geometry.center_from_radius((a, b), (c, d), float(radius[row]) * scale, turn)
+                e, f = center[row].tolist()
+                sweep[row] = geometry.sweep_about((e, f), (a, b), (c, d), turn, state.inch)
+            except geometry.ArcError:
+                self.end = int(rows[row])
+                return center[:row], sweep[:row]
+        return center, sweep
+
+    def _feeds(self, ends: tuple[FloatArray, FloatArray], arc: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Feed of each line's move (`feeds.feed_of_move`); rapids are none."""
+        (start, end), (center, sweep) = ends, arc
+        feed: FloatArray = self.feed[: self.end].copy()
+        if self.state.feed_mode == "G94":
+            standing = np.logical_and.reduce([start[:, axis] == end[:, axis] for axis in range(3)]) & (sweep == 0.0)
+            feed[standing] = rotary_feed(self.state, feed[standing])
+            return feed
+        normal = geometry.normal_of(self.state.plane)
+        for row in np.flatnonzero(self.cutting[: self.end]).tolist():
+            x, y, z = center[row].tolist()
+            move = Arc((x, y, z), normal, float(sweep[row])) if sweep[row] else None
+            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), move)
+        return feed
+
+    def _leave(self, control: FloatArray | None) -> int:
+        """Set the state as the lines executed leave it; their number."""
+        state, last = self.state, self.end - 1
+        if last < 0:
+            return 0
+        if state.dialect.increments and self.counted[: self.end].any():
+            assume_increments(state)
+        if "S" in self.words.forms:
+            speed_rows = np.flatnonzero(self.words.forms["S"][: self.end])
+            if len(speed_rows):
+                state.speed = float(self.words.values["S"][speed_rows[-1]])
+        if self.mode[last] != NO_MODE:
+            state.motion = MODE_NAMES[self.mode[last]]
+        if state.feed_mode == "G93":
+            used = self.cutting[max(int(self.feed_row[last]), 0) : self.end].any()
+            state.feed = None if used or math.isnan(self.feed[last]) else float(self.feed[last])
+        elif not math.isnan(self.feed[last]):
+            state.feed = float(self.feed[last])
+        if control is not None:
+            state.frames.position = control[self.end].tolist()
+            state.length_changed = state.rotation_changed = False
+        return self.end

@@ -1,13 +1,12 @@
 """An NC program or a cutter-location file, from file or text, to `ReadProgram`."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.codes.increments import increments_hint
+from toolpath_stiff.nc.codes.increments import point_warning
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.languages import foreign_program, looks_like_cutter_location, refused_program
@@ -15,7 +14,6 @@ from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
 from toolpath_stiff.nc.moves import RAPID, ReadProgram, Remark
-from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
@@ -172,7 +170,7 @@ def program_of(run: ProgramRun, request: Request, ending: Sequence[Remark]) -> R
             *warnings,
             *state.warnings,
             *lathe_warning(state.turning, moves),
-            *millimetre_warning(state, run.lines),
+            *point_warning(state, run.lines),
         ),
         assumptions=(START, *state.assumptions),
         tools=tuple(state.used_tools.values()),
@@ -201,23 +199,3 @@ def _with_feed(program: ReadProgram, request: Request) -> ReadProgram:
         return program
     assumed = f"cuts before the first feed of the program have {feed:g} mm/min, as asked for"
     return replace(program, assumptions=(*program.assumptions, assumed))
-
-
-_LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)
-_LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beginning
-
-
-def millimetre_warning(state: State, lines: Sequence[str]) -> list[Remark]:
-    """That numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
-
-    Where whole numbers are increments, posts end those in mm with their point.
-    """
-    hint = increments_hint(state)
-    if not hint:
-        return []
-    texts = (split_comments(line)[0] for line in lines[:_LOOKED_AT])
-    words = [word for text in texts for word in _LENGTHS.findall(text)]
-    whole = next((word for word in words if "." not in word and word.strip("XYZIJRxyzijr+-0 \t")), None)
-    if whole is None or not any("." in word for word in words) or any(word[-1] == "." for word in words):
-        return []
-    return [Remark(f"{whole} stands beside numbers with decimals, and none ends with its point: {hint}")]

@@ -208,8 +208,6 @@ class State:
         Tool centre point control, by the number of moves before it is switched (G43.4) on or off.
     unsupported, warnings, assumptions
         As in `Program`.
-    bare, pointed
-        The first length without a decimal point, with its line; whether any length ends with its point, as `X10.`.
     trace
         Each move of the current block, for whoever starts the list.
     corner
@@ -255,8 +253,6 @@ class State:
     unsupported: list[Unsupported] = field(default_factory=list)
     warnings: list[Remark] = field(default_factory=list)
     assumptions: list[str] = field(default_factory=list)
-    bare: tuple[int, Word] | None = None
-    pointed: bool = False
     trace: list[Segment] | None = None
     corner: Corner | None = None
     cutter: Cutter | None = None

@@ -1,9 +1,4 @@
-"""Lines to blocks, blocks to words. The only module that knows pygcode.
-
-pygcode 0.2.1 (unmaintained since 2017) fails on comments of both styles in one line, on `X+1` and on spaces inside
-words, drops the E of `1.5E2`, and ignores what it does not know. So comments, spaces, signs, exponents and N words are
-handled before it is called, each word keeps its true column, and every word that pygcode does not return is an error.
-"""
+"""Lines to blocks, blocks to words, each with its true column."""
 
 from __future__ import annotations
 
@@ -11,11 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal
 from typing import NamedTuple
-
-from pygcode.exceptions import GCodeWordStrError
-from pygcode.words import text2words
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.place import Place
@@ -24,17 +15,16 @@ NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
 WORD = re.compile(rf"([A-Z@^]|,[CR])({NUMBER})(E[+-]?\d++)?", re.ASCII)
 AXES = "XYZABC"
-POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
+POLAR = "@^"  # LinuxCNC's polar words
 CORNERS = (",C", ",R")  # chamfer and rounding of the corner to the next block (Fanuc, Haas)
-NOT_PYGCODES = (*POLAR, *CORNERS)
 LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *POLAR, *CORNERS))
 COMMENT = re.compile("[();]")
 EXPRESSION = re.compile(r"[#\[]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
-# Caps: longer is no block.
+# Longer is no block.
 LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
-LONGEST_NUMBER = 100  # characters
 MOST_DIGITS = 9  # of a program number, its O included
+NUMBERED = {"G": 1, "M": 1, "L": 0, "T": 0}  # decimals of words that number something
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
 
 
@@ -100,7 +90,8 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     if slash > 0:
         rest = len(words)
         words += _tokens(compact, columns, behind, text, place)
-    return Block(line, through_pygcode(words, place), optional=slash == 0, switch=switch, rest=rest)
+    check_numbers(words, place)
+    return Block(line, tuple(words), optional=slash == 0, switch=switch, rest=rest)
 
 
 def block_delete(compact: str, slash: int, columns: Sequence[int], place: Place) -> tuple[int, int]:
@@ -194,21 +185,16 @@ def _tokens(
             else:
                 number += exponent
         original = text[column - 1 : columns[end - 1]]
-        if end - position > 1 + LONGEST_NUMBER:
-            problem = f"a number of {end - position - 1} characters after {letter}"
-            raise place.fail(problem, f"at most {LONGEST_NUMBER}", column=column)
-        if letter == "N":
-            if words:
-                problem = f"line number {original!r} after another word"
-                raise place.fail(problem, "N at the beginning of the line", column=column)
-        elif letter not in LETTERS:
+        position, value = end, float(number)
+        if letter not in LETTERS:
             raise place.fail(f"word {original!r} is not known", column=column)
-        else:
-            value = float(number)
-            if not math.isfinite(value):
-                raise place.fail(f"{original!r} is not a finite number", column=column)
+        if not math.isfinite(value):
+            raise place.fail(f"{original!r} is not a finite number", column=column)
+        if letter != "N":
             words.append(Word(letter, value, column, original))
-        position = end
+        elif words:
+            problem = f"line number {original!r} after another word"
+            raise place.fail(problem, "N at the beginning of the line", column=column)
     return words
 
 
@@ -223,34 +209,12 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
     return place.fail(f"{compact[position : position + 12]!r} is not a word", "a letter and a number", column=column)
 
 
-def through_pygcode(words: Sequence[Word], place: Place) -> tuple[Word, ...]:
-    """Let pygcode read the normalised words; what it does not return exactly is an error."""
-    known = [word for word in words if word.letter not in NOT_PYGCODES]
-    returned: list[tuple[str, float]] = []
-    try:
-        for word in text2words(" ".join([_plain(word) for word in known])):
-            returned.append((word.letter, float(word.value)))
-    except (GCodeWordStrError, ValueError):
-        returned.append(("", math.nan))
-    for word, read in zip(known, [*returned, ("", math.nan)], strict=False):
-        if read != (word.letter, word.value):
-            raise place.fail(f"word {word.text!r} cannot be read", _expected(word.letter), column=word.column)
-    return tuple(words)
-
-
-def _plain(word: Word) -> str:
-    """The word as pygcode can read it: no plus, no exponent, whole numbers where it wants them."""
-    number = repr(word.value)
-    if "e" in number:
-        number = format(Decimal(number), "f")
-    if number.endswith(".0"):
-        number = number[:-2]
-    return word.letter + number
-
-
-def _expected(letter: str) -> str:
-    if letter in "GM":
-        return f"a code such as {letter}1 or {letter}59.3"
-    if letter in "LTN":
-        return "a whole number that is not negative"
-    return "a decimal number"
+def check_numbers(words: Sequence[Word], place: Place) -> None:
+    """Refuse numbers that no code, tool or count has."""
+    for letter, value, column, text in words:
+        decimals = NUMBERED.get(letter)
+        if decimals is not None and (value < 0.0 or value != round(value, decimals)):
+            expected = (
+                f"a code such as {letter}1 or {letter}59.3" if decimals else "a whole number that is not negative"
+            )
+            raise place.fail(f"word {text!r} cannot be read", expected, column=column)

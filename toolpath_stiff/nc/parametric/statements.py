@@ -21,8 +21,8 @@ from toolpath_stiff.nc.words import (
     Word,
     block_delete,
     check_length,
+    check_numbers,
     program_number,
-    through_pygcode,
     without_comments,
 )
 
@@ -241,7 +241,7 @@ def _contents(block: Scanner, text: str) -> tuple[list[tuple[str, Value | float,
         words.append((letter, value, column, written))
     # The numbers that codes and tools may have, as in any other program.
     plain_words = [Word(parts[0], parts[1], parts[2], parts[3]) for parts in words if isinstance(parts[1], float)]
-    through_pygcode(plain_words, block.place)
+    check_numbers(plain_words, block.place)
     return words, assignments
 
 
