@@ -183,7 +183,7 @@ def test_a_controller_file(tmp_path):
     assert read.moves.arc_center[1, :2] == pytest.approx([0.0, 0.005])
     assert read.moves.end[-1, 0] == pytest.approx(0.09)
     (tool,) = read.tools
-    assert (tool.number, tool.stick_out, tool.material, tool.remark) == (3, 0.04, "carbide", "end mill")
+    assert (tool.number, tool.stick_out, tool.material, tool.remark) == (3, 40.0, "carbide", "end mill")
     assert read.dialect.startswith("haas, changed")
     assert read_program(program, controller=read_controller(path, "linuxcnc")).dialect.startswith("linuxcnc, changed")
     with pytest.raises(InputError, match="without --write"):

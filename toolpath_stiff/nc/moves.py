@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
+from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.units import (
     Pose,
     deg_from_rad,
@@ -139,18 +140,6 @@ class Unsupported:
     reason: str
 
 
-@dataclass(frozen=True)
-class ToolUse:
-    """A tool of the tool table: number; length, diameter, stick-out in m (nan: not given); remark, material."""
-
-    number: int
-    length: float
-    diameter: float
-    remark: str = ""
-    stick_out: float = math.nan
-    material: str = ""
-
-
 @dataclass(frozen=True, repr=False)
 class ReadProgram:
     r"""A program that was read to its end.
@@ -173,7 +162,7 @@ class ReadProgram:
     unsupported, warnings, assumptions
         What was read but not acted upon; what should be checked; what was assumed; each one sentence.
     tools
-        The tools that the program used.
+        The tools that the program used, lengths in mm.
     interpreter
         Who read it: "builtin" or "linuxcnc".
     dialect
@@ -209,7 +198,7 @@ class ReadProgram:
     unsupported: tuple[Unsupported, ...] = ()
     warnings: tuple[Remark, ...] = ()
     assumptions: tuple[str, ...] = ()
-    tools: tuple[ToolUse, ...] = field(default=())
+    tools: tuple[ToolEntry, ...] = ()
     interpreter: str = "builtin"
     dialect: str = "generic"
     kinematics: str = ""

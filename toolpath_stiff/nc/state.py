@@ -14,7 +14,7 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.groups import Group
-from toolpath_stiff.nc.moves import Arc, Recorder, Remark, ToolUse, Unsupported
+from toolpath_stiff.nc.moves import Arc, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
 from toolpath_stiff.units import MM_PER_INCH
@@ -248,7 +248,7 @@ class State:
     rotation_changed: bool = False
     height_lost: bool = False
     recorder: Recorder = field(default_factory=Recorder)
-    used_tools: dict[int, ToolUse] = field(default_factory=dict)
+    used_tools: dict[int, ToolEntry] = field(default_factory=dict)
     tip_held: list[tuple[int, bool]] = field(default_factory=list)
     unsupported: list[Unsupported] = field(default_factory=list)
     warnings: list[Remark] = field(default_factory=list)

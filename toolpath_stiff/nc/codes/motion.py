@@ -6,6 +6,7 @@ is known.
 
 import math
 from collections.abc import Collection
+from dataclasses import replace
 
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import FANUC, Code, g_codes
@@ -74,7 +75,7 @@ def record(
 def note_tool(state: State) -> None:
     """Keep the tool in the spindle among those that moved."""
     if state.tool not in state.used_tools:
-        state.used_tools[state.tool] = tool_of(state.tools, state.tool).in_use()
+        state.used_tools[state.tool] = replace(tool_of(state.tools, state.tool))
 
 
 def find_height(state: State, block: CurrentBlock, motion: int, named: bool) -> None:

@@ -92,7 +92,7 @@ class _Session:
             unsupported=tuple(self._unsupported()),
             warnings=(*self._warnings(source, given), *lathe_warning(self._turning(), moves)),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),
-            tools=tuple(tool_of(request.controller.tools, number).in_use() for number in follower.used_tools),
+            tools=tuple(tool_of(request.controller.tools, number) for number in follower.used_tools),
             interpreter="linuxcnc",
             dialect="linuxcnc",
             jumps=tuple(follower.jumps),
