@@ -1,8 +1,9 @@
-"""Cutter compensation, saved modes, synchronised moves: by hand, by distance to the contour, and against rs274."""
+"""Cutter compensation: by hand, by distance to the contour, and against rs274."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ SQUARE = "G1 X0 Y-20\nX20\nY20\nX-20\nY-20\nX1\n"
 
 
 def read(text: str):
-    return parse_program(f"G21 G90 F600\n{text}\nM2\n", tools=TOOLS, controller=LINUXCNC)
+    return parse_program(f"G21 G90 F600\n{text}\nM2\n", controller=replace(LINUXCNC, tools=TOOLS))
 
 
 def ends(text: str) -> list[list[float]]:

@@ -9,6 +9,7 @@ import pytest
 
 from tests.nc.cutter_location import MM, START, read, refused
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.cutter_location.vocabulary import WORDS, table
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.tables import ToolEntry
@@ -68,7 +69,7 @@ def test_tools_lengths_and_pauses():
     np.testing.assert_allclose(program.moves.tool_length, [0.08, math.nan])
     assert program.moves.dwell[0] == pytest.approx(2.5)
     assert any("LENGTH of LOADTL" in text for text in program.assumptions)
-    tabled = read(text, tools={3: ToolEntry(3, 120.0, 6.0), 4: ToolEntry(4, 90.0)})
+    tabled = read(text, controller=Controller(tools={3: ToolEntry(3, 120.0, 6.0), 4: ToolEntry(4, 90.0)}))
     np.testing.assert_allclose(tabled.moves.tool_length, [0.12, 0.09])
     assert [tool.number for tool in tabled.tools] == [3, 4] and tabled.tools[0].diameter == pytest.approx(6.0)
 

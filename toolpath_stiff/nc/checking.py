@@ -10,7 +10,6 @@ from dataclasses import replace
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning
-from toolpath_stiff.nc.controller import plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
@@ -62,7 +61,7 @@ def check(request: Request) -> Checked:
     if looks_like_cutter_location(request.lines, request.name):
         return _check_cutter_location(request)
     ours = _check_built_in(request)
-    if request.interpreter == "builtin" or ours.complete or not plain(request.block_delete, request.controller):
+    if request.interpreter == "builtin" or ours.complete or not request.controller.plain:
         return ours
     theirs = _check_by_linuxcnc(replace(request, interpreter="linuxcnc"), may_lack=True)
     why = next(finding for finding in ours.findings if finding.severity == ERROR)

@@ -196,48 +196,23 @@ class Controller:
         """Whether LinuxCNC's interpreter reads numbers, switches and codes in the same way."""
         return self.dialect in (GENERIC, DIALECTS["linuxcnc"]) and self.switches in (frozenset(), ALL_SWITCHES)
 
+    def check_plain(self) -> None:
+        """Raise `InputError` if LinuxCNC's interpreter would read a program differently from the control."""
+        if not self.plain:
+            raise ProgramError(
+                f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {self.dialect.name!r}, "
+                "or it has single block-delete switches",
+                hint="use the built-in interpreter (--interpreter builtin)",
+            )
+
     @property
     def label(self) -> str:
         """The dialect's name, and whether a controller file changes it."""
         name = self.dialect.name
-        unchanged = self.dialect == DIALECTS[name] and not self.switches
-        return name if unchanged else f"{name}, changed by the controller file"
+        return name if self.dialect == DIALECTS[name] else f"{name}, changed by the controller file"
 
 
 UNKNOWN_CONTROL = Controller()
-Switches = bool | frozenset[int]  # block-delete switches that are on; True: all, False: those of the controller file
-
-
-def switches_on(block_delete: Switches, controller: Controller) -> frozenset[int]:
-    """The block-delete switches that are on: those asked for, else the controller file's.
-
-    Examples
-    --------
-    >>> switches_on(frozenset({1, 3}), UNKNOWN_CONTROL) == {1, 3}
-    True
-    >>> len(switches_on(True, UNKNOWN_CONTROL))
-    9
-    """
-    if isinstance(block_delete, bool):
-        return ALL_SWITCHES if block_delete else controller.switches
-    if not block_delete <= ALL_SWITCHES:
-        raise ProgramError(f"block-delete switches {sorted(block_delete)}", expected="1 to 9")
-    return block_delete
-
-
-def plain(block_delete: Switches, controller: Controller) -> bool:
-    """Whether LinuxCNC's interpreter would read the program as the control does: it has one switch and its dialect."""
-    return controller.plain and switches_on(block_delete, controller) in (frozenset(), ALL_SWITCHES)
-
-
-def check_plain(block_delete: Switches, controller: Controller) -> None:
-    """Raise `InputError` if LinuxCNC's interpreter would read the program differently from the control."""
-    if not plain(block_delete, controller):
-        raise ProgramError(
-            f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {controller.dialect.name!r}, "
-            "or it has single block-delete switches",
-            hint="use the built-in interpreter (--interpreter builtin)",
-        )
 
 
 def read_controller(path: str | Path, dialect: str | None = None) -> Controller:

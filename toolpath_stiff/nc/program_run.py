@@ -109,7 +109,7 @@ class ProgramRun:
     def __init__(self, request: Request, tally: Tally | None = None, fast: bool = True) -> None:
         state, lines, name = request.start(), request.lines, request.name
         self.state, self.lines, self.name = state, without_label(state, lines), name
-        self.switches, self.tally = request.switches, tally
+        self.switches, self.tally = request.controller.switches, tally
         self._plain = PlainRun(state, lines, name) if fast else None
         self._levels: list[Subprogram] = []
         self._programs: dict[int, int] | None = None
