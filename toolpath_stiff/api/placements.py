@@ -167,7 +167,7 @@ def _rewriting(
 
     if write is not None:
         chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-        return Rewriting(str(write), decimals, chord, part.tables)
+        return Rewriting(str(write), decimals, chord, part.request.controller)
     if decimals is not None or linearise_mm is not None:
         option = "decimals" if decimals is not None else "linearise"
         raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
@@ -309,4 +309,4 @@ def rewrite(
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, control=part.tables)
+    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, control=part.request.controller)

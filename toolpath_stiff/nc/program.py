@@ -189,12 +189,6 @@ class Program:
         return read_lines(self.file) if self.file is not None else split_lines(self.text or "", self.name)
 
     @property
-    def tables(self) -> Controller:
-        """Offsets, tools and block-delete switches of its control: what is known where its blocks are written anew."""
-        control = self.request.controller
-        return Controller(offsets=control.offsets, tools=control.tools, switches=control.switches)
-
-    @property
     def words(self) -> list[str]:
         """The options of a command that say how it is read."""
         return options(**self.given)
