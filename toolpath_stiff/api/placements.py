@@ -309,4 +309,6 @@ def rewrite(
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, control=part.request.controller)
+    return rewrite_program(
+        part.moves(new), new, old, decimals=decimals, linearise=chord, control=part.request.controller
+    )

@@ -102,8 +102,8 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
     if name in REFUSED:
         raise block.fail(word, f"is {REFUSED[name].what}, which is not supported", hint=REFUSED[name].hint)
     code = CODES.get(name)
-    if code is None and word.letter == "G":
-        raise block.fail(word, "is not a G code that is known", hint="check the program, or post it without it")
+    unknown = code is None and word.letter == "G"
+    block.refuse_if(unknown, word, "is not a G code that is known", hint="check the program, or post it without it")
     if code is None:  # it may run anything, a change of kinematics included; its parameters go with it
         state.note(block.line, word, "an M code of one control, not acted upon")
         state.warnings.append(Remark(f"what {word.text} does on its control is not known", block.line))
@@ -111,16 +111,15 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
             if other.letter in "PQE":
                 state.note(block.line, other, f"parameter of {word.text}")
         return
-    if code.listed and word.letter == "G" and dialect.name not in code.controls:
-        raise block.fail(word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls))
+    foreign = code.listed and word.letter == "G" and dialect.name not in code.controls
+    block.refuse_if(foreign, word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls))
     if code.listed:
         state.note(block.line, word, code.listed)
     before = block.groups.get(code.group)
     # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
     if before is not None and (before == name or "G80" not in (before, name)):
-        problem = (
-            f"and {before} are both of the modal group {code.group.removeprefix('M ')!r}, or act once in their block"
-        )
+        group = code.group.removeprefix("M ")
+        problem = f"and {before} are both of the modal group {group!r}, or act once in their block"
         raise block.fail(word, problem, "one of them in a block")
     if before is None or name != "G80":
         block.groups[code.group] = name
@@ -155,10 +154,10 @@ def _move(state: State, block: CurrentBlock) -> None:
     instead = once if once is not None and CODES[once].when == "motion" else None  # G53
     if state.motion is None:
         for letter in POINT_WORDS:
-            if block.has(letter):
-                raise block.fail(letter, "has no motion mode to move in", "G0, G1, G2, G3 or a cycle before it")
-        if instead is not None:
-            raise block.fail(instead, "without G0 or G1")
+            block.refuse_if(
+                block.has(letter), letter, "has no motion mode to move in", "G0, G1, G2, G3 or a cycle before it"
+            )
+        block.refuse_if(instead is not None, instead, "without G0 or G1")
     else:
         mode = instead or state.motion
         CODES[mode].act(state, block, mode)

@@ -119,14 +119,21 @@ class CurrentBlock:
         """A word with the number as written, before the decimal-point rule."""
         return next(word for word in self.block.words if word.letter == letter)
 
-    def whole(self, letter: str, word: Word) -> int | None:
-        """The count that a word beside a code gives, taken; None without it. Raises `InputError`."""
+    def whole(self, letter: str, word: Word, least: int = 1) -> int | None:
+        """The whole number that a word beside a code gives, taken; None without it. Raises `InputError`."""
         value = self.take(letter)
         if value is None:
             return None
-        if value != int(value) or value < 1:
-            raise self.fail(self.values[letter], f"beside {word.text} is not a count", "a whole number from 1")
+        if value != int(value) or value < least:
+            raise self.fail(self.values[letter], f"beside {word.text} is not a count", f"a whole number from {least}")
         return int(value)
+
+    def refuse_if(
+        self, wrong: object, culprit: Word | str | None, problem: str, expected: str = "", hint: str = ""
+    ) -> None:
+        """Raise the error of `fail` where something is wrong."""
+        if wrong:
+            raise self.fail(culprit, problem, expected, hint)
 
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block (or that of a code or letter), or at the block."""

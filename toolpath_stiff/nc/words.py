@@ -202,8 +202,7 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
     """The error for text that is not a word."""
     character, follower = compact[position], compact[position + 1 : position + 3].lstrip("+-")[:1]
     if character == "%":
-        hint = "take the name behind it away; a Fanuc's number is read past with --dialect fanuc"
-        return place.fail("`%` among other words", "`%` alone on its line", hint, column)
+        return place.fail("`%` among other words", "`%` alone on its line", "take the name behind it away", column)
     if character in LETTERS and (not follower or follower in LETTERS or follower == "/"):
         return place.fail(f"the word {character!r} has no number", f"a number after {character}", column=column)
     return place.fail(f"{compact[position : position + 12]!r} is not a word", "a letter and a number", column=column)

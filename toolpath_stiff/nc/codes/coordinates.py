@@ -28,16 +28,17 @@ def work_offset(state: State, block: CurrentBlock, code: str) -> None:
 
 def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
     """G54.1 P and G154 P: an additional offset; the controller file or G10 must have defined it."""
-    if code not in state.dialect.additional:
-        known = f"{' or '.join(state.dialect.additional)} P" if state.dialect.additional else "G54 to G59.3"
-        raise block.fail(code, f"is not a code of the dialect {state.dialect.name}", known)
+    block.refuse_if(
+        code not in state.dialect.additional, code, f"is not a code of the dialect {state.dialect.name}", "G54 to G59.3"
+    )
     _take_additional(state, block, block.codes[code], code, block.whole("P", block.codes[code]))
 
 
 def numbered_offset(state: State, block: CurrentBlock, code: str) -> None:
     """G110 to G129: Haas' older names of G154 P1 to P20."""
-    if state.dialect.name != "haas":
-        raise block.fail(code, "is a work offset of Haas' controls", hint="name the control with --dialect")
+    block.refuse_if(
+        state.dialect.name != "haas", code, "is a work offset of Haas' controls", hint="name the control with --dialect"
+    )
     _take_additional(state, block, block.codes[code], "G154", int(code[1:]) - FIRST_NUMBERED + 1)
 
 
@@ -91,13 +92,12 @@ def set_offsets(state: State, block: CurrentBlock, code: str) -> None:
 def _set_offset(state: State, block: CurrentBlock, code: str, number: int, from_here: bool) -> None:
     """L2, L20: the numbers of an offset, or of the present point in it."""
     frames = state.frames
-    if number == 0 and frames.active >= len(WORK_OFFSETS):
-        raise block.fail(code, "P0 while an additional offset is in force", "P1 to P9")
+    additional = frames.active >= len(WORK_OFFSETS)
+    block.refuse_if(number == 0 and additional, code, "P0 while an additional offset is in force", "P1 to P9")
     active, index = frames.active, frames.active if number == 0 else number - 1
     offset, rotation = frames.offsets.table[index], block.take("R")
     if rotation is not None:
-        if from_here:
-            raise block.fail("R", "does not go with L20", "L2")
+        block.refuse_if(from_here, "R", "does not go with L20", "L2")
         if index == active and rotation != offset.rotation:
             state.unsettled = "G10"
         offset.rotation = rotation
@@ -121,8 +121,7 @@ def _set_fanuc_offset(state: State, block: CurrentBlock, code: str, number: int,
 
     Sources: Fanuc's operator's manuals ("Programmable data input"), Haas' mill operator's manual (G10).
     """
-    if not state.absolute:
-        raise block.fail(code, "in incremental mode (G91), where it adds", "G90")
+    block.refuse_if(not state.absolute, code, "in incremental mode (G91), where it adds", "G90")
     offsets, words = state.frames.offsets, axis_words(state, block)
     offset = offsets.additional.setdefault(number, WorkOffset()) if additional else offsets.table[number - 1]
     offset.axes[:] = [words.get(axis, value) for axis, value in enumerate(offset.axes)]
@@ -139,8 +138,7 @@ def _set_tool(state: State, block: CurrentBlock, code: str, number: int) -> None
             raise block.fail(code, "L10 without the length, or in incremental mode (G91), where it adds", "R, in G90")
         tool.length = radius * state.length_scale
         return
-    if words.keys() - {2}:
-        raise block.fail(code, "sets other tool offsets than Z", "Z, the tool's length")
+    block.refuse_if(words.keys() - {2}, code, "sets other tool offsets than Z", "Z, the tool's length")
     tool.length = words.get(2, tool.length)
     tool.diameter = tool.diameter if radius is None else 2.0 * radius * state.length_scale
 
@@ -155,8 +153,7 @@ def shift(state: State, block: CurrentBlock, code: str) -> None:
     frames = state.frames
     if code in ("G52", "G92"):
         words = axis_words(state, block)
-        if not words:
-            raise block.fail(code, "without axis words", "X, Y, Z, A, B or C")
+        block.refuse_if(not words, code, "without axis words", "X, Y, Z, A, B or C")
         if code == "G92":
             know_position(state, block, block.codes[code], words)
             here = frames.to_program(frames.position)
@@ -187,14 +184,13 @@ def rotation(state: State, block: CurrentBlock, code: str) -> None:
 
 def _rotation_of(state: State, block: CurrentBlock, word: Word, here: list[float]) -> Rotation:
     present, angle = state.frames.rotation, block.take("R")
-    if state.plane != "G17" or any(block.has(letter) for letter in "ZABCIJK"):
-        problem = f"in the plane {state.plane}, or in space (Z, A, B, C, I, J, K), which is not supported"
-        raise block.fail(word, problem, "G68 X Y R in G17")
+    elsewhere = state.plane != "G17" or any(block.has(letter) for letter in "ZABCIJK")
+    block.refuse_if(elsewhere, word, "outside of G17, or beside Z, A, B, C, I, J, K", "G68 X Y R in G17")
     if angle is None:
         raise block.fail(word, "without its angle, which is then a parameter of the control", "R in degrees")
-    if not state.absolute and present is not None:
-        problem = "in incremental mode (G91) under a rotation: a parameter of the control says whether R adds"
-        raise block.fail(word, problem, "G90, or G69 before it")
+    block.refuse_if(
+        not state.absolute and present is not None, word, "in G91 under a rotation, where R may add", "G69 before it"
+    )
     center = axis_words(state, block)
     if present is not None and not center:
         return (present[0], present[1], angle)

@@ -16,13 +16,15 @@ from toolpath_stiff.nc.words import CORNERS
 def corner(state: State, block: CurrentBlock, code: str) -> None:
     """`,C` and `,R`: the corner to the next block is cut off or rounded."""
     word, size, recent = block.values[code], block.take(code) or 0.0, state.recorder.recent
-    if state.dialect.name == "linuxcnc":
-        raise block.fail(word, "is not a word of the dialect linuxcnc", "generic, fanuc or haas")
-    if size <= 0.0:
-        raise block.fail(word, "is the size of a corner", "more than 0")
+    block.refuse_if(
+        state.dialect.name == "linuxcnc", word, "is not a word of the dialect linuxcnc", "generic, fanuc or haas"
+    )
+    block.refuse_if(size <= 0.0, word, "is the size of a corner", "more than 0")
     after_feed = recent and recent[-1].line == block.line and recent[-1].motion == FEED
-    if not after_feed or len(block.values.keys() & {*CORNERS}) > 1 or state.feed_mode == "G93":
-        raise block.fail(word, "beside another corner, under G93, or without a feed move", "one corner beside a G1")
+    alone = after_feed and len(block.values.keys() & {*CORNERS}) == 1 and state.feed_mode != "G93"
+    block.refuse_if(
+        not alone, word, "beside another corner, under G93, or without a feed move", "one corner beside a G1"
+    )
     state.corner = Corner(code, size * state.length_scale, block.line)
 
 
@@ -31,9 +33,8 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     pending, frames, before = state.corner, state.frames, state.recorder.recent[-1]
     assert pending is not None
     harmless = {"motion", "distance", *(group for group in block.groups if group.startswith("M "))}
-    if block.groups.keys() - harmless or before.dwell:
-        problem = f"the second move of a corner ({pending.letter}, line {pending.line}) beside other codes"
-        raise block.fail(None, problem, "G1")
+    others = block.groups.keys() - harmless or before.dwell
+    block.refuse_if(others, None, f"the second move of the corner of line {pending.line} beside other codes", "G1")
     state.corner = None
     begin, vertex, end = before.start, frames.to_setup(frames.position), frames.to_setup(target)
     normal = frames.turn_direction(geometry.normal_of(state.plane))

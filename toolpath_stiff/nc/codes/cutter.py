@@ -35,15 +35,17 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
     """G41, G42 D: the tool is left or right of the contour, by the diameter in the tool table; D of G41.1 is it."""
     word, frames = block.codes[code], state.frames
     straight = state.dialect.increments  # Fanuc, Haas
-    if state.dialect.name == "generic" or (straight and code.endswith(".1")):
-        raise block.fail(word, f"is {OTHER_CONTROLS}", hint=NAME_CONTROL)
+    unknown = state.dialect.name == "generic" or (straight and code.endswith(".1"))
+    block.refuse_if(unknown, word, f"is {OTHER_CONTROLS}", hint=NAME_CONTROL)
     _check_codes(state, block, ("plane", "units", "M tool change"))
     turned = frames.rotation is not None or state.polar is not None or frames.tip_held
-    if state.cutter is not None or state.plane == "G19" or turned:
-        problem = "while cutter compensation is on, in the plane G19, or under G68, G16 or G43.4"
-        raise block.fail(word, problem, "G40, G17 or G18, G69, G15 and G49 before it")
-    if straight and "D" not in block.values:
-        raise block.fail(word, "without D, whose last value the control would take", "D with the tool's number")
+    block.refuse_if(state.cutter is not None, word, "while cutter compensation is on", "G40 in a block before it")
+    block.refuse_if(
+        state.plane == "G19" or turned, word, "in G19, or under G68, G16 or G43.4", "G17, G69, G15, G49 first"
+    )
+    block.refuse_if(
+        straight and "D" not in block.values, word, "without D, whose last value the control would take", "D"
+    )
     if straight and block.values["D"].value == 0:  # no offset: the programmed path is the tool centre's
         block.take("D")
         return
@@ -57,16 +59,15 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
 
 def _diameter(state: State, block: CurrentBlock, code: str) -> float:
     """Diameter that G41, G42 name: D is a tool's number, in G41.1 and G42.1 the diameter."""
-    word, number = block.codes[code], block.take("D")
+    word = block.codes[code]
     if code.endswith(".1"):
-        if number is None:
+        diameter = block.take("D")
+        if diameter is None:
             raise block.fail(word, "without the diameter", "D")
-        return number * state.length_scale
-    if number is not None and (number < 0 or number != int(number)):
-        raise block.fail("D", "is not the number of a tool", "a whole number")
-    if not number and state.renamed:
-        raise block.fail(word, "of the tool in the spindle after M61", f"D{state.tool}")
-    tool = int(number) if number else state.tool  # D0: of the tool in the spindle
+        return diameter * state.length_scale
+    number = block.whole("D", word, 0)
+    block.refuse_if(not number and state.renamed, word, "of the tool in the spindle after M61", f"D{state.tool}")
+    tool = number or state.tool  # D0: of the tool in the spindle
     entry = (state.tools or {}).get(tool)
     if entry is None or math.isnan(entry.diameter):
         hint = "give it in a tool table (--tools FILE), or G41.1 D"
@@ -79,8 +80,7 @@ def switch_off(state: State, block: CurrentBlock, code: str) -> None:
     cutter, state.cutter, frames = state.cutter, None, state.frames
     if cutter is None or cutter.position is None:
         return
-    if cutter.entering:
-        raise block.fail(code, "right after the first move of cutter compensation", "a contour between")
+    block.refuse_if(cutter.entering, code, "right after the first move of cutter compensation", "a contour between")
     try:
         _settle(state, cutter, cutter.center)
     except ArcError as error:
@@ -99,11 +99,10 @@ def _check_codes(state: State, block: CurrentBlock, also: tuple[str, ...]) -> No
     # A stop ends the move before it, without a corner.
     harmless = (state.plane, "G20" if state.inch else "G21", "G4", "M2", "M30", *MOTIONS)
     for group, name in block.groups.items():
-        if name not in harmless and (group == "motion" or group not in GROUPS | {*also}):
-            raise block.fail(name, "while cutter compensation is on (G41, G42)", "G40 in a block before it")
+        wrong = name not in harmless and (group == "motion" or group not in GROUPS | {*also})
+        block.refuse_if(wrong, name, "while cutter compensation is on (G41, G42)", "G40 in a block before it")
     polar = next((letter for letter in "@^" if block.has(letter)), None)
-    if polar is not None:
-        raise block.fail(polar, "while cutter compensation is on", "X and Y")
+    block.refuse_if(polar is not None, polar, "while cutter compensation is on", "X and Y")
 
 
 def offset_move(state: State, cutter: Cutter, move: Move, control: list[float]) -> bool:

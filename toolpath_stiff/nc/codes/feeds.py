@@ -25,15 +25,11 @@ def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
 def feed_word(state: State, block: CurrentBlock, code: str) -> None:
     """F: the feed from here on; F0 takes it away."""
     feed, word = block.take("F") or 0.0, block.values["F"]
-    if feed < 0.0 or 0.0 < feed * state.feed_scale < SLOWEST:
-        raise block.fail(word, "is no feed that moves", "F above 0, a nanometre a minute or more")
-    if "." not in word.text and feed and bare_feed_is_open(state):
-        units = "inch" if state.inch else "mm"
-        raise block.fail(
-            word,
-            f"without a decimal point is a feed that depends on the control's parameters ({state.dialect.name})",
-            f"{word.text}. if it is that many {units} per {'revolution' if state.feed_mode == 'G95' else 'minute'}",
-        )
+    slow = feed < 0.0 or 0.0 < feed * state.feed_scale < SLOWEST
+    block.refuse_if(slow, word, "is no feed that moves", "F above 0, a nanometre a minute or more")
+    bare = "." not in word.text and feed and bare_feed_is_open(state)
+    problem = f"without a decimal point depends on the control's parameters ({state.dialect.name})"
+    block.refuse_if(bare, word, problem, f"{word.text}. if it is that many units")
     state.feed = feed * state.feed_scale or None
 
 
@@ -50,8 +46,7 @@ def speed_word(state: State, block: CurrentBlock, code: str) -> None:
     if dwells_by(state, block) == "S":
         return
     state.speed = block.take("S") or 0.0
-    if state.speed < 0.0:
-        raise block.fail("S", "is a negative speed", "S of 0 or more")
+    block.refuse_if(state.speed < 0.0, "S", "is a negative speed", "S of 0 or more")
 
 
 def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
@@ -64,8 +59,7 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
     """Feed of a move in mm/min, or deg/min for one of the rotary axes alone."""
     if state.feed is None:
         word = next((word for word in block.block.words if word.letter == "G"), block.block.words[0])
-        if state.feed_mode == "G93":
-            raise block.fail(word, "is a feed move without F under G93", "F above 0")
+        block.refuse_if(state.feed_mode == "G93", word, "is a feed move without F under G93", "F above 0")
         hint = f", or {both_names('--feed', 'MM_PER_MIN')} for such moves" if state.feed_mode == "G94" else ""
         raise block.fail(word, "is a feed move before any feed", f"F above 0{hint}")
     if state.feed_mode == "G93":
@@ -115,13 +109,9 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
         seconds = 0.0
     if state.dialect.name == GENERIC.name and letter in ("X", "S"):
         word = block.values[letter]
-        if letter == "X" and ("." not in word.text or any(block.has(axis) for axis in POINT_WORDS)):
-            raise block.fail(
-                word,
-                "beside G4 is not certainly a time: without a point it counts milliseconds on Fanuc's controls",
-                f"{word.text.rstrip('.')}. alone, for seconds",
-                "name the control with --dialect",
-            )
+        doubtful = letter == "X" and ("." not in word.text or any(block.has(axis) for axis in POINT_WORDS))
+        expected = f"{word.text.rstrip('.')}. alone, for seconds"
+        block.refuse_if(doubtful, word, "beside G4 may count milliseconds", expected, "name the control with --dialect")
         state.assume(f"the {letter} of G4 is a time in seconds, as {'Fanuc' if letter == 'X' else 'Marlin'} means it")
     if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
         raise block.fail(code, "needs its time", "P with the seconds, 0 or more")
@@ -136,8 +126,8 @@ def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
     written = block.as_written(letter)
     if "." not in written.text:
         return written.value / 1e3
-    if letter == "P" and state.dialect.dwell == MILLISECONDS:
-        raise block.fail(written, f"has a decimal point, which {state.dialect.name} does not allow", "milliseconds")
+    whole = letter == "P" and state.dialect.dwell == MILLISECONDS
+    block.refuse_if(whole, written, f"has a decimal point, which {state.dialect.name} does not allow", "milliseconds")
     return value
 
 

@@ -29,8 +29,8 @@ def read_numbers(state: State, block: CurrentBlock) -> None:
     """Give the block's words their values in program units, by the dialect's decimal-point rule."""
     if not state.dialect.increments:
         return
-    # Q may be a number of something else: G5.1 Q1, M61 Q5, M98 Q5.
-    counts = "Q" if "look-ahead" in block.groups or not {"M61", "M98"}.isdisjoint(block.codes) else ""
+    # Q may be a number of something else: G5.1 Q1, M61 Q5.
+    counts = "Q" if "look-ahead" in block.groups or "M61" in block.codes else ""
     words = [word for letter, word in block.values.items() if letter not in counts]
     inch = block.groups.get("units", "G20" if state.inch else "G21") == "G20"
     angles = set(ANGLES)

@@ -10,9 +10,7 @@ from toolpath_stiff.nc.state import CurrentBlock, State
 def units(state: State, block: CurrentBlock, code: str) -> None:
     """G20: lengths and feeds in inches; G21: in millimetres."""
     inch = code == "G20"
-    if inch != state.inch and state.frames.tool:
-        problem = "while a tool length is in force: LinuxCNC would read its number in the new unit"
-        raise block.fail(code, problem, "G49 before it")
+    block.refuse_if(inch != state.inch and state.frames.tool, code, "while a tool length is in force", "G49 before it")
     state.inch = inch
 
 

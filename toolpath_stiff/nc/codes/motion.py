@@ -129,8 +129,7 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
     target = destination(state, block, here, words)
     start, end = (here[first], here[second]), (target[first], target[second])
     turns = block.whole("P", block.block.words[0]) or 1
-    if turns > MOST_TURNS:
-        raise block.fail("P", "is not a number of turns", f"a whole number from 1 to {MOST_TURNS}")
+    block.refuse_if(turns > MOST_TURNS, "P", "is not a number of turns", f"a whole number from 1 to {MOST_TURNS}")
     center = _center(state, block, start, end, clockwise, words)
     sweep = geometry.sweep_about(center, start, end, clockwise, state.inch, turns)
     middle = list(here)
@@ -150,14 +149,12 @@ def _center(
     in_plane = (geometry.CENTER_WORDS[first], geometry.CENTER_WORDS[second])
     if block.has(off_plane) and block.values[off_plane].value == 0.0:
         block.take(off_plane)  # posts write all three
-    if block.has(off_plane):
-        raise block.fail(off_plane, f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
+    block.refuse_if(block.has(off_plane), off_plane, f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
     offsets = [block.take(letter) for letter in in_plane]
     if state.polar is not None and offsets != [None, None]:
         raise ArcError("an arc with I, J or K in polar mode (G16)", "R")
     if radius is not None:
-        if offsets != [None, None]:
-            raise block.fail("R", "and a centre (I, J, K) are both given", "one of them")
+        block.refuse_if(offsets != [None, None], "R", "and a centre (I, J, K) are both given", "one of them")
         if not {first, second} & words.keys():
             raise ArcError("an arc with R and without an end point", "an axis word of the plane")
         return geometry.center_from_radius(start, end, radius * state.length_scale, clockwise)
@@ -176,11 +173,11 @@ def motion_off(state: State, block: CurrentBlock, code: str) -> None:
 def machine_move(state: State, block: CurrentBlock, code: str) -> None:
     """G53: the axis words are machine coordinates, for this block only."""
     word, frames = block.codes[code], state.frames
-    if state.motion not in ("G0", "G1") or not state.absolute:
-        raise block.fail(word, f"with {state.motion}, or in incremental mode (G91)", "G0 or G1, in G90")
+    straight = state.motion in ("G0", "G1") and state.absolute
+    block.refuse_if(not straight, word, f"with {state.motion}, or in incremental mode (G91)", "G0 or G1, in G90")
     words = axis_words(state, block)
-    if any(axis > 2 for axis in words) and any(frames.origin[3:]):
-        raise block.fail(word, "with rotary axes, while the work is turned", "X, Y, Z alone")
+    turned = any(axis > 2 for axis in words) and any(frames.origin[3:])
+    block.refuse_if(turned, word, "with rotary axes, while the work is turned", "X, Y, Z alone")
     if words:
         _leave_program_coordinates(state, block, word, words)
     point = frames.machine_position()
@@ -227,8 +224,7 @@ def set_home(state: State, block: CurrentBlock, code: str) -> None:
 
 def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, axes: Collection[int]) -> None:
     """A move of `axes` (none: all) by machine coordinates: harmless under G68 only off the rotated plane."""
-    if state.frames.tip_held:
-        raise block.fail(word, "while tool centre point control is on (G43.4)", "G49 before it")
+    block.refuse_if(state.frames.tip_held, word, "while tool centre point control is on (G43.4)", "G49 before it")
     both = not axes or set(axes) >= XY
     if not both:
         know_place(state, block, word)

@@ -29,8 +29,8 @@ def take_words(state: State, block: CurrentBlock, code: str) -> None:
     """G61, G64 P Q: tolerances; G5 P, G5.1 Q, G8 P, G103 P, G187 P E: look-ahead; G22, G25, G26: zones, the spindle."""
     taken = TAKEN[code]
     letters = {word.letter for word in block.block.words} - {*"GMFST"}
-    if code in SPLINES and (letters - {*taken} or not letters):
-        raise block.fail(code, "is a spline, which is not supported", hint="post the program with arcs and lines")
+    spline = code in SPLINES and (letters - {*taken} or not letters)
+    block.refuse_if(spline, code, "is a spline, which is not supported", hint="post the program with arcs and lines")
     for letter in taken:
         if block.take(letter) is not None and code == "G8":  # alone it is a mode of lathes that holds anyway
             state.note(block.line, block.codes[code], _PLANNING)
@@ -39,9 +39,7 @@ def take_words(state: State, block: CurrentBlock, code: str) -> None:
 def scaling_off(state: State, block: CurrentBlock, code: str) -> None:
     """G50 alone; with S or axis words it is a lathe's."""
     letter = next((letter for letter in "SXYZUVW" if letter in block.values), None)
-    if letter is not None:
-        problem = f"with {letter} is a lathe's code (the limit of its speed, or a shift), and a lathe's X is a diameter"
-        raise block.fail(code, problem, hint=LATHE_HINT)
+    block.refuse_if(letter, code, f"with {letter} is a lathe's code, and a lathe's X is a diameter", hint=LATHE_HINT)
 
 
 def dynamic_offset(state: State, block: CurrentBlock, code: str) -> None:

@@ -77,9 +77,9 @@ def _at_radius_and_angle(state: State, block: CurrentBlock) -> dict[int, float]:
     """LinuxCNC's polar words: @ the radius, ^ the angle about the program zero, of the XY plane."""
     word = block.values["@" if block.has("@") else "^"]
     turned = state.polar is not None or state.unsettled or state.frames.rotation is not None
-    if state.dialect.increments or state.plane != "G17" or turned or block.has("X") or block.has("Y"):
-        problem = "is a polar word of LinuxCNC's, beside X or Y, outside of G17, or under G16 or a rotation"
-        raise block.fail(word, problem, "X and Y, or G16")
+    elsewhere = state.dialect.increments or state.plane != "G17" or turned or block.has("X") or block.has("Y")
+    problem = "is a polar word of LinuxCNC's, beside X or Y, outside of G17, or under G16 or a rotation"
+    block.refuse_if(elsewhere, word, problem, "X and Y, or G16")
     block.polar_words = (word, block.take("@"), block.take("^"))
     return xy_of_polar_words(state, block)
 
@@ -93,8 +93,8 @@ def xy_of_polar_words(state: State, block: CurrentBlock) -> dict[int, float]:
     word, radius, angle = block.polar_words
     here = state.frames.to_program(state.frames.position)
     present, turn = math.hypot(here[0], here[1]), math.atan2(here[1], here[0])
-    if present < SAME_PLACE_MM and (radius is None or angle is None or not state.absolute):
-        raise block.fail(word, "counts from the present point, which is the program zero", "both @ and ^, in G90")
+    at_zero = present < SAME_PLACE_MM and (radius is None or angle is None or not state.absolute)
+    block.refuse_if(at_zero, word, "counts from the present point, which is the program zero", "both @ and ^, in G90")
     if radius is not None:
         present = radius * state.length_scale + (0.0 if state.absolute else present)
     if angle is not None:
@@ -108,14 +108,14 @@ def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle:
     polar, letter = state.polar, AXES[PLANES[state.plane][0 if radius is not None else 1]]
     assert polar is not None
     if radius is not None:
-        if not state.absolute:
-            problem = "is a polar radius in incremental mode (G91)"
-            raise block.fail(letter, problem, "G90; the angle alone may be in G91")
+        block.refuse_if(not state.absolute, letter, "is a polar radius in incremental mode (G91)", "G90 before it")
         polar[0] = radius
     if angle is not None:
         polar[1] = angle if state.absolute else polar[1] + angle
-    if math.isnan(polar[0]) or math.isnan(polar[1]):
-        raise block.fail(letter, "is half of a polar point, and nothing before it gives the other half", "both, in G90")
+    half = math.isnan(polar[0]) or math.isnan(polar[1])
+    block.refuse_if(
+        half, letter, "is half of a polar point, and nothing before it gives the other half", "both, in G90"
+    )
     state.unsettled = None
     turn = math.radians(polar[1])
     return (polar[0] * math.cos(turn), polar[0] * math.sin(turn))
@@ -129,14 +129,16 @@ def forget_polar(state: State) -> None:
 
 def refuse_while_rotated(state: State, block: CurrentBlock, word: Word | str, what: str) -> None:
     """Refuse what Fanuc's controls forbid between G68 and G69."""
-    if state.frames.rotation is not None:
-        raise block.fail(word, f"{what} while the coordinate system is rotated (G68)", "G69 before it")
+    block.refuse_if(
+        state.frames.rotation is not None, word, f"{what} while the coordinate system is rotated (G68)", "G69 before it"
+    )
 
 
 def know_place(state: State, block: CurrentBlock, word: Word) -> None:
     """Refuse what depends on the present X and Y, after a G10 that turned the offset in force."""
-    if state.unsettled == "G10":
-        raise block.fail(word, f"depends on the present X and Y. {TURNED}", "a move with both X and Y before it")
+    block.refuse_if(
+        state.unsettled == "G10", word, f"depends on the present X and Y. {TURNED}", "a move with both before it"
+    )
 
 
 def _settle(state: State, block: CurrentBlock, words: dict[int, float]) -> None:

@@ -11,6 +11,7 @@ HOLDS_TIP = "G43.4"  # tool centre point control
 HOLDS_HINT = (
     "post X, Y, Z, A, B, C of the tip, or name the machine it is posted for ([kinematics] of a controller file)"
 )
+ADD_IT = "add it to the tool table (--tools FILE)"
 
 
 def tool_word(state: State, block: CurrentBlock, code: str) -> None:
@@ -20,10 +21,10 @@ def tool_word(state: State, block: CurrentBlock, code: str) -> None:
 
 def change_tool(state: State, block: CurrentBlock, code: str) -> None:
     """M6: the selected tool into the spindle. M61 Q: the tool there has that number; what T has selected stays."""
-    number = state.selected if code == "M6" else block.take("Q")
-    if number is None or number < 0 or number != int(number):
+    number = state.selected if code == "M6" else block.whole("Q", block.codes[code], 0)
+    if number is None:
         raise block.fail(code, "needs the tool number", "Q with a whole number")
-    state.tool, state.renamed = int(number), code == "M61"
+    state.tool, state.renamed = number, code == "M61"
     # What LinuxCNC's rs274 forgets at a tool change.
     state.height_lost = state.height_lost or state.length_changed
     if state.rotation_changed:
@@ -40,8 +41,8 @@ def list_numbers(state: State, block: CurrentBlock) -> None:
         block.take("D")
         state.note(block.line, block.values["D"], "the number of a radius offset, which acts with G41 and G42 alone")
     if block.has("H") and (changes or "G49" in block.codes):
-        if not math.isnan(state.tool_length):
-            raise block.fail("H", "without G43, while a tool length is in force", "G43 beside it")
+        has_length = not math.isnan(state.tool_length)
+        block.refuse_if(has_length, "H", "without G43, while a tool length is in force", "G43 beside it")
         state.named_length = block.take("H")
         state.note(block.line, block.values["H"], "the number of a tool length, which acts with G43 alone")
 
@@ -52,8 +53,7 @@ def tool_length(state: State, block: CurrentBlock, code: str) -> None:
     G43.4 H: as G43, and X, Y, Z are those of the tip on the part while the rotary axes turn.
     """
     frames, length = state.frames, math.nan
-    if code == HOLDS_TIP and frames.posted is None:
-        raise block.fail(code, "is tool centre point control of one control, which is not supported", hint=HOLDS_HINT)
+    block.refuse_if(code == HOLDS_TIP and frames.posted is None, code, "is tool centre point control", hint=HOLDS_HINT)
     _hold_tip(state, block, code, False)
     if code == "G43.1":
         value = block.take("Z")
@@ -90,31 +90,27 @@ def _hold_tip(state: State, block: CurrentBlock, code: str, hold: bool) -> None:
         return
     length = tool_of(state.tools, state.tool).length if math.isnan(state.tool_length) else state.tool_length
     position = switched(frames, length, hold)
-    if any(map(math.isnan, position)):
-        raise block.fail(code, "with a tilted head needs the tool's length", hint="add it to the tool table")
+    block.refuse_if(any(map(math.isnan, position)), code, "with a tilted head needs the tool's length", hint=ADD_IT)
     frames.position = position
 
 
 def _length_in_table(state: State, block: CurrentBlock, code: str) -> float:
     """Length of the tool that G43 names by H, or of the one in the spindle."""
-    number = block.take("H")
+    number = block.whole("H", block.codes[code], 0)
     if number == 0 and state.dialect.increments:
         return math.nan
     if number == 0 and state.dialect.name != "linuxcnc":
         problem = "is no offset on some controls, on LinuxCNC that of the tool"
         raise block.fail("H", problem, "H or G49", "name the control with --dialect")
-    if number is not None and (number < 0 or number != int(number)):
-        raise block.fail("H", "is not a tool number", "a whole number")
-    if not number and (state.renamed or state.named_length not in (None, state.tool)):
-        problem = "without H after M61, or after another H: controls differ in whose length it takes"
-        raise block.fail(code, problem, f"G43 H{state.tool}, or T and M6")
-    tool = int(number) if number else state.tool  # LinuxCNC's H0 too (find_tool_pocket(0))
+    other = not number and (state.renamed or state.named_length not in (None, state.tool))
+    problem = "without H after M61, or after another H: controls differ in whose length it takes"
+    block.refuse_if(other, code, problem, f"G43 H{state.tool}, or T and M6")
+    tool = number or state.tool  # LinuxCNC's H0 too (find_tool_pocket(0))
     if state.tools is None:
         problem = f"needs the length of tool {tool}, and there is no tool table"
         raise block.fail(code, problem, hint=tool_table_hint(tool))
     length = tool_of(state.tools, tool).length
-    if math.isnan(length):
-        raise block.fail(code, f"needs the length of tool {tool}", hint="add it to the tool table (--tools FILE)")
+    block.refuse_if(math.isnan(length), code, f"needs the length of tool {tool}", hint=ADD_IT)
     return length
 
 
