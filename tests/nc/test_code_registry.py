@@ -14,9 +14,9 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import EVERYWHERE
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED, UNDERSTOOD, code_meaning
 from toolpath_stiff.nc.controller import DIALECTS, Controller
-from toolpath_stiff.nc.groups import STEPS
 from toolpath_stiff.nc.plain_lines import MODE_NAMES
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.state import STEPS
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
 
 

@@ -13,9 +13,8 @@ from toolpath_stiff.nc.codes.passive import m_parameters
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.codes.tools import list_numbers
 from toolpath_stiff.nc.geometry import ArcError
-from toolpath_stiff.nc.groups import LAST_MODE, Group
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Flow, State, Then
+from toolpath_stiff.nc.state import LAST_MODE, POINT_WORDS, CurrentBlock, Flow, Group, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
 

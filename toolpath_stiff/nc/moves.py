@@ -335,20 +335,11 @@ def in_si(moves: Moves) -> Moves:
 
 
 def _joined(parts: list[Moves]) -> Moves:
-    """All parts; each is let go once it is copied, so that no move is held twice."""
-    n, first = sum(map(len, parts)), 0
-    names = [column.name for column in fields(Moves)]
-    like = {name: getattr(parts[0], name) for name in names}
-    moves = Moves(**{name: np.zeros((n, *values.shape[1:]), values.dtype) for name, values in like.items()})
-    parts.reverse()
-    while parts:
-        part = parts.pop()
-        for name in names:
-            values = getattr(part, name)
-            if values.any():  # pages of zeros that nobody writes to take no memory
-                getattr(moves, name)[first : first + len(part)] = values
-        first += len(part)
-    return replace(moves, tool=held_once(moves.tool), tool_length=held_once(moves.tool_length))
+    """All parts, column by column."""
+    columns = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in (c.name for c in fields(Moves))
+    }
+    return replace(Moves(**columns), tool=held_once(columns["tool"]), tool_length=held_once(columns["tool_length"]))
 
 
 def held_once(column: NDArray[Any]) -> NDArray[Any]:

@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
-from toolpath_stiff.nc.groups import Group
 from toolpath_stiff.nc.moves import Arc, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
@@ -23,9 +22,23 @@ if TYPE_CHECKING:
     from toolpath_stiff.nc.frames import Frames
 
 
+# Modal groups in the order in which the codes and words of a block act: both are LinuxCNC's (manual, "G-Code Overview",
+# "Modal Groups" and "Order of Execution"), because its interpreter is what the results are compared with. Groups of M
+# codes begin with "M ", since a G code may have a group of that name too. "dwell" is a step of G4 alone; F, S and T act
+# without a code.
+#
+# Units first, so that an F beside G20 is in inches; the moves last. Up to `LAST_MODE`, a group may be executed ahead of
+# the rest of the block: doing so twice changes nothing but dwells.
+Group = Literal[
+    "units", "feed mode", "F", "S", "T", "M tool change", "dwell", "plane", "polar", "tool length", "M subprogram",
+    "work offset", "path control", "exact stop", "look-ahead", "dynamic offset", "spindle mode", "distance",
+    "arc distance", "cycle return", "cutter compensation", "lathe diameter", "scaling", "mirror image", "stroke check",
+    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M rigid tapping",
+    "rotation", "non-modal", "M stop", "motion", "corner",
+]  # fmt: skip
+STEPS: dict[Group, int] = {group: place for place, group in enumerate(get_args(Group))}
+LAST_MODE = STEPS["M rigid tapping"]
 POINT_WORDS = (*AXES, *POLAR)
-
-
 LATHE_HINT = "this reads the programs of mills: post it for a mill, with X as a position"
 
 
@@ -155,15 +168,6 @@ class Segment(NamedTuple):
     arc: Arc | None
 
 
-@dataclass(frozen=True)
-class Corner:
-    """A corner that waits for its second move: `,C` or `,R`, its size in mm, and the line that asks for it."""
-
-    letter: str
-    size: float
-    line: int
-
-
 @dataclass
 class State:
     """The state of a control, at its start as LinuxCNC's is unless the dialect says otherwise.
@@ -218,7 +222,7 @@ class State:
     trace
         Each move of the current block, for whoever starts the list.
     corner
-        The corner (,C or ,R) that the next block has to make with the one before it; None: there is none.
+        The block whose ,C or ,R the next block has to make with it; None: there is none.
     cutter
         Cutter compensation in force (G41, G42); None: G40.
     beside
@@ -261,7 +265,7 @@ class State:
     warnings: list[Remark] = field(default_factory=list)
     assumptions: list[str] = field(default_factory=list)
     trace: list[Segment] | None = None
-    corner: Corner | None = None
+    corner: CurrentBlock | None = None
     cutter: Cutter | None = None
     beside: list[float] | None = None
     named_length: float | None = None

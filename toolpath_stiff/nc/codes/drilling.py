@@ -9,7 +9,7 @@ from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
 from toolpath_stiff.nc.codes.feeds import time_word
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_polar_words
-from toolpath_stiff.nc.moves import CYCLE, RAPID
+from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.words import AXES
@@ -74,10 +74,10 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
         record(state, block, RAPID, frames.to_control(place), words)
         level = clear
         _along_normal(state, block, normal, hole.retract, RAPID)
-        for stroke in strokes(hole):
-            _along_normal(state, block, normal, stroke.height, CYCLE if stroke.feed else RAPID)
-            if stroke.dwell:
-                state.recorder.add_dwell(stroke.dwell)
+        for height, motion, wait in strokes(hole):
+            _along_normal(state, block, normal, height, motion)
+            if wait:
+                state.recorder.add_dwell(wait)
 
 
 def _along_normal(state: State, block: CurrentBlock, normal: int, height: float, motion: int) -> None:

@@ -15,7 +15,7 @@ from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, d
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
 from toolpath_stiff.nc.geometry import Vector
-from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Move, Recorder, Remark
+from toolpath_stiff.nc.moves import RAPID, Arc, Move, Recorder, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.strokes import Drilling, strokes
 from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry, tool_of
@@ -218,7 +218,7 @@ def drill(state: CutterLocationState, target: Vector, axis: Vector, hole: Drilli
         (along(state.point, axis, -height), level, RAPID, 0.0),
         (target, level, RAPID, 0.0),
         (target, hole.retract, RAPID, 0.0),
-        *((target, stroke.height, CYCLE if stroke.feed else RAPID, stroke.dwell) for stroke in strokes(hole)),
+        *((target, *stroke) for stroke in strokes(hole)),
     ]
     for foot, above, motion, dwell in stops:
         point = along(foot, axis, above)
