@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -149,30 +149,6 @@ def turn_between(first: float, last: float, clockwise: bool) -> float:
     if sweep < LEAST_SWEEP:
         sweep = math.tau
     return -sweep if clockwise else sweep
-
-
-def arc_sweeps(start: FloatArray, end: FloatArray, center: FloatArray, clockwise: BoolArray) -> FloatArray:
-    """(n,) `arc_sweep` of n arcs (n, 2) of one turn, digit for digit.
-
-    Examples
-    --------
-    >>> start, end, center = np.array([[10.0, 0.0]]), np.array([[0.0, 10.0]]), np.zeros((1, 2))
-    >>> np.degrees(arc_sweeps(start, end, center, np.array([True])))
-    array([-270.])
-    """
-    # `math`, as numpy's own arc tangent differs in the last digit between processors.
-    first, last = (
-        map(math.atan2, (point - center)[:, 1].tolist(), (point - center)[:, 0].tolist()) for point in (start, end)
-    )
-    return np.array(list(map(turn_between, first, last, clockwise.tolist())), dtype=float)
-
-
-def radii_clearly_agree(start: FloatArray, end: FloatArray, center: FloatArray, inch: bool) -> BoolArray:
-    """(n,) whether arcs (n, 2) are so far within `check_radii` and `check_bulge` that rounding does not matter."""
-    first, last = (np.sqrt(((point - center) ** 2).sum(axis=1)) for point in (start, end))
-    least = INCH_TOLERANCE if inch else MM_TOLERANCE
-    small = np.maximum(first, last) < LARGEST_MM / 2.0  # wherever it goes, `check_bulge` allows it
-    return np.asarray((np.minimum(first, last) > 2.0 * SMALLEST_RADIUS) & (np.abs(first - last) < 0.5 * least) & small)
 
 
 def corner(

@@ -336,10 +336,13 @@ def in_si(moves: Moves) -> Moves:
 
 def _joined(parts: list[Moves]) -> Moves:
     """All parts, column by column."""
-    columns = {
-        name: np.concatenate([getattr(part, name) for part in parts]) for name in (c.name for c in fields(Moves))
-    }
+    columns = {column.name: _end_to_end([getattr(part, column.name) for part in parts]) for column in fields(Moves)}
     return replace(Moves(**columns), tool=held_once(columns["tool"]), tool_length=held_once(columns["tool_length"]))
+
+
+def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    whole = np.concatenate(parts)
+    return whole if whole.any() else np.zeros(whole.shape, whole.dtype)  # pages that nobody writes to take no memory
 
 
 def held_once(column: NDArray[Any]) -> NDArray[Any]:

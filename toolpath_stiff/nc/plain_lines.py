@@ -16,13 +16,14 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.feeds import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
+from toolpath_stiff.nc.codes.feeds import SLOWEST, bare_feed_is_open, rotary_feed
 from toolpath_stiff.nc.codes.increments import ANGLES, assume_increments, increment
 from toolpath_stiff.nc.codes.motion import note_tool
 from toolpath_stiff.nc.codes.points import LINEAR
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.frames import STILL
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Moves
+from toolpath_stiff.nc.geometry import Point2
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Moves
 from toolpath_stiff.nc.plain_words import BARE, FIRST_F, LAST_F, LETTERS, NO_CODE, NONE, PlainWords, lex
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
@@ -69,7 +70,7 @@ def _suits(state: State) -> bool:
     """Whether the modes in force leave plain words their plain meaning."""
     frames = state.frames
     return (
-        state.feed_mode in ("G93", "G94")
+        state.feed_mode == "G94"
         and state.polar is None
         and state.unsettled is None
         and state.corner is None
@@ -112,33 +113,37 @@ class Lines:
 
     def execute(self, first: int) -> int:
         """Move; returns how many lines were executed. `first`: the first one's number, from 0."""
-        self._modes()
+        self.coded = self.words.code != NO_CODE
+        before = MODES.get(self.state.motion or "", NO_MODE)
+        self.mode = np.concatenate([[before], self.words.code[self.coded]])[np.cumsum(self.coded)]
         axes, centers = self._any(AXES), self._any(geometry.CENTER_LETTERS)
         is_arc = self.mode >= CLOCKWISE
         self._stop(~is_arc & centers)
         self._stop((self.mode == NO_MODE) & axes)
         arc = is_arc & (axes | centers | self.coded)
         moving = (axes & (self.mode != NO_MODE)) | arc
-        self.cutting = moving & (self.mode != MODES["G0"])
         self._feed_words()
-        self._stop(self._no_feed())
+        self._stop(moving & (self.mode != MODES["G0"]) & np.isnan(self.feed))
         if not moving[: self.end].any():
             return self._leave(None)
         control = self._control()
-        start, end = self._set_up(control)
         center, sweep = self._arcs(np.flatnonzero(arc[: self.end]), control)
-        done = slice(self.end)
-        self._record(first, (start[done], end[done]), (center[done], sweep[done]), moving[done])
-        return self._leave(control if moving[done].any() else None)
+        self._record(first, control, (center, sweep), moving)
+        return self._leave(control if moving[: self.end].any() else None)
 
-    def _record(
-        self, first: int, ends: tuple[FloatArray, FloatArray], arc: tuple[FloatArray, FloatArray], moving: BoolArray
-    ) -> None:
+    def _record(self, first: int, control: FloatArray, arc: tuple[FloatArray, FloatArray], moving: BoolArray) -> None:
         """Hand over the moves of the lines that are done, those that go anywhere."""
-        state, (start, end), (center, sweep) = self.state, ends, arc
-        goes = np.logical_or.reduce([start[:, axis] != end[:, axis] for axis in range(6)])
-        rows = np.flatnonzero(moving & (goes | (sweep != 0.0)))
-        motion = np.where(sweep != 0.0, ARC, np.where(self.mode[: self.end] == MODES["G1"], FEED, RAPID))[rows]
+        state, done = self.state, slice(self.end)
+        setup = control - np.array([*state.frames.fix_reference(), 0.0, 0.0, 0.0])
+        start, end = setup[:-1][done], setup[1:][done]
+        # An axis that stands keeps its number (`motion.record`).
+        end = np.where(np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start)), start, end)
+        center, sweep, feed = arc[0][done], arc[1][done], self.feed[done]
+        same = [start[:, axis] == end[:, axis] for axis in range(6)]
+        rotary = np.logical_and.reduce(same[:3]) & (sweep == 0.0)
+        feed = np.where(rotary, rotary_feed(state, feed), feed)
+        rows = np.flatnonzero(moving[done] & (~np.logical_and.reduce(same) | (sweep != 0.0)))
+        motion = np.where(sweep != 0.0, ARC, np.where(self.mode[done] == MODES["G1"], FEED, RAPID))[rows]
         vector = state.frames.turn_direction(geometry.normal_of(state.plane))
         n = len(rows)
         state.recorder.add_many(
@@ -150,7 +155,7 @@ class Lines:
                 arc_sweep=sweep[rows],
                 arc_center=center[rows],
                 arc_normal=np.where((motion == ARC)[:, None], vector, 0.0),
-                feed=np.where(motion == RAPID, math.nan, self._feeds(ends, arc)[rows]),
+                feed=np.where(motion == RAPID, math.nan, feed[rows]),
                 dwell=np.zeros(n),
                 tool=np.full(n, state.tool),
                 tool_length=np.full(n, state.tool_length),
@@ -160,18 +165,12 @@ class Lines:
         if n:
             note_tool(state)
 
-    def _modes(self) -> None:
-        """The motion mode of each line."""
-        self.coded = self.words.code != NO_CODE
-        before = MODES.get(self.state.motion or "", NO_MODE)
-        self.mode = np.concatenate([[before], self.words.code[self.coded]])[np.cumsum(self.coded)]
-
     def _any(self, letters: str) -> BoolArray:
         columns = [self.given[letter] for letter in letters if letter in self.given]
         return np.asarray(np.logical_or.reduce([np.zeros(self.n, dtype=bool), *columns]))
 
     def _feed_words(self) -> None:
-        """F in force on each line, and the line that set it (-1: a line before these)."""
+        """F in force on each line."""
         state = self.state
         has_feed, values, bare = np.zeros(self.n, dtype=bool), np.full(self.n, math.nan), np.zeros(self.n, dtype=bool)
         for key in (FIRST_F, LAST_F):
@@ -180,23 +179,11 @@ class Lines:
                 self._stop(has_feed & (form != NONE))  # a second one
                 values = np.where(has_feed, values, self.words.values[key])
                 has_feed, bare = has_feed | (form != NONE), bare | (form == BARE)
-        order = np.cumsum(has_feed)
-        self.feed_row = np.concatenate([[-1], np.flatnonzero(has_feed)])[order]
         before = math.nan if state.feed is None else state.feed
-        self.feed = np.concatenate([[before], values[has_feed] * state.feed_scale])[order]
+        self.feed = np.concatenate([[before], values[has_feed] * state.feed_scale])[np.cumsum(has_feed)]
         self._stop((self.feed < SLOWEST) | (self.feed > LARGEST_WORD))
         if bare_feed_is_open(state):
             self._stop(bare)
-
-    def _no_feed(self) -> BoolArray:
-        """Cutting lines without a feed."""
-        if self.state.feed_mode == "G94":
-            return np.asarray(self.cutting & np.isnan(self.feed))
-        rows = np.flatnonzero(self.cutting)  # G93: each needs its own
-        missing = np.zeros(self.n, dtype=bool)
-        used = np.concatenate([[-2], rows[:-1]])
-        missing[rows] = (self.feed_row[rows] <= used) | np.isnan(self.feed[rows])
-        return missing
 
     def _control(self) -> FloatArray:
         """(n + 1, 6) control coordinates before the first line and after each (`points.control_point`)."""
@@ -216,76 +203,44 @@ class Lines:
                 control[:, axis] = np.cumsum(np.concatenate([[here], np.where(given, scaled, 0.0)]))
         return control
 
-    def _set_up(self, control: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Set-up coordinates of each line's start and end; an axis that stands keeps its number (`motion.record`)."""
-        setup = control - np.array([*self.state.frames.fix_reference(), 0.0, 0.0, 0.0])
-        start, end = setup[:-1], setup[1:]
-        still = np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start))
-        return start, np.where(still, start, end)
-
     def _arcs(self, rows: IntArray, control: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(n, 3) centres in the set-up frame and (n,) sweeps, 0 but for these lines; the first unfit ends the run."""
-        state, frames = self.state, self.state.frames
+        frames, nothing = self.state.frames, np.full(self.n, math.nan)
         center, sweep = np.zeros((self.n, 3)), np.zeros(self.n)
-        if not len(rows):
-            return center, sweep
-        first, second, normal = geometry.PLANES[state.plane]
+        first, second, normal = geometry.PLANES[self.state.plane]
         centers = geometry.CENTER_LETTERS
         letters = (AXES[first], AXES[second], centers[first], centers[second], "R", centers[normal])
-        nothing = np.full(self.n, math.nan)
-        words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters])
+        words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
         points = np.stack([frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
-        middles, sweeps = self._all_arcs(rows, points[:, [first, second]], words)
-        done = rows[: len(sweeps)]
-        points = points[: len(sweeps)]
-        points[:, [first, second]] = middles
-        setup = np.stack([frames.axis_to_control(axis, points[:, axis]) for axis in range(3)], axis=1)
-        center[done], sweep[done] = setup - np.array(frames.fix_reference()), sweeps
-        return center, sweep
-
-    def _all_arcs(self, rows: IntArray, start: FloatArray, words: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(m, 2) centres and (m,) sweeps of the first m of some lines; what is wrong with the next one ends the run.
-
-        `words` (6, n): X, Y, I, J of the plane, R and the offset off the plane, nan where there is none.
-        """
-        state, scale = self.state, self.state.length_scale
-        x, y, i, j, radius, off_plane = words
-        end = np.stack([x, y], axis=1) * scale
-        end = np.where(np.isnan(end), start, end if state.absolute else start + end)
-        center = start + np.stack([np.where(np.isnan(i), 0.0, i), np.where(np.isnan(j), 0.0, j)], axis=1) * scale
-        clockwise = self.mode[rows] == CLOCKWISE
-        sweep = geometry.arc_sweeps(start, end, center, clockwise)
-        by_radius, by_center = ~np.isnan(radius), ~(np.isnan(i) & np.isnan(j))
-        unfit = (np.abs(off_plane) > 0.0) | (by_radius == by_center) | (by_radius & np.isnan(x) & np.isnan(y))
-        clear = ~unfit & by_center & geometry.radii_clearly_agree(start, end, center, state.inch)
-        for row in np.flatnonzero(~clear).tolist():
-            (a, b), (c, d), turn = start[row].tolist(), end[row].tolist(), bool(clockwise[row])
+        for row, point, numbers in zip(rows.tolist(), points, words, strict=True):
+            start = (float(point[first]), float(point[second]))
             try:
-                if unfit[row]:
-                    raise geometry.ArcError("words that do not fit", "")
-                if by_radius[row]:
-                    center[row] = geometry.center_from_radius((a, b), (c, d), float(radius[row]) * scale, turn)
-                e, f = center[row].tolist()
-                sweep[row] = geometry.sweep_about((e, f), (a, b), (c, d), turn, state.inch)
+                middle, sweep[row] = self._arc(start, numbers, self.mode[row] == CLOCKWISE)
             except geometry.ArcError:
-                self.end = int(rows[row])
-                return center[:row], sweep[:row]
+                self.end = row
+                break
+            point[[first, second]] = middle
+        setup = np.stack([frames.axis_to_control(axis, points[:, axis]) for axis in range(3)], axis=1)
+        center[rows] = setup - np.array(frames.fix_reference())
         return center, sweep
 
-    def _feeds(self, ends: tuple[FloatArray, FloatArray], arc: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Feed of each line's move (`feeds.feed_of_move`); rapids are none."""
-        (start, end), (center, sweep) = ends, arc
-        feed: FloatArray = self.feed[: self.end].copy()
-        if self.state.feed_mode == "G94":
-            standing = np.logical_and.reduce([start[:, axis] == end[:, axis] for axis in range(3)]) & (sweep == 0.0)
-            feed[standing] = rotary_feed(self.state, feed[standing])
-            return feed
-        normal = geometry.normal_of(self.state.plane)
-        for row in np.flatnonzero(self.cutting[: self.end]).tolist():
-            x, y, z = center[row].tolist()
-            move = Arc((x, y, z), normal, float(sweep[row])) if sweep[row] else None
-            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), move)
-        return feed
+    def _arc(self, start: Point2, words: list[float], clockwise: bool) -> tuple[Point2, float]:
+        """Centre and sweep of an arc; `words`: X, Y, I, J of the plane, R, the offset off the plane, nan for none."""
+        (x, y, i, j, radius, off_plane), scale = words, self.state.length_scale
+        by_radius = not math.isnan(radius)
+        fits = by_radius == (math.isnan(i) and math.isnan(j)) and not (by_radius and math.isnan(x) and math.isnan(y))
+        if not fits or abs(off_plane) > 0.0:
+            raise geometry.ArcError("words that do not fit", "")
+        base = (0.0, 0.0) if self.state.absolute else start
+        end = (start[0] if math.isnan(x) else base[0] + x * scale, start[1] if math.isnan(y) else base[1] + y * scale)
+        if by_radius:
+            center = geometry.center_from_radius(start, end, radius * scale, clockwise)
+        else:
+            center = (
+                start[0] + (0.0 if math.isnan(i) else i * scale),
+                start[1] + (0.0 if math.isnan(j) else j * scale),
+            )
+        return center, geometry.sweep_about(center, start, end, clockwise, self.state.inch)
 
     def _leave(self, control: FloatArray | None) -> int:
         """Set the state as the lines executed leave it; their number."""
@@ -300,10 +255,7 @@ class Lines:
                 state.speed = float(self.words.values["S"][speed_rows[-1]])
         if self.mode[last] != NO_MODE:
             state.motion = MODE_NAMES[self.mode[last]]
-        if state.feed_mode == "G93":
-            used = self.cutting[max(int(self.feed_row[last]), 0) : self.end].any()
-            state.feed = None if used or math.isnan(self.feed[last]) else float(self.feed[last])
-        elif not math.isnan(self.feed[last]):
+        if not math.isnan(self.feed[last]):
             state.feed = float(self.feed[last])
         if control is not None:
             state.frames.position = control[self.end].tolist()
