@@ -198,23 +198,23 @@ def _rotation_of(state: State, block: CurrentBlock, word: Word, here: list[float
 
 
 _FANUC = f"{FANUC}, Additional workpiece coordinate systems (G54.1)"
-_ADDITIONAL_HAAS = "additional work offset (Haas)"
 _STANDARD = {code: f"work offset {number}" for number, code in enumerate(WORK_OFFSETS, 1)}
 _NUMBERED = dict.fromkeys(
     (f"G{number}" for number in range(FIRST_NUMBERED, FIRST_NUMBERED + 20)),
     "additional work offset (Haas: G154 P1 to P20)",
 )
-_SUSPENDED = {"G92.1": "no shift any more", "G92.2": "shift suspended"}
 _ROTATION = f"{FANUC} of the series 16 and 15i, Coordinate system rotation (G68, G69)"
 COORDINATE_CODES = (
     *family(_STANDARD, "work offset", work_offset, g_codes("G54-G59.3")),
     Code("G54.1", "work offset", additional_offset, "additional work offset", _FANUC, ("generic", "fanuc")),
-    Code("G154", "work offset", additional_offset, _ADDITIONAL_HAAS, f"{HAAS}, G154", ("generic", "haas")),
+    Code(
+        "G154", "work offset", additional_offset, "additional work offset (Haas)", f"{HAAS}, G154", ("generic", "haas")
+    ),
     *family(_NUMBERED, "work offset", numbered_offset, f"{HAAS}, G110-G129", ("haas",)),
     Code("G10", "non-modal", set_offsets, "set offsets", g_codes("G10 L1, G10 L2, G10 L20"), takes_axes=True),
     Code("G52", "non-modal", shift, "local shift", g_codes("G52"), takes_axes=True),
     Code("G92", "non-modal", shift, "shift", g_codes("G92"), takes_axes=True),
-    *family(_SUSPENDED, "non-modal", shift, g_codes("G92.1 G92.2")),
+    *family({"G92.1": "no shift any more", "G92.2": "shift suspended"}, "non-modal", shift, g_codes("G92.1 G92.2")),
     Code("G92.3", "non-modal", shift, "shift restored", g_codes("G92.3")),
     Code("G68", "rotation", rotation, "rotated coordinates", _ROTATION, takes_axes=True),
     Code("G69", "rotation", rotation, "rotation off", _ROTATION),

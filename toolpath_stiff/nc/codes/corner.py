@@ -37,8 +37,9 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     state.corner = None
     begin, vertex, end = before.start, frames.to_setup(frames.position), frames.to_setup(target)
     normal = frames.turn_direction(geometry.normal_of(state.plane))
-    if begin[3:] != vertex[3:] or vertex[3:] != end[3:]:
-        raise geometry.ArcError("a corner while the rotary axes turn", "X, Y and Z alone")
+    geometry.refuse_arc_if(
+        begin[3:] != vertex[3:] or vertex[3:] != end[3:], "a corner while the rotary axes turn", "X, Y and Z alone"
+    )
     rounded = ",R" in pending.values
     size = pending.values[",R" if rounded else ",C"].value * state.length_scale
     ends = geometry.corner(begin[:3], vertex[:3], end[:3], normal, size, rounded)

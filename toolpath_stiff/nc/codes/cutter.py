@@ -12,7 +12,7 @@ from toolpath_stiff.nc import compensation, geometry
 from toolpath_stiff.nc.codes.code import Code, family, g_codes
 from toolpath_stiff.nc.compensation import CenterMove, Cutter, OffsetArc, Pending
 from toolpath_stiff.nc.frames import Frames, standing
-from toolpath_stiff.nc.geometry import ArcError, Point2
+from toolpath_stiff.nc.geometry import ArcError, Point2, refuse_arc_if
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
 from toolpath_stiff.nc.state import CurrentBlock, State
 
@@ -112,8 +112,11 @@ def offset_move(state: State, cutter: Cutter, move: Move, control: list[float]) 
     Raises `ArcError`.
     """
     frames, rows, step = state.frames, len(state.recorder.recent), None
-    if any(frames.from_machine[axis] for axis in cutter.axes[:2]):
-        raise ArcError("a move under cutter compensation from machine coordinates", "both words of the plane")
+    refuse_arc_if(
+        any(frames.from_machine[axis] for axis in cutter.axes[:2]),
+        "a move under cutter compensation from machine coordinates",
+        "both words of the plane",
+    )
     there = frames.to_program(control)
     start, target = cutter.in_plane(frames.to_program(frames.position)), cutter.in_plane(there)
     direction = (target[0] - start[0], target[1] - start[1])
@@ -176,8 +179,7 @@ def _settle(state: State, cutter: Cutter, to: Point2) -> None:
     """Move the end of the pending moves; raises `ArcError` where the tool would have to go back."""
     assert cutter.position is not None
     for pending in cutter.pending:
-        if _gouges(cutter, pending, to):
-            raise ArcError(compensation.GOUGE, compensation.SMALLER)
+        refuse_arc_if(_gouges(cutter, pending, to), compensation.GOUGE, compensation.SMALLER)
         pending.end[:] = cutter.moved(pending.end, to)
         _rewrite(state, cutter, pending)
     cutter.position = cutter.moved(cutter.position, to)

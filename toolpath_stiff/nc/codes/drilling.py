@@ -203,7 +203,6 @@ def _check_pecks(state: State, block: CurrentBlock, code: str, depth: float, rep
 
 _MANUAL = f"{FANUC}, Canned cycle for drilling"
 _RETURNS = {"G98": "cycles return to their level", "G99": "cycles return to R"}
-_FINE = f"{_MANUAL}, Fine boring cycle (G76)"
 DRILLING_CODES = (
     Code("G73", "motion", cycle, "chip-breaking drilling", g_codes("G73")),
     Code("G81", "motion", cycle, "drilling", g_codes("G81")),
@@ -211,7 +210,7 @@ DRILLING_CODES = (
     Code("G83", "motion", cycle, "peck drilling", g_codes("G83")),
     Code("G74", "motion", cycle, "left-hand tapping", f"{g_codes('G74')}; {_MANUAL}, G74"),
     Code("G84", "motion", cycle, "right-hand tapping", f"{g_codes('G84')}; {_MANUAL}, G84"),
-    Code("G76", "motion", cycle, "fine boring, rapid out", _FINE, ("fanuc", "haas")),
+    Code("G76", "motion", cycle, "fine boring, rapid out", f"{_MANUAL}, Fine boring cycle (G76)", ("fanuc", "haas")),
     Code("G86", "motion", cycle, "boring, spindle stop, rapid out", g_codes("G86")),
     Code("G85", "motion", cycle, "boring, feed out", g_codes("G85")),
     Code("G89", "motion", cycle, "boring with dwell, feed out", g_codes("G89")),

@@ -131,7 +131,6 @@ def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
     return value
 
 
-_DWELL = f"{g_codes('G4')}; {FANUC}, Dwell (G04); Marlin, G004"
 _FEEDS = {"G93": "inverse-time feed", "G94": "feed per minute", "G95": "feed per revolution"}
 _SPINDLE, _UNUSED = g_codes("G96 G97"), "constant surface speed: the spindle speed does not enter"
 FEED_CODES = (
@@ -139,6 +138,6 @@ FEED_CODES = (
     Code("S", "S", speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
     *family(_FEEDS, "feed mode", feed_mode, g_codes("G93 G94 G95")),
     Code("G96", "spindle mode", surface_speed, "constant surface speed", _SPINDLE, listed=_UNUSED),
-    Code("G4", "non-modal", dwell, "dwell", _DWELL, step="dwell"),
+    Code("G4", "non-modal", dwell, "dwell", f"{g_codes('G4')}; {FANUC}, Dwell (G04); Marlin, G004", step="dwell"),
     Code("G97", "spindle mode", holds_anyway, "spindle speed in revolutions", _SPINDLE),
 )

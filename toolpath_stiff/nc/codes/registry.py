@@ -27,8 +27,6 @@ LISTED = {code.name: code.listed for code in UNDERSTOOD if code.listed}
 
 _TIP, _MOVES = "post X, Y, Z, A, B, C of the tool tip", "post the moves of the cycle"
 _LINES_AND_ARCS, _AS_CUT = "post the program with lines and arcs", "post the program as it is cut"
-_PROBING = ("probing", "leave probing out", g_codes("G38.2 - G38.5"))
-_POCKET = ("a circular pocket, drawn in the manual without numbers", _LINES_AND_ARCS, f"{HAAS}, G12 and G13")
 _POLAR = (
     "milling in polar coordinates on a rotary axis",
     _TIP,
@@ -42,12 +40,15 @@ REFUSED: dict[str, Refused] = {
     for names, what, hint, source in (
         ("G5.2 G5.3", "a NURBS curve", _LINES_AND_ARCS, g_codes("G5.2 G5.3")),
         ("G7", "lathe diameter mode", "this is a mill", g_codes("G7")),
-        ("G12 G13", *_POCKET),
+        (
+            "G12 G13",
+            *("a circular pocket, drawn in the manual without numbers", _LINES_AND_ARCS, f"{HAAS}, G12 and G13"),
+        ),
         ("G12.1", *_POLAR),
         ("G17.1 G18.1 G19.1", *_PLANE),
         ("G31", "a move up to a signal (skip, probing)", "leave probing out", f"{FANUC}, Skip function (G31)"),
         ("G33 G33.1", "motion synchronised with the spindle", "leave threading and rigid tapping out", g_codes("G33")),
-        ("G38.2 G38.3 G38.4 G38.5", *_PROBING),
+        ("G38.2 G38.3 G38.4 G38.5", *("probing", "leave probing out", g_codes("G38.2 - G38.5"))),
         ("G43.2", "an added tool length", "put the whole length into the tool table", g_codes("G43.2")),
         ("G44", "a tool length counted the other way", "G43 with the length's other sign", f"{FANUC}, G43, G44"),
         ("G47", "engraving in the control's own letters", _LINES_AND_ARCS, f"{HAAS}, G47"),

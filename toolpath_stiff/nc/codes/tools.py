@@ -115,7 +115,6 @@ def _length_in_table(state: State, block: CurrentBlock, code: str) -> float:
 
 
 _TCP = "Fanuc, operator's manual of the series 30i, Tool center point control (G43.4)"
-_TCP_HAAS = "tool centre point control (Haas), as G43.4"
 TOOL_CODES = (
     Code("T", "T", tool_word, "the tool of the next M6", "LinuxCNC, Other Codes, T: Select Tool"),
     Code("M6", "M tool change", change_tool, "tool change", m_codes("M6")),
@@ -123,6 +122,8 @@ TOOL_CODES = (
     Code("G43", "tool length", tool_length, "tool length", g_codes("G43")),
     Code("G43.1", "tool length", tool_length, "tool length in the block", g_codes("G43.1"), takes_axes=True),
     Code(HOLDS_TIP, "tool length", tool_length, "tool centre point control", _TCP, ("generic", "linuxcnc", "fanuc")),
-    Code("G234", "tool length", no_such_control, _TCP_HAAS, f"{HAAS}, G234", ("haas",)),
+    Code(
+        "G234", "tool length", no_such_control, "tool centre point control (Haas), as G43.4", f"{HAAS}, G234", ("haas",)
+    ),
     Code("G49", "tool length", tool_length, "tool length off", g_codes("G49")),
 )
