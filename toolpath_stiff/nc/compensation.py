@@ -231,8 +231,7 @@ def _go_round(
     if inside:
         _check_fits(cutter, radius)
     end = _beside(target, cutter.radius, _angle(target, center) if inside else _angle(center, target))
-    straight_back = abs(corner - math.pi) < CORNER and not inside
-    if corner < -least or corner > math.pi + least or straight_back:
+    if corner < -least or corner > math.pi + least or (abs(corner - math.pi) < CORNER and not inside):
         arc = cutter.pending[0].arc
         if arc is not None:
             return CenterMove(end, trim=_arc_meets_arc(cutter, arc, center, turn, radius))

@@ -280,5 +280,4 @@ def _switches(toml: TomlReader) -> frozenset[int]:
         return ALL_SWITCHES if value else frozenset()
     if isinstance(value, list) and all(type(v) is int and v in ALL_SWITCHES for v in value):
         return frozenset(value)
-    expected = "true, false, or a list of switches 1 to 9"
-    raise toml.error(f"block_delete = {value!r}", expected, where="block_delete")
+    raise toml.error(f"block_delete = {value!r}", "true, false, or a list of switches 1 to 9", where="block_delete")

@@ -222,5 +222,4 @@ def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
     (-30.0, 0.0)
     """
     across = math.hypot(i, k)
-    pitch = math.degrees(math.atan2(i, k)) if across else 0.0
-    return math.degrees(math.atan2(-j, across)), pitch
+    return math.degrees(math.atan2(-j, across)), math.degrees(math.atan2(i, k)) if across else 0.0

@@ -134,8 +134,7 @@ def _check_axis_words(block: CurrentBlock) -> None:
         return
     if len(takers) > 1 or (takers and moving and moving != "G80"):
         other = moving if moving and len(takers) == 1 else takers[0]
-        word = block.codes[takers[-1]]
-        raise block.fail(word, f"and {other} both use the axis words of their block", "two blocks")
+        raise block.fail(block.codes[takers[-1]], f"and {other} both use the axis words of their block", "two blocks")
 
 
 def _move(state: State, block: CurrentBlock) -> None:

@@ -22,7 +22,6 @@ from toolpath_stiff.nc.codes.motion import note_tool
 from toolpath_stiff.nc.codes.points import LINEAR
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.frames import STILL
-from toolpath_stiff.nc.geometry import Point2
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Moves
 from toolpath_stiff.nc.plain_words import BARE, FIRST_F, LAST_F, LETTERS, NO_CODE, NONE, PlainWords, lex
 from toolpath_stiff.nc.state import State
@@ -140,8 +139,7 @@ class Lines:
         end = np.where(np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start)), start, end)
         center, sweep, feed = arc[0][done], arc[1][done], self.feed[done]
         same = [start[:, axis] == end[:, axis] for axis in range(6)]
-        rotary = np.logical_and.reduce(same[:3]) & (sweep == 0.0)
-        feed = np.where(rotary, rotary_feed(state, feed), feed)
+        feed = np.where(np.logical_and.reduce(same[:3]) & (sweep == 0.0), rotary_feed(state, feed), feed)
         rows = np.flatnonzero(moving[done] & (~np.logical_and.reduce(same) | (sweep != 0.0)))
         motion = np.where(sweep != 0.0, ARC, np.where(self.mode[done] == MODES["G1"], FEED, RAPID))[rows]
         vector = state.frames.turn_direction(geometry.normal_of(state.plane))
@@ -224,7 +222,7 @@ class Lines:
         center[rows] = setup - np.array(frames.fix_reference())
         return center, sweep
 
-    def _arc(self, start: Point2, words: list[float], clockwise: bool) -> tuple[Point2, float]:
+    def _arc(self, start: geometry.Point2, words: list[float], clockwise: bool) -> tuple[geometry.Point2, float]:
         """Centre and sweep of an arc; `words`: X, Y, I, J of the plane, R, the offset off the plane, nan for none."""
         (x, y, i, j, radius, off_plane), scale = words, self.state.length_scale
         by_radius = not math.isnan(radius)

@@ -76,8 +76,7 @@ class PlainWords:
 
 def lex(lines: Sequence[str]) -> tuple[PlainWords, IntArray]:
     """The words of lines, and the lines (from 0) that are not plain."""
-    text = "\n".join(lines).replace(";\n", "\n")  # the end of a block, or an empty comment
-    characters = text.encode("ascii", "replace").translate(None, b" \t")
+    characters = "\n".join(lines).replace(";\n", "\n").encode("ascii", "replace").translate(None, b" \t")
     buffer = b"%b\n%b\n" % (_BEFORE, characters)
     codes = np.frombuffer(buffer, dtype=np.uint8)
     marks = np.flatnonzero(codes - np.uint8(ord("0")) > 9)  # all characters but digits

@@ -9,7 +9,7 @@ call unchanged.
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from toolpath_stiff.errors import InputError
@@ -191,7 +191,8 @@ class ProgramRun:
 
     def _read(self, row: int) -> Block:
         block = read_block(self.lines[row], row + 1, self.name, self.state.dialect.semicolon)
-        return block if block.rest is None else block.executed(self.switches)
+        cut = block.rest is not None and block.switch in self.switches  # what stands behind a slash in its middle
+        return replace(block, words=block.words[: block.rest]) if cut else block
 
     def _fail(
         self, row: int, problem: str, expected: str = "", hint: str = "", column: int | None = None
@@ -211,8 +212,9 @@ class ProgramRun:
 
     def _unended(self, row: int) -> InputError:
         level = self._levels[-1]
-        problem = f"the subprogram {level.name}, which begins in line {level.first + 1}, has no end"
-        return self._fail(row, problem, "M99")
+        return self._fail(
+            row, f"the subprogram {level.name}, which begins in line {level.first + 1}, has no end", "M99"
+        )
 
     def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
         """A warning if anything but tape marks and the subprograms that ran follows the end."""

@@ -78,8 +78,7 @@ def parse_program(
         ...
     toolpath_stiff.errors.ProgramError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0, ...
     """
-    lines = split_lines(text, name)
-    return read(Request(lines, name, "", origin, default_origin, interpreter, controller=controller))
+    return read(Request(split_lines(text, name), name, "", origin, default_origin, interpreter, controller=controller))
 
 
 def read(request: Request) -> ReadProgram:

@@ -3,24 +3,19 @@
 mm, degrees, mm/min.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import Literal, get_args
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
-from toolpath_stiff.nc.moves import Arc, Recorder, Remark, Unsupported
+from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
 from toolpath_stiff.units import MM_PER_INCH
-
-if TYPE_CHECKING:
-    from toolpath_stiff.nc.frames import Frames
-
 
 # Modal groups in the order in which the codes and words of a block act: both are LinuxCNC's (manual, "G-Code Overview",
 # "Modal Groups" and "Order of Execution"), because its interpreter is what the results are compared with. Groups of M
@@ -159,15 +154,6 @@ class CurrentBlock:
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
 
-class Segment(NamedTuple):
-    """One move of a block, those of no length too: control coordinates of its ends, and its arc."""
-
-    motion: int
-    start: list[float]
-    end: list[float]
-    arc: Arc | None
-
-
 @dataclass
 class State:
     """The state of a control, at its start as LinuxCNC's is unless the dialect says otherwise.
@@ -220,7 +206,8 @@ class State:
     unsupported, warnings, assumptions
         As in `Program`.
     trace
-        Each move of the current block, for whoever starts the list.
+        Each move of the current block, those of no length too, with its ends in control coordinates, for whoever starts
+        the list.
     corner
         The block whose ,C or ,R the next block has to make with it; None: there is none.
     cutter
@@ -264,7 +251,7 @@ class State:
     unsupported: list[Unsupported] = field(default_factory=list)
     warnings: list[Remark] = field(default_factory=list)
     assumptions: list[str] = field(default_factory=list)
-    trace: list[Segment] | None = None
+    trace: list[Move] | None = None
     corner: CurrentBlock | None = None
     cutter: Cutter | None = None
     beside: list[float] | None = None

@@ -1,11 +1,9 @@
 """Tool tables and work-offset files: LinuxCNC's own formats and plain ones. mm and degrees."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from toolpath_stiff.errors import FileError, InputError, ProgramError
@@ -49,10 +47,6 @@ class ToolEntry:
     stick_out: float = math.nan
     material: str = ""
 
-    def __deepcopy__(self, _memo: dict[int, object]) -> ToolEntry:
-        # Every reading copies its tables, field by field at ten times the cost.
-        return replace(self)
-
 
 def tool_of(tools: dict[int, ToolEntry] | None, number: int) -> ToolEntry:
     """The tool of a number; where no table has it, one of which nothing else is known."""
@@ -66,9 +60,6 @@ class WorkOffset:
     axes: list[float] = field(default_factory=lambda: [0.0] * 6)
     rotation: float = 0.0
     given: bool = False
-
-    def __deepcopy__(self, _memo: dict[int, object]) -> WorkOffset:
-        return replace(self, axes=[*self.axes])
 
 
 @dataclass
@@ -162,8 +153,7 @@ def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
     columns = ("tool", *TOOL_KEYS[1:])
     table = parse_table(text, file, Columns(columns[:4], columns[4:]))
     unknown = [f"{name!r} is not known" for name in table.heading if name not in columns]
-    missing = [f"{name!r} is missing" for name in columns[:2] if name not in table.heading]
-    for problem in unknown + missing:
+    for problem in unknown + [f"{name!r} is missing" for name in columns[:2] if name not in table.heading]:
         raise Place(file, table.heading_line).fail(f"column {problem}", f"columns {', '.join(columns)}")
     for line, cells in table.rows:
         try:

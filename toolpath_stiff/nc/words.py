@@ -1,11 +1,9 @@
 """Lines to blocks, blocks to words, each with its true column."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError
@@ -52,12 +50,6 @@ class Block:
     percent: bool = False
     switch: int = 1
     rest: int | None = None
-
-    def executed(self, switches: frozenset[int]) -> Block:
-        """The block without what the block-delete switches leave out behind a slash in its middle."""
-        if self.rest is None or self.switch not in switches:
-            return self
-        return replace(self, words=self.words[: self.rest])
 
 
 def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block:
@@ -109,8 +101,9 @@ def block_delete(compact: str, slash: int, columns: Sequence[int], place: Place)
 def check_length(compact: str, place: Place) -> None:
     """Refuse a block that no control reads."""
     if len(compact) > LONGEST_BLOCK:
-        problem = f"a block of {len(compact)} characters without comments and blanks"
-        raise place.fail(problem, f"at most {LONGEST_BLOCK}")
+        raise place.fail(
+            f"a block of {len(compact)} characters without comments and blanks", f"at most {LONGEST_BLOCK}"
+        )
 
 
 def program_number(compact: str, column: int, place: Place) -> Block:
@@ -179,8 +172,7 @@ def _tokens(
         if exponent:
             # An exponent stands without blanks; `X1 E5` is two words, not a hundred metres.
             begin = match.start(3)
-            apart = columns[begin] - columns[begin - 1] > 1
-            if letter in NO_EXPONENT or apart or HAS_E_WORD.search(compact):
+            if letter in NO_EXPONENT or (columns[begin] - columns[begin - 1] > 1) or HAS_E_WORD.search(compact):
                 end = begin
             else:
                 number += exponent

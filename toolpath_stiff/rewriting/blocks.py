@@ -167,7 +167,8 @@ def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
 
 def _piece_count(controls: Controls) -> int:
     """Number of pieces into which a move must be cut; those that must be are refused, unless it was asked for."""
-    motion, start, end, arc = controls.trace[-1]
+    move = controls.trace[-1]
+    motion, start, end, arc = move.motion, move.start, move.end, move.arc
     plane, leaning, problem = controls.source.plane, 0.0, ""
     off_plane = arc is not None and controls.image(plane) is None
     if motion != RAPID and controls.turn.turns and start[3:] != end[3:]:

@@ -15,7 +15,8 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.interpreter import execute
-from toolpath_stiff.nc.state import CurrentBlock, Segment, State
+from toolpath_stiff.nc.moves import Move
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
 from toolpath_stiff.rewriting.turn import Turn, cutting_rows, differences
 from toolpath_stiff.units import MM_PER_INCH
@@ -144,7 +145,7 @@ class Controls:
         self.block, self.edit = Block(0, ()), LineEdit("", Block(0, ()), 0)
         self.current: CurrentBlock | None = None
         self.axes: list[str] = []
-        self.trace: list[Segment] = []
+        self.trace: list[Move] = []
         source.trace = self.trace
         self._coarsest = 0.0  # mm, the last decimal of any block so far: inches round coarser than mm
 

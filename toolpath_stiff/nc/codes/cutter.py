@@ -8,11 +8,23 @@ are set back in the recorder when the next corner is concave.
 import math
 from dataclasses import replace
 
-from toolpath_stiff.nc import compensation, geometry
 from toolpath_stiff.nc.codes.code import Code, family, g_codes
-from toolpath_stiff.nc.compensation import CenterMove, Cutter, OffsetArc, Pending
+from toolpath_stiff.nc.compensation import (
+    GOUGE,
+    MATCHING,
+    SHORTENED,
+    SMALLER,
+    STRAIGHT,
+    TYPE_A,
+    CenterMove,
+    Cutter,
+    OffsetArc,
+    Pending,
+    enter,
+    go_on,
+)
 from toolpath_stiff.nc.frames import Frames, standing
-from toolpath_stiff.nc.geometry import ArcError, Point2, refuse_arc_if
+from toolpath_stiff.nc.geometry import PLANES, ArcError, Point2, normal_of, refuse_arc_if
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
 from toolpath_stiff.nc.state import CurrentBlock, State
 
@@ -51,10 +63,9 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
         return
     diameter = _diameter(state, block, code)
     side = SIDES[code] if diameter >= 0.0 else -SIDES[code]
-    axes = geometry.PLANES[state.plane]
-    state.cutter = Cutter(side, abs(diameter) / 2.0, axes, state.length_scale, straight=straight)
+    state.cutter = Cutter(side, abs(diameter) / 2.0, PLANES[state.plane], state.length_scale, straight=straight)
     if straight:
-        state.assume(compensation.TYPE_A)
+        state.assume(TYPE_A)
 
 
 def _diameter(state: State, block: CurrentBlock, code: str) -> float:
@@ -122,10 +133,10 @@ def offset_move(state: State, cutter: Cutter, move: Move, control: list[float]) 
     direction = (target[0] - start[0], target[1] - start[1])
     programmed = None if move.arc is None else _programmed(frames, cutter, move.arc)
     if cutter.position is None:
-        step, direction = compensation.enter(cutter, start, target, programmed)
+        step, direction = enter(cutter, start, target, programmed)
         cutter.position, cutter.anchor = frames.to_program(frames.from_setup(move.start)), start
     elif programmed is not None or math.dist(start, target) >= SAME_PLACE:  # else the corner is still to come
-        step = compensation.go_on(cutter, start, target, programmed)
+        step = go_on(cutter, start, target, programmed)
         _go_round_corner(state, cutter, move, step, start, there)
     if step is not None and step.center is not None and programmed is not None:
         programmed = OffsetArc(step.center, programmed.turn, programmed.turns)
@@ -150,7 +161,7 @@ def _go_round_corner(
         _settle(state, cutter, step.trim)
     cutter.pending.clear()
     if step.outside:
-        state.assume(compensation.STRAIGHT)
+        state.assume(STRAIGHT)
     beside = [*cutter.position[:3], *there[3:]]
     straight = replace(move, motion=RAPID if rapid else FEED, from_machine=bound)
     for place in step.way:
@@ -171,7 +182,7 @@ def _add(state: State, cutter: Cutter, move: Move, end: list[float], arc: Offset
     if arc is not None:
         x, y, z = _to_setup(frames, cutter.moved(here, arc.center))[:3]
         sweep = arc.sweep_to(cutter.in_plane(here), cutter.in_plane(end))
-        move.arc = Arc((x, y, z), frames.turn_direction(geometry.normal_of(state.plane)), sweep)
+        move.arc = Arc((x, y, z), frames.turn_direction(normal_of(state.plane)), sweep)
     return move if state.recorder.add(move) else None
 
 
@@ -179,7 +190,7 @@ def _settle(state: State, cutter: Cutter, to: Point2) -> None:
     """Move the end of the pending moves; raises `ArcError` where the tool would have to go back."""
     assert cutter.position is not None
     for pending in cutter.pending:
-        refuse_arc_if(_gouges(cutter, pending, to), compensation.GOUGE, compensation.SMALLER)
+        refuse_arc_if(_gouges(cutter, pending, to), GOUGE, SMALLER)
         pending.end[:] = cutter.moved(pending.end, to)
         _rewrite(state, cutter, pending)
     cutter.position = cutter.moved(cutter.position, to)
@@ -201,8 +212,8 @@ def _gouges(cutter: Cutter, move: Pending, to: Point2) -> bool:
     if arc is None:
         return move.direction[0] * (to[0] - anchor[0]) + move.direction[1] * (to[1] - anchor[1]) < 0.0
     apart = abs(math.dist(cutter.in_plane(move.end), arc.center) - math.dist(to, arc.center))
-    longer = abs(arc.sweep_to(anchor, to)) > abs(arc.programmed) + compensation.SHORTENED
-    return apart > compensation.MATCHING * cutter.unit or (arc.programmed != 0.0 and longer)
+    longer = abs(arc.sweep_to(anchor, to)) > abs(arc.programmed) + SHORTENED
+    return apart > MATCHING * cutter.unit or (arc.programmed != 0.0 and longer)
 
 
 def _rewrite(state: State, cutter: Cutter, pending: Pending) -> None:

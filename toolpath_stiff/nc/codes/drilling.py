@@ -169,8 +169,7 @@ def _shallower_pecks(state: State, block: CurrentBlock) -> None:
 
 
 def _check_cycle(state: State, block: CurrentBlock, code: str, normal: int) -> None:
-    axis = AXES[normal]
-    for letter, what in (("Z", axis), ("R", "R")):
+    for letter, what in (("Z", AXES[normal]), ("R", "R")):
         block.refuse_if(
             letter not in state.sticky, None, f"{code} without {what}", f"{what} in the cycle's first block"
         )
@@ -196,8 +195,7 @@ def _heights(state: State, block: CurrentBlock, code: str, initial: float) -> tu
 
 
 def _check_pecks(state: State, block: CurrentBlock, code: str, depth: float, repeats: int) -> None:
-    pecks = depth / state.sticky["Q"] if code in PECKS else 1.0
-    many = pecks * repeats > MOST_STROKES
+    many = (depth / state.sticky["Q"] if code in PECKS else 1.0) * repeats > MOST_STROKES
     block.refuse_if(many, None, f"{code} with more than {MOST_STROKES} strokes", "a larger Q, or fewer repeats")
 
 

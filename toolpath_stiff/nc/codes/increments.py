@@ -41,8 +41,7 @@ def read_numbers(state: State, block: CurrentBlock) -> None:
         angles.add(AXES[PLANES[block.groups.get("plane", state.plane)][1]])
     for word in words:
         if "." not in word.text and word.value and word.letter in LENGTHS | angles:
-            unit = increment(word.letter in angles, inch)
-            block.values[word.letter] = word._replace(value=word.value * unit)
+            block.values[word.letter] = word._replace(value=word.value * increment(word.letter in angles, inch))
             assume_increments(state)
 
 

@@ -25,9 +25,8 @@ from toolpath_stiff.nc.codes.points import (
     refuse_while_rotated,
 )
 from toolpath_stiff.nc.frames import standing
-from toolpath_stiff.nc.geometry import ArcError, Point2
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Segment, State
+from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 from toolpath_stiff.nc.tables import tool_of
 from toolpath_stiff.nc.words import Word
 
@@ -66,7 +65,7 @@ def record(
     else:
         added = state.recorder.add(move)
     if state.trace is not None:
-        state.trace.append(Segment(motion, list(frames.position), list(control), arc))
+        state.trace.append(replace(move, start=list(frames.position), end=list(control), arc=arc))
     frames.position = control
     if added:
         note_tool(state)
@@ -140,9 +139,14 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _center(
-    state: State, block: CurrentBlock, start: Point2, end: Point2, clockwise: bool, words: dict[int, float]
-) -> Point2:
-    """Centre by R, or by the two of I, J, K that belong to the plane. Raises `InputError`, `ArcError`."""
+    state: State,
+    block: CurrentBlock,
+    start: geometry.Point2,
+    end: geometry.Point2,
+    clockwise: bool,
+    words: dict[int, float],
+) -> geometry.Point2:
+    """Centre by R, or by the two of I, J, K that belong to the plane. Raises `InputError`, `geometry.ArcError`."""
     first, second, normal = geometry.PLANES[state.plane]
     radius = block.take("R")
     off_plane = geometry.CENTER_WORDS[normal]
@@ -152,15 +156,15 @@ def _center(
     block.refuse_if(block.has(off_plane), off_plane, f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
     offsets = [block.take(letter) for letter in in_plane]
     if state.polar is not None and offsets != [None, None]:
-        raise ArcError("an arc with I, J or K in polar mode (G16)", "R")
+        raise geometry.ArcError("an arc with I, J or K in polar mode (G16)", "R")
     if radius is not None:
         block.refuse_if(offsets != [None, None], "R", "and a centre (I, J, K) are both given", "one of them")
         if not {first, second} & words.keys():
-            raise ArcError("an arc with R and without an end point", "an axis word of the plane")
+            raise geometry.ArcError("an arc with R and without an end point", "an axis word of the plane")
         return geometry.center_from_radius(start, end, radius * state.length_scale, clockwise)
     if offsets == [None, None] or (state.arc_absolute and None in offsets):
         expected = f"{in_plane[0]} and {in_plane[1]}, or R"
-        raise ArcError("an arc without a centre, or with one word of an absolute one (G90.1)", expected)
+        raise geometry.ArcError("an arc without a centre, or with one word of an absolute one (G90.1)", expected)
     a, b = ((offset or 0.0) * state.length_scale for offset in offsets)
     return (a, b) if state.arc_absolute else (start[0] + a, start[1] + b)
 
@@ -183,8 +187,7 @@ def machine_move(state: State, block: CurrentBlock, code: str) -> None:
     point = frames.machine_position()
     for axis, value in words.items():
         point[axis] = value
-    motion = RAPID if state.motion == "G0" else FEED
-    record(state, block, motion, frames.control_of_machine(point), machine=words)
+    record(state, block, RAPID if state.motion == "G0" else FEED, frames.control_of_machine(point), machine=words)
 
 
 def homes_standing(block: CurrentBlock, letter: str) -> bool:
@@ -218,8 +221,7 @@ def set_home(state: State, block: CurrentBlock, code: str) -> None:
     """G28.1, G30.1: the present point is the reference point from here on."""
     know_position(state, block, block.codes[code], range(6))
     offsets = state.frames.offsets
-    home = offsets.home_g28 if code == "G28.1" else offsets.home_g30
-    home[:] = state.frames.machine_position()
+    (offsets.home_g28 if code == "G28.1" else offsets.home_g30)[:] = state.frames.machine_position()
 
 
 def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, axes: Collection[int]) -> None:
