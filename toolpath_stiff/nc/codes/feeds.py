@@ -2,7 +2,6 @@
 
 import math
 
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes, holds_anyway
 from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
 from toolpath_stiff.nc.frames import Numbers
@@ -60,7 +59,7 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
     if state.feed is None:
         word = next((word for word in block.block.words if word.letter == "G"), block.block.words[0])
         block.refuse_if(state.feed_mode == "G93", word, "is a feed move without F under G93", "F above 0")
-        hint = f", or {both_names('--feed', 'MM_PER_MIN')} for such moves" if state.feed_mode == "G94" else ""
+        hint = ", or --feed MM_PER_MIN for such moves" if state.feed_mode == "G94" else ""
         raise block.fail(word, "is a feed move before any feed", f"F above 0{hint}")
     if state.feed_mode == "G93":
         feed, state.feed = state.feed, None  # every move needs its own
