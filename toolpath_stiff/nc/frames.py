@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import ShopPose
+from toolpath_stiff.poses import ShopPose
 
 if TYPE_CHECKING:
     import numpy as np
