@@ -36,10 +36,11 @@ from toolpath_stiff.placement.paths import work_path
 from toolpath_stiff.placement.placing import place_again, place_program
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.task import PlacementTask, Rewriting
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
+from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
 FARTHEST_TURN_DEG = 720.0
 MOST_FRONT_POINTS = 1000

@@ -13,7 +13,7 @@ from typing import TypeVar
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import ShopPose
+from toolpath_stiff.poses import ShopPose
 
 Numbers = TypeVar("Numbers", float, FloatArray)
 STILL = 1e-12  # of a coordinate, or of 1 mm if that is more: what frames' sums leave of an axis that stands

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.units import (
-    Pose,
     deg_from_rad,
     m_from_mm,
     m_per_s_from_mm_per_min,

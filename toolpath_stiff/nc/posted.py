@@ -13,7 +13,8 @@ from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.recovery import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.poses import Pose
+from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
 OWN_ZERO = (
     "G54 as the program or the controller file sets it is that of the machine that the program was posted for; it does "

@@ -17,7 +17,7 @@ from toolpath_stiff.nc.reader import read
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.options import Option, arguments_of, checked, switches
-from toolpath_stiff.units import Pose
+from toolpath_stiff.poses import Pose
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import Pose, ShopPose, pose_in_mm
+from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 ORIGIN_WINS = Remark(

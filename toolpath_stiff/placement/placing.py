@@ -30,8 +30,8 @@ from toolpath_stiff.placement.rows import (
 from toolpath_stiff.placement.search import search_placements
 from toolpath_stiff.placement.task import PlacementTask, Rewriting, SearchRecord
 from toolpath_stiff.placement.working import Search
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
-from toolpath_stiff.units import Pose
 
 AGAIN = "search again, without --pick"
 

@@ -11,9 +11,10 @@ from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.paths import Read
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.rewriting.program import check_rewritable
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose, mm_from_m
+from toolpath_stiff.units import mm_from_m
 
 VARIED = ("--x", "--y", "--z", "--tilt-a", "--tilt-b", "--rotate")  # options of the columns of a placement
 

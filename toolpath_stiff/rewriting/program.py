@@ -23,11 +23,12 @@ from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import read_block
+from toolpath_stiff.poses import Pose, pose_in_mm
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
 from toolpath_stiff.rewriting.turn import Turn
-from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm
+from toolpath_stiff.units import mm_from_m
 
 LINE_END = re.compile("\r\n|\n|\r")
 PLAIN_DIALECTS = ("generic", "linuxcnc")

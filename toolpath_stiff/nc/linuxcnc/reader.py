@@ -23,7 +23,7 @@ from toolpath_stiff.nc.moves import ReadProgram, Remark, Unsupported
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START
 from toolpath_stiff.nc.tables import tool_of
-from toolpath_stiff.units import ShopPose, pose_in_si
+from toolpath_stiff.poses import ShopPose, pose_in_si
 
 MACHINE_CODES = re.compile(r"G0*(?:53|28|30)(?!\d)")
 OFFSET_CODES = re.compile(r"G0*10(?!\d)")
