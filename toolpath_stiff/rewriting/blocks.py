@@ -153,8 +153,7 @@ def _piece_count(controls: Controls, move: Move) -> int:
     if controls.linearise is None or (not off_plane and leaning == 0.0):
         return 1
     tolerance = controls.linearise - controls.unit
-    option = f"--linearise {controls.linearise:g}"
-    rounding = f"{option} is no more than the rounding to {controls.digits} decimals"
+    rounding = f"--linearise {controls.linearise:g} is no more than the rounding to {controls.digits} decimals"
     controls.refuse_if(tolerance < controls.unit, rounding, "give more of it, or more --decimals")
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
     if arc is not None and (off_plane or count > 1):
@@ -169,8 +168,7 @@ def _piece_count(controls: Controls, move: Move) -> int:
 def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
     """Straight moves, the first in the block's own line."""
     stop, edit = controls.current and controls.current.code("M stop"), controls.edit
-    what = stop[0] if stop else "inverse-time feed (G93)"
-    several = f"{what} in a block that is written as several"
+    several = f"{stop[0] if stop else 'inverse-time feed (G93)'} in a block that is written as several"
     controls.refuse_if(stop or controls.out.feed_mode == "G93", several, "give it a block of its own, or G94")
     edit.remove("IJKRPLQ")
     lead = "".join(SLASH.findall(edit.render())) if edit.block.optional else ""

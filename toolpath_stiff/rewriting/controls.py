@@ -246,6 +246,6 @@ class Controls:
         repeats = next((word.value for word in self.edit.block.words if word.letter == "L"), 1.0)
         difference = differences(self.turn, wanted, written, self.unit * max(repeats, 1.0))
         unknown = ", ".join(letter for letter in "XYZ" if letter not in self.known)
-        hint = "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
-        hint = f"position {unknown} in rapid before the first cutting move" if unknown else hint
+        place = f"position {unknown} in rapid before the first cutting move"
+        hint = place if unknown else "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
         self.refuse_if(difference, f"the block cannot be rewritten: its cutting move {difference}", hint)

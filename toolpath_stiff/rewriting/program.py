@@ -139,8 +139,7 @@ def rewrite_program(
         )
         for origin in (placement, original)
     )
-    tolerance = None if linearise is None else mm_from_m(linearise)
-    controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
+    controls = Controls(source, out, Turn(placement, original), decimals, linearise and mm_from_m(linearise))
     text, encoding = read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
     if placement == original:
         return RewrittenProgram(program.name, text, encoding, [])
@@ -173,8 +172,7 @@ def check_rewritable(program: ReadProgram) -> None:
 
 def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
     """Lines with their ends; what follows the program's end stays as it is."""
-    lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), LINE_END.findall(text)
-    ends += [""] * (len(lines) - len(ends))
+    lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), [*LINE_END.findall(text), ""]
     running, started = True, False
     for number, (line, raw, end) in enumerate(zip(lines, raw_lines, ends, strict=False), 1):
         written = [line]
