@@ -160,7 +160,7 @@ def _piece_count(controls: Controls, move: Segment) -> int:
     controls.refuse_if(tolerance < controls.unit, rounding, "give more of it, or more --decimals")
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
     if arc is not None and (off_plane or count > 1):
-        controls.note(
+        controls.notes.add(
             f"arcs that the turn takes out of the planes are written as chords within {controls.linearise:g} mm"
         )
         frames = controls.source.frames
@@ -182,7 +182,7 @@ def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
             controls.edit, controls.current = edit.next_line(lead), None
         controls.motion_word(code)
         controls.go(controls.of_setup(point), [] if number else controls.axes)
-        if number == 0 or controls.edit.moves:
+        if number == 0 or any(map(controls.edit.word, AXES)):
             lines.append(controls.emit())
         if dwell:
             controls.edit = edit.next_line(lead)

@@ -87,8 +87,8 @@ def _not_about_z(program: ReadProgram, placement: Pose) -> str:
     moves = program.moves
     tilted = np.flatnonzero(np.abs(np.concatenate([moves.start, moves.end], axis=1)[:, [3, 4, 5, 9, 10, 11]]).max(1))
     if placement[5] and len(tilted):
-        line = moves.line[tilted[0]]
-        return f"the tool is tilted (line {line}), and work offsets turn X and Y, not its axis: {USE_WRITE}"
+        where = f"line {moves.line[tilted[0]]}"
+        return f"the tool is tilted ({where}), and work offsets turn X and Y, not its axis: {USE_WRITE}"
     return ""
 
 

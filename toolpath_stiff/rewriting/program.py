@@ -143,7 +143,7 @@ def rewrite_program(
     if placement == original:
         return RewrittenProgram(program.name, text, encoding, [])
     lines = list(_rewritten_lines(controls, text, program.name, switches))
-    return RewrittenProgram(program.name, "".join(lines), encoding, controls.notes)
+    return RewrittenProgram(program.name, "".join(lines), encoding, sorted(controls.notes))
 
 
 def check_rewritable(program: ReadProgram) -> None:
@@ -188,5 +188,5 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
                 problem = "a block that --block-delete leaves out cannot be rewritten"
                 raise Place(name, number).fail(problem, hint="take it out of the program, or do without --block-delete")
             if block.optional and written != [line]:
-                controls.note(SLASHED)
+                controls.notes.add(SLASHED)
         yield raw + end if written == [line] else (end or ends[0] or "\n").join(written) + end

@@ -113,9 +113,8 @@ class CutterLocationState:
     def numbers(self, statement: MajorStatement, *counts: int) -> list[float]:
         """All arguments as numbers; there must be one of `counts` of them."""
         numbers = [self.number(argument) for argument in statement.arguments]
-        if len(numbers) not in counts:
-            expected = " or ".join(map(str, counts))
-            raise self.fail(f"{statement.word}/ with {len(numbers)} numbers", f"{expected} numbers")
+        expected = f"{' or '.join(map(str, counts))} numbers"
+        self.refuse_if(len(numbers) not in counts, f"{statement.word}/ with {len(numbers)} numbers", expected)
         return numbers
 
     def scaled(self, numbers: list[float]) -> Vector:
@@ -135,8 +134,8 @@ class CutterLocationState:
         """mm/min of a feed that may be per revolution."""
         if not per_revolution:
             return feed
-        if not self.speed > 0.0:
-            raise self.fail("a feed per revolution without a spindle speed", "SPINDL/ with RPM before it")
+        no_speed = not self.speed > 0.0
+        self.refuse_if(no_speed, "a feed per revolution without a spindle speed", "SPINDL/ with RPM before it")
         return feed * self.speed
 
 
@@ -195,10 +194,11 @@ def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, 
 
 def drill(state: CutterLocationState, target: Vector, axis: Vector, hole: Drilling) -> None:
     """The hole of the cycle in force at a point, along the tool axis."""
-    if state.point is not None and axis != state.axis:
-        raise state.fail(
-            "a hole with another tool axis than the move before", "a GOTO/ before the cycle that turns the tool"
-        )
+    state.refuse_if(
+        state.point is not None and axis != state.axis,
+        "a hole with another tool axis than the move before",
+        "a GOTO/ before the cycle that turns the tool",
+    )
     feed = state.feed_per_minute(state.hole_feed, state.hole_per_revolution)
     if state.point is None:
         stand(state, along(target, axis, hole.clear), axis)
