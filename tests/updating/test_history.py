@@ -141,7 +141,6 @@ def test_a_workbooks_dates_are_read(tmp_path):
     data = read_measurements(str(tmp_path / "struts.xlsx"), nist())
     assert data.day == pytest.approx([0.0, 1.25]) and data.date[0].startswith("2024-03-01")
     assert data.beside.side.tolist() == [1.0, -1.0] and data.compliance == pytest.approx([25e-9] * 2)
-    assert data.select(np.array([1])).day == pytest.approx([1.25])
 
 
 # -- bench records -----------------------------------------------------------------------------------------------------
@@ -237,16 +236,6 @@ def test_wrong_bench_records_are_named(text, message, tmp_path):
 def stiffness_table(dates: list[str], values=lambda i: 40_000 + 10 * (i % 7)) -> str:
     rows = [f"{i % 6 + 1},{date},{values(i)}" for i, date in enumerate(d for d in dates for _ in range(6))]
     return "\n".join(["strut,date,stiffness_N_per_mm", *rows]) + "\n"
-
-
-@pytest.mark.parametrize("dates", [["2021-01", "2022-01"], ["2021", "2022", "2023"]])
-def test_months_and_years_are_drawn(dates, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("short.csv").write_text(stiffness_table(dates))
-    assert main(["reduce", "short.csv"]) == 0
-    assert Path("short_measurements_history.png").read_bytes().startswith(b"\x89PNG")
-    drawn = tps.reduce("short.csv").plot().axes[0].lines[0].get_xdata()
-    assert [str(day)[: len(date)] for day, date in zip(drawn, dates, strict=True)] == dates
 
 
 def test_failed_tests_are_set_aside_and_struts_are_printed(tmp_path):

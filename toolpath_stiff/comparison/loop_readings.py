@@ -7,7 +7,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions
 from toolpath_stiff.inference.covariances import Covariance
-from toolpath_stiff.readings.dates import day_of, short_dates
+from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.history import StrutHistory, history
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.readings.strut_series import StrutReadings
@@ -106,4 +106,4 @@ def strut_history(data: Readings, log_model: FloatArray, seed: int) -> StrutHist
         log_read[of_strut] -= modelled[of_strut] - modelled[of_strut].mean()
     dates = [""] * len(names) if data.date is None else data.date[alone].tolist()
     day = np.array([day_of(text) for text in dates], dtype=float)
-    return history(StrutReadings(names, day, log_read, data.beside.side[alone], short_dates(dates)), seed=seed)
+    return history(StrutReadings(names, day, log_read, data.beside.side[alone]), seed=seed)

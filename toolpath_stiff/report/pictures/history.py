@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from toolpath_stiff.readings.dates import date_text, day_of
 from toolpath_stiff.report.colours import MUTED, ORANGE
 from toolpath_stiff.report.history import TITLE, dated
 from toolpath_stiff.report.pictures.style import new_figure
@@ -43,10 +42,9 @@ def _strut(axes: Axes, strut: StrutOverTime) -> None:
     """One strut: dates as points, changes in orange."""
 
     def day(text: str) -> Any:  # matplotlib takes dates, its types do not say so
-        return date.fromisoformat(date_text(day_of(text)))  # a year or a month alone is its middle
+        return date.fromisoformat(text)
 
-    days = [day(mean.date) for mean in strut.dates]
-    axes.plot(days, [mean.stiffness_N_per_mm for mean in strut.dates], "o", color=MUTED, markersize=4.0)
+    axes.plot([*map(day, strut.dates)], list(strut.dates.values()), "o", color=MUTED, markersize=4.0)
     for change in strut.changes:
         ends = [day(change.after), day(change.before)]
         if change.kind == "step":
