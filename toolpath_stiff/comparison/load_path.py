@@ -1,6 +1,6 @@
 """Compliance at the measured poses, link by link of the load path."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,42 +11,27 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 
-@dataclass(frozen=True)
-class LinkShares:
-    """Compliance by link.
-
-    Attributes
-    ----------
-    links
-        "strut 1" to "strut 6", then names of effects.
-    compliance
-        (3, links) m/N along X, Y, Z, mean over the measured poses.
-    poses
-        How many poses.
-    """
-
-    links: tuple[str, ...]
-    compliance: FloatArray
-    poses: int
-
-
-def load_path_shares(model: StiffnessModel, data: Readings) -> LinkShares:
-    """Shares at the measured poses, each counted once."""
+def load_path_shares(model: StiffnessModel, data: Readings) -> dict[str, FloatArray]:
+    """Link, "strut 1" to "strut 6" and effects -> (3,) m/N along X, Y, Z, mean over the measured poses."""
     poses = repeat_groups(data, apart=("direction", "force", "loop"))
     distinct = data.select(np.unique(poses, return_index=True)[1])
     by_axis = []
     for axis in np.eye(3):
         rows = replace(distinct, direction=np.broadcast_to(axis, (len(distinct), 3)).copy())
         by_axis.append(_by_link(model, rows).mean(axis=0))
-    names = tuple(f"strut {i + 1}" for i in range(6)) + tuple(active.effect.name for active in model.effects)
-    return LinkShares(names, np.array(by_axis), len(distinct))
+    names = [*(f"strut {i + 1}" for i in range(6)), *(active.effect.name for active in model.effects)]
+    return dict(zip(names, np.array(by_axis).T, strict=True))
 
 
 def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
     """(n, links) m/N along each row's direction."""
     path, links, _, f = exact.under_load(model, measured_path(model, data), data.direction)
-    w = np.concatenate([data.direction, np.zeros((len(data), 3))], axis=1)
-    loads = np.concatenate([f, w], axis=1)
+    loads = np.concatenate([f, data.direction, np.zeros((len(data), 3))], axis=1)
+    # The platform's motion x, from J x = Q_ff f + Q_fw w.
+    stretch = links.strut * f
+    if links.loads is not None:
+        stretch = stretch + np.einsum("nij,nj->ni", links.loads[:, :6], loads)
+    motion = np.linalg.solve(path.struts.jacobian, stretch[..., None])[..., 0]
     columns = [*(f**2 / path.machine.strut_law.stiffness(path.struts.lengths)).T]
     for active in model.effects:
         energy = np.zeros(len(data))
@@ -57,15 +42,6 @@ def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
         if form is not None:
             energy += np.einsum("ni,nij,nj->n", loads, form, loads)
         if beside is not None:
-            motion = _platform_motion(path.struts.jacobian, links, f, w)
             energy += np.einsum("ni,nij,nj->n", motion, beside, motion)
         columns.append(energy)
     return np.stack(columns, axis=1)
-
-
-def _platform_motion(jacobian: FloatArray, links: exact.AssembledLinks, f: FloatArray, w: FloatArray) -> FloatArray:
-    """(n, 6) x from J x = Q_ff f + Q_fw w."""
-    stretch = links.strut * f
-    if links.loads is not None:
-        stretch = stretch + np.einsum("nij,nj->ni", links.loads[:, :6], np.concatenate([f, w], axis=1))
-    return np.asarray(np.linalg.solve(jacobian, stretch[..., None])[..., 0])

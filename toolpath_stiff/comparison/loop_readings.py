@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.comparison.residuals import directions
 from toolpath_stiff.inference.covariances import Covariance
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.history import StrutHistory, history
@@ -16,25 +15,11 @@ STANDS_OUT = 3.0  # standard deviations from which a loop is said to read someth
 
 
 @dataclass(frozen=True)
-class LoopReadingFigures:
-    """One reading; nm per N of load at the tip (of a strut alone: of force in it)."""
-
-    file: str
-    line: int
-    point: str
-    loop: str
-    direction: str
-    force_N: float
-    read_nm_per_N: float
-    model_nm_per_N: float
-    off_nm_per_N: float
-    sd_nm_per_N: float
-    standard_deviations: float
-
-
-@dataclass(frozen=True)
 class LoopMean:
-    """All readings of one loop; counted in the direction in which the machine file's struts would move it."""
+    """All readings of one loop, nm per N of load at the tip (of a strut alone: of force in it).
+
+    Counted in the direction in which the machine file's struts would move it.
+    """
 
     loop: str
     readings: int
@@ -46,16 +31,8 @@ class LoopMean:
     text: str
 
 
-@dataclass(frozen=True)
-class BesideTip:
-    """Loops beside the tip: by loop, and reading by reading."""
-
-    by_loop: tuple[LoopMean, ...] = ()
-    readings: tuple[LoopReadingFigures, ...] = ()
-
-
-def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> BesideTip:
-    """Readings of loops beside the tip.
+def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> tuple[LoopMean, ...]:
+    """Readings of loops beside the tip, by loop.
 
     Parameters
     ----------
@@ -68,28 +45,22 @@ def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> Bes
     """
     beside = data.beside
     if beside is None:
-        return BesideTip()
+        return ()
     joined = np.exp(-log_model)
     read, model, sd = 1e9 * data.compliance, 1e9 * beside.alone(joined), 1e9 * np.sqrt(spread.diagonal) * joined
-    rows = np.flatnonzero(beside.beside)
-    along, off = directions(data), read - model
-    texts = (data.file, data.line, data.point, data.loop, along)
-    figures = (data.force, read, model, off, sd, off / sd)
-    columns = (column[rows].tolist() for column in (*texts, *figures))
-    readings = [LoopReadingFigures(*row) for row in zip(*columns, strict=True)]
     means = []
-    for name in dict.fromkeys(data.loop[rows].tolist()):
+    for name in dict.fromkeys(data.loop[beside.beside].tolist()):
         of_loop = data.loop == name
         weights = np.where(of_loop, 1.0 / sd**2, 0.0)
         toward = beside.toward * weights / weights.sum()
         error = 1e9 * float(np.sqrt(spread.squares(toward * joined)))
-        count, mean, modelled, apart = int(of_loop.sum()), *(float(toward @ part) for part in (read, model, off))
+        count, mean, modelled = int(of_loop.sum()), float(toward @ read), float(toward @ model)
+        ratio = float(toward @ (read - model)) / error
         text = f"{name}: {mean:.2f} nm/N read in the mean of {count}, {modelled:.2f} nm/N modelled"
-        side = "more" if apart > 0.0 else "less"
-        ratio = apart / error
+        side = "more" if ratio > 0.0 else "less"
         text += f": {abs(ratio):.1f} standard deviations {side}" if abs(ratio) >= STANDS_OUT else ", which agrees"
-        means.append(LoopMean(name, count, mean, modelled, apart, error, ratio, text))
-    return BesideTip(tuple(means), tuple(readings))
+        means.append(LoopMean(name, count, mean, modelled, ratio * error, error, ratio, text))
+    return tuple(means)
 
 
 def strut_history(data: Readings, log_model: FloatArray, seed: int) -> StrutHistory:

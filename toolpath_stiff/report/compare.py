@@ -154,9 +154,9 @@ def far_off(summary: ComparisonSummary, most: int) -> ShownTable:
 
 def _model_free(summary: ComparisonSummary) -> ShownTable:
     """Checks that need no stiffness model, and why others cannot be made."""
-    checks, cannot = summary.model_free.checks, summary.model_free.cannot_check
+    checks, cannot = summary.model_free, summary.not_checked
     rows = [(check.check, check.text, f"{check.statistic:+.1f}", f"{check.p_adjusted:.2g}") for check in checks]
-    rows += [(check.check, f"not checked: {check.reason}", "", "") for check in cannot]
+    rows += [(check, f"not checked: {reason}", "", "") for check, reason in cannot.items()]
     kinds = ["" if check.holds else "finding" for check in checks] + ["out"] * len(cannot)
     return ShownTable(("principle", "result", ">t", ">p, corrected"), rows, kinds)
 
@@ -192,8 +192,8 @@ def text(comparison: Comparison) -> str:
             others = ", ".join(finding.indistinguishable_from)
             lines.append(f"  ({plain(finding.pattern)} looks the same here as: {plain(others)})")
     lines += [*loops_text(summary.loops), *history_text(summary.history), "", "checks without a model"]
-    lines += [f"  {plain(check.text)}" for check in summary.model_free.checks]
-    lines += [f"  {check.check}: {check.reason}" for check in summary.model_free.cannot_check]
+    lines += [f"  {plain(check.text)}" for check in summary.model_free]
+    lines += [f"  {check}: {reason}" for check, reason in summary.not_checked.items()]
     if summary.outliers:
         lines += ["", "readings far off", *far_off(summary, MOST_NAMED).lines(2)]
         if len(summary.outliers) > MOST_NAMED:

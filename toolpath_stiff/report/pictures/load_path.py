@@ -19,12 +19,12 @@ LINKS = (BLUE, LIGHT_BLUE)  # struts, alternating
 
 def load_path(comparison: Comparison) -> Figure:
     """Compliance of the tip along X, Y, Z, link by link, and what the measurements add or take."""
-    shares = comparison.shares
-    compliance = shares.compliance * NM_PER_N
+    links = tuple(comparison.shares)
+    compliance = np.array([*comparison.shares.values()]).T * NM_PER_N
     along = directions(comparison.data)
     ratio = np.array([_measured_over_modelled(comparison, along == axis) for axis in "XYZ"])
-    below = 0.95 if max(len(name) for name in shares.links) <= LONG_NAME else 1.45
-    poses = counted(shares.poses, "measured pose")
+    below = 0.95 if max(len(name) for name in links) <= LONG_NAME else 1.45
+    poses = counted(len(comparison.data.poses[0]), "measured pose")
     figure = new_figure(
         13.0, 4.25 + below, "Which link takes what share of the compliance?", f"mean over {poses}; last bars: the "
         f"model's sum and what was measured along that direction, with {DEVIATION} of its stiffness, {MINUS_IS_SOFTER}",
@@ -32,7 +32,7 @@ def load_path(comparison: Comparison) -> Figure:
     top = 1.18 * float(np.nanmax(compliance.sum(axis=1) * np.fmax(ratio, 1.0)))
     for i, axis in enumerate("XYZ"):
         axes = panel(figure, 0.75 + 4.1 * i, below, 3.8, 3.05)
-        _waterfall(axes, compliance[i], shares.links, float(ratio[i]))
+        _waterfall(axes, compliance[i], links, float(ratio[i]))
         axes.set_ylim(0.0, top)
         axes.set_title(f"{axis}: {compliance[i].sum():.1f} nm/N modelled", color=DIRECTIONS[axis])
         axes.tick_params(labelleft=not i)
