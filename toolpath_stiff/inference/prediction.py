@@ -188,8 +188,7 @@ class Predictor:
 
     def strut_part(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(..., n) m/N that the struts contribute to the compliance along each reading, for laws (..., 2)."""
-        first, second = self._law_terms(law)
-        return np.asarray((self._squared_forces / (first + second)).sum(axis=-2)[..., self._timeless.which])
+        return self.strut_part_and_slopes(law)[0]
 
     def strut_part_and_slopes(self, law: ArrayLike = NO_CHANGE) -> tuple[FloatArray, FloatArray]:
         """`strut_part`, and its derivatives (..., 2, n) to the law's logarithms: they add up to minus the part."""
@@ -231,10 +230,9 @@ class Predictor:
             for strut, axis in np.ndindex(6, 3):
                 joints = np.array(getattr(given, name))
                 joints[strut, axis] += JOINT_STEP
-                moved = replace(
-                    self.base, machine=given.with_changes(**{name: joints}), control=self.base.control or given
-                )
-                stiffness = mechanical_stiffness(moved, measured_path(moved, prepared.data), prepared.data)
+                moved = given.with_changes(**{name: joints})
+                model = replace(self.base, machine=moved, control=self.base.control or given)
+                stiffness = mechanical_stiffness(model, measured_path(model, prepared.data), prepared.data)
                 columns.append((np.log(stiffness) - self._base_log)[prepared.which] / JOINT_STEP)
         return np.stack(columns, axis=1)
 
@@ -251,24 +249,21 @@ def idle_on(model: StiffnessModel, data: Readings) -> dict[str, str]:
 
 def _prepare(model: StiffnessModel, data: Readings, timed: bool) -> _Prepared:
     """Rows that differ in nothing that mechanics sees are solved once: repeats cost nothing."""
-    setups = np.unique(data.setup, return_inverse=True)[1].astype(float)
-    columns = [data.position, data.angles, data.direction, data.force[:, None], data.tool_extension[:, None]]
-    columns += [setups[:, None], np.nan_to_num(data.temperature, nan=-1e3)[:, None]]
-    if timed:
-        columns.append(np.nan_to_num(data.time, nan=-1.0)[:, None])
-    beside = data.beside
-    if beside is not None:
-        columns += [beside.which[:, None].astype(float), beside.offset[:, None], beside.toward[:, None]]
-        columns.append(np.nan_to_num(beside.length)[:, None])
-    keys = np.concatenate(columns, axis=1)
+    setups = np.unique(data.setup, return_inverse=True)[1]
+    columns = [data.angles, data.direction, data.force, data.tool_extension, setups]
+    columns += [np.nan_to_num(data.temperature, nan=-1e3)]
+    columns += [np.nan_to_num(data.time, nan=-1.0)] if timed else []
+    if data.beside is not None:
+        beside = data.beside
+        columns += [beside.which, beside.offset, beside.toward, np.nan_to_num(beside.length)]
+    keys = np.column_stack([data.position, *columns])
     _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     distinct = data.select(first)
     path = measured_path(model, distinct)
     wrenches = np.zeros((len(distinct), 6, 1))
     wrenches[:, :3, 0] = distinct.direction
     _, forces = exact.respond(path, exact.assemble_links(model, path), wrenches)
-    products = forces[..., 0] ** 2
-    if distinct.beside is not None:
-        few = distinct.beside
+    products, few = forces[..., 0] ** 2, distinct.beside
+    if few is not None:
         products = law_products(forces[..., 0], few.loops, few.which) * few.toward[:, None]
     return _Prepared(distinct, which.reshape(-1).astype(np.int64), path, forces[..., 0], products)
