@@ -17,7 +17,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.load_path import load_path_shares
-from toolpath_stiff.comparison.loop_readings import beside_tip, strut_history
+from toolpath_stiff.comparison.loop_readings import beside_tip
 from toolpath_stiff.comparison.principles import assess, model_free_checks
 from toolpath_stiff.comparison.residuals import ReadingNames, Variable, labels, modelled, patterns, variables
 from toolpath_stiff.comparison.structure import FoundPattern, Scattering, find_structure, shared_tests
@@ -190,11 +190,10 @@ def compare(
         structures.append(find_structure(values, looked_for, scattering))
         outcomes.append(assess(checks, tip, scattering.covariance, scattering.draws(0.0)))
     summary = summary_of(predictor, values, structures, outcomes, not_checked, notes, seed)
-    if data.beside is not None:  # other loops against the machine as its file has it; struts alone over their dates
+    if data.beside is not None:  # other loops against the machine as its file has it
         every = Predictor(machine, data, effect_files)
         spread = covariance(noise_models(data, noise, strut_spread)[-1], every)
-        loops = beside_tip(data, every.log_stiffness(), spread)
-        summary = replace(summary, loops=loops, history=strut_history(data, every.log_stiffness(), seed))
+        summary = replace(summary, loops=beside_tip(data, every.log_stiffness(), spread))
     return Comparison(
         predictor,
         predictor.data,

@@ -6,10 +6,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Covariance
-from toolpath_stiff.readings.dates import day_of
-from toolpath_stiff.readings.history import StrutHistory, history
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.readings.strut_series import StrutReadings
 
 STANDS_OUT = 3.0  # standard deviations from which a loop is said to read something else than the model has
 
@@ -61,20 +58,3 @@ def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> tup
         text += f": {abs(ratio):.1f} standard deviations {side}" if abs(ratio) >= STANDS_OUT else ", which agrees"
         means.append(LoopMean(name, count, mean, modelled, ratio * error, error, ratio, text))
     return tuple(means)
-
-
-def strut_history(data: Readings, log_model: FloatArray, seed: int) -> StrutHistory:
-    """Struts measured alone, over their dates and by the sign of their force.
-
-    Readings at several lengths are reduced to the mean of these by the model's own stiffness, `log_model` (n,).
-    """
-    if data.beside is None:
-        return StrutHistory()
-    alone = np.array([loop.kind == "alone" for loop in data.beside.loops])[data.beside.which]
-    names, log_read, modelled = data.loop[alone], np.log(data.stiffness[alone]), log_model[alone]
-    for name in np.unique(names):
-        of_strut = names == name
-        log_read[of_strut] -= modelled[of_strut] - modelled[of_strut].mean()
-    dates = [""] * len(names) if data.date is None else data.date[alone].tolist()
-    day = np.array([day_of(text) for text in dates], dtype=float)
-    return history(StrutReadings(names, day, log_read, data.beside.side[alone]), seed=seed)

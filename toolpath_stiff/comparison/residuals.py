@@ -4,8 +4,6 @@ A `Variable` is numbers (height, time, force), `ReadingNames` are names (set-up,
 heights, zones are distances from the machine's axis.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from toolpath_stiff.inference.noise import Noise, Scatter
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.inference.slips import SuspectEntry, suspect_entries, suspect_rows
 from toolpath_stiff.machine.model import StrutLaw
-from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
@@ -126,7 +125,6 @@ class ComparisonSummary:
     findings: list[PatternFinding]
     outliers: list[FarReading]
     loops: Sequence[LoopMean] = ()
-    history: StrutHistory = field(default_factory=StrutHistory)
     model_free: list[CheckOutcome]
     not_checked: dict[str, str]
     noise: list[NoiseFigures]

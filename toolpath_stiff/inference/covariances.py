@@ -17,14 +17,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 
-Rows = NDArray[np.int64]
+Rows = IntArray
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class Groups:
     of: Rows
 
     @classmethod
-    def by(cls, labels: NDArray[Any]) -> Groups:
+    def by(cls, labels: AnyArray) -> Groups:
         """Readings with equal labels (n,) together."""
         return cls(np.unique(labels, return_inverse=True)[1].reshape(-1).astype(np.int64))
 
@@ -222,10 +220,8 @@ class Precision:
         own_variance, of = self.own_variance[columns], self.groups.of[columns]
         factors = np.moveaxis(self.factors[:, columns], 0, -2)
         same = of[..., :, None] == of[..., None, :]
-        blocks = -(same * (self.pull[of] / own_variance)[..., None, :]) / own_variance[..., :, None]
-        diagonal = np.arange(columns.shape[-1])
-        blocks[..., diagonal, diagonal] += 1.0 / own_variance
-        return np.asarray(blocks - np.swapaxes(factors, -1, -2) @ factors)
+        blocks = np.eye(columns.shape[-1]) - same * (self.pull[of] / own_variance)[..., None, :]
+        return np.asarray(blocks / own_variance[..., :, None] - np.swapaxes(factors, -1, -2) @ factors)
 
     def beside(self, fitted: FloatArray, prior: FloatArray) -> Precision:
         """P = A - A J (J^T A J + prior)^-1 J^T A: of what a fit of p unknowns leaves of the readings.

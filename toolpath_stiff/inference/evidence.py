@@ -304,26 +304,21 @@ class Problem:
         if len(chosen) == 1:
             # By quadrature, which holds for sizes next to nothing as well, with the profile as a parabola.
             mean = self.prior(*chosen[0]).log_mean_likelihood(float(sizes[0]), float(deviations[0]))
-            return peak - 0.5 * float(np.linalg.slogdet(information[:2, :2])[1]) + mean
+            return float(peak - 0.5 * np.linalg.slogdet(information[:2, :2])[1] + mean)
         evidence = peak - 0.5 * float(np.linalg.slogdet(information)[1]) + 0.5 * len(chosen) * np.log(2.0 * np.pi)
         around = np.sign(sizes) * np.maximum(np.abs(sizes), deviations)
         for table in fit.tables:
             rows = [i for i, (owner, _) in enumerate(chosen) if owner is table]
             # The strongest component by itself, the others comparable to it.
-            changes = {i: self._rms_alone(*chosen[i], around[i]) for i in rows}
-            first = max(rows, key=lambda i: changes[i], default=None)
+            units = {i: around[i] * np.eye(len(table.candidate.components))[chosen[i][1]] for i in rows}
+            changes = {i: float(np.sqrt(np.mean(self.sight.change(table.delta(u)) ** 2))) for i, u in units.items()}
+            first = max(rows, key=lambda i: changes[i], default=-1)
             for i in rows:
                 if i == first:
                     evidence += self.prior(*chosen[i]).log_density_around(float(sizes[i]), float(deviations[i]))
                 else:
                     evidence += log_comparable(changes[i] / changes[first]) - np.log(abs(around[i]))
         return float(evidence)
-
-    def _rms_alone(self, table: CandidateTable, j: int, size: float) -> float:
-        """Rms change of ln stiffness by one component alone."""
-        unit = np.zeros(len(table.candidate.components))
-        unit[j] = size
-        return float(np.sqrt(np.mean(self.sight.change(table.delta(unit)) ** 2)))
 
     def _gauss_newton(
         self, tables: Sequence[CandidateTable], start: FloatArray, unknowns: Sequence[int], precision: Precision

@@ -133,7 +133,7 @@ def _scanned(
         more = np.linspace(low, high, 8)[1:-1]
         known = with_more(more[(more != 0.0) & (more != sizes[peak])])
     peak = int(np.argmax(known[1]))
-    size = float(known[0][peak])
+    size = known[0][peak]
     more = size + _width(known[0], known[1], peak) * np.linspace(-4.5, 4.5, 14)
     more = more[(more * size > 0.0) & (np.abs(more) <= table.reach(float(np.sign(size))))]
     return with_more(more) if len(more) else known
@@ -156,21 +156,20 @@ def score_families(problem: Problem, effects: Iterable[Effect], base: Fit) -> li
 
 def tables_of(problem: Problem, effect: Effect) -> list[CandidateTable]:
     """The tables of an effect, one a choice that does something to these data."""
-    candidates = candidates_of(effect, problem.predictor.data)
-    return list(filter(None, (table_of(candidate, problem.predictor) for candidate in candidates)))
+    tables = (table_of(candidate, problem.predictor) for candidate in candidates_of(effect, problem.predictor.data))
+    return list(filter(None, tables))
 
 
 def signatures(problem: Problem, tables: Iterable[CandidateTable]) -> list[list[FloatArray]]:
     """One-sided small-size signatures d ln k / d size of every candidate: subsets of columns (n, p), sizes >= 0."""
     signs = []
     for table in tables:
-        columns = -table.columns / problem.base_compliance[:, None]
-        components = table.candidate.components
+        columns, components = -table.columns / problem.base_compliance[:, None], table.candidate.components
         if len(components) == 1:
             signs.append([columns * sign for sign in components[0].signs])
         else:
-            toward = np.array([c.signs[-1] for c in components])
-            signs.append([(columns * toward)[:, list(subset)] for subset in table.candidate.subsets()])
+            toward = columns * np.array([c.signs[-1] for c in components])
+            signs.append([toward[:, list(subset)] for subset in table.candidate.subsets()])
     return signs
 
 

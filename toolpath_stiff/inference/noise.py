@@ -20,9 +20,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
@@ -93,7 +92,7 @@ class Noise:
     freedom: float
     origin: str
     remark: str = ""
-    tip: NDArray[np.bool_] | None = None
+    tip: BoolArray | None = None
 
     @property
     def guess(self) -> str:
@@ -123,7 +122,7 @@ class Noise:
     def _of_tip(self, values: FloatArray) -> FloatArray:
         return values if self.tip is None or not self.tip.any() else values[self.tip]
 
-    def select(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Noise:
+    def select(self, rows: BoolArray | IntArray) -> Noise:
         """The noise of some of the readings."""
         return replace(self, repeat=self.repeat[rows], tip=None if self.tip is None else self.tip[rows])
 

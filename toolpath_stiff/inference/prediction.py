@@ -90,7 +90,7 @@ class Predictor:
         self.effect_files = tuple(effect_files)
         self.base = build_model(machine, self.effect_files)
         failed = failures(own_effects(self.base, self.effect_files), machine)
-        warnings = (*failed, *data.warnings, *idle_on(self.base, data).values())
+        warnings = [*failed, *data.warnings, *idle_on(self.base, data).values()]
         self.data = replace(data, warnings=tuple(dict.fromkeys(warnings)))
         self._timeless = _prepare(self.base, data, timed=False)
         self._timed = _prepare(self.base, data, timed=True)
@@ -105,9 +105,8 @@ class Predictor:
     @property
     def effects_that_act(self) -> list[str]:
         """Effects and instruments of the machine file that change these readings, for headings."""
-        idle = idle_on(self.base, self.data)
-        names = [active.effect.name for active in (*self.base.effects, *self.base.instruments)]
-        return [name for name in names if name not in idle]
+        every, idle = (*self.base.effects, *self.base.instruments), idle_on(self.base, self.data)
+        return [active.effect.name for active in every if active.effect.name not in idle]
 
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
         """(n,) ln(N/m) that the readings should show; nan where the model has no answer.
@@ -115,8 +114,7 @@ class Predictor:
         `effects` come on top of those of the machine file; instruments among them change the readings only. The last
         answers are kept: a fit begins where the one before it ended, and asks for the same again.
         """
-        chosen = tuple((active.effect.name, *active.values.items()) for active in effects)
-        key = (*np.asarray(law, dtype=float).tolist(), chosen)
+        key = (*np.asarray(law, dtype=float).tolist(), *((a.effect.name, *a.values.items()) for a in effects))
         if key not in self._answers:
             while len(self._answers) >= ANSWERS_KEPT:
                 self._answers.pop(next(iter(self._answers)))
@@ -166,17 +164,15 @@ class Predictor:
 
     def strut_columns(self) -> FloatArray:
         """(n, 6) d ln k / d ln(stiffness of strut i) at the machine file's strut law: its share of the compliance."""
-        prepared = self._timeless
-        softness = 1.0 / self.machine.strut_law.stiffness(prepared.path.struts.lengths)
+        prepared, law = self._timeless, self.machine.strut_law
+        softness = 1.0 / law.stiffness(prepared.path.struts.lengths)
         return np.asarray((prepared.products * softness * np.exp(self._base_log)[:, None])[prepared.which])
 
     def struts_carry_all(self, effects: Iterable[Effect]) -> bool:
         """Whether these effects and the machine file's leave geometry, equilibrium and readings as they are."""
+        every = (*effects, *(active.effect for active in (*self.base.effects, *self.base.instruments)))
         hooks = ("geometry", "parallel_stiffness", "reading")
-        mine = (active.effect for active in (*self.base.effects, *self.base.instruments))
-        return not any(
-            getattr(type(effect), hook) is not getattr(Effect, hook) for effect in (*effects, *mine) for hook in hooks
-        )
+        return all(getattr(type(effect), hook) is getattr(Effect, hook) for effect in every for hook in hooks)
 
     def law_columns(self, log_stiffness: FloatArray, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(n, 2) d ln k / d law where the model says `log_stiffness` (n,).

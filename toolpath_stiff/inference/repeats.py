@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.readings.measurements import Readings
@@ -51,7 +50,7 @@ ALIKE = ("position", "angles", "direction", "force", "tool_extension", "setup", 
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
-def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> NDArray[np.int64]:
+def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> IntArray:
     """(n,) number of each reading's group: the same pose, direction, load, tool, set-up and loop.
 
     `apart`: those of `ALIKE` in which the readings of a group may differ.
@@ -127,7 +126,7 @@ def from_repeats(data: Readings) -> Repeats | None:
     return replace(result, repeat=factor * result.repeat, wild=share)
 
 
-def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, float]:
+def _mixture(deviations: FloatArray, size: IntArray) -> tuple[float, float]:
     """Factor on the scatter, and share of wild readings, from deviations (n,) of repeats.
 
     A reading's deviation from the others of its group of `size` (n,) is wild with itself or with one of them; for pairs
@@ -170,7 +169,7 @@ class _Contrasts:
         Whether every reading was clamped by itself: the differences then hold clamping too.
     """
 
-    def __init__(self, data: Readings, groups: NDArray[np.int64]) -> None:
+    def __init__(self, data: Readings, groups: IntArray) -> None:
         means, clamps = Groups.by(groups), Groups.by(data.clamp)
         sizes = np.bincount(means.of)
 

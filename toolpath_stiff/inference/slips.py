@@ -310,6 +310,6 @@ def _gain_of_wild(scatter: Scatter, rows: Rows, block: FloatArray, pull: FloatAr
     if not far.any():
         return 0.0
     inner, part, widening = block[np.ix_(far, far)], pull[far], scatter.widening[rows[far]]
-    gain = float(part @ np.linalg.solve(np.diag(1.0 / widening) + inner, part))
-    volume = float(np.linalg.slogdet(np.eye(len(part)) + widening[:, None] * inner)[1])
-    return 0.5 * (gain - volume) - len(part) * scatter.price
+    gain = part @ np.linalg.solve(np.diag(1.0 / widening) + inner, part)
+    volume = np.linalg.slogdet(np.eye(len(part)) + widening[:, None] * inner)[1]
+    return float(0.5 * (gain - volume) - len(part) * scatter.price)

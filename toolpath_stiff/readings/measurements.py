@@ -9,13 +9,11 @@ from functools import cached_property
 from importlib import resources
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.machine.model import Hexapod
@@ -108,7 +106,7 @@ class Readings:
     point: TextArray
     clamp: TextArray
     file: TextArray
-    line: NDArray[np.int64]
+    line: IntArray
     extra: Mapping[str, FloatArray]
     missing: tuple[str, ...]
     notes: tuple[str, ...] = ()
@@ -120,7 +118,7 @@ class Readings:
         return len(self.position)
 
     @property
-    def tip(self) -> NDArray[np.bool_]:
+    def tip(self) -> BoolArray:
         """(n,) readings of the tool tip against the work."""
         return np.ones(len(self), dtype=bool) if self.beside is None else ~self.beside.beside
 
@@ -149,13 +147,13 @@ class Readings:
         return np.asarray(days - np.nanmin(days))
 
     @cached_property
-    def poses(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def poses(self) -> tuple[IntArray, IntArray]:
         """(p,) a row of each distinct pose with its tool, and (n,) which of them each reading was taken at."""
         columns = np.concatenate([self.position, self.angles, self.tool_extension[:, None]], axis=1)
         _, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
         return first, which.reshape(-1)
 
-    def select(self, rows: NDArray[Any]) -> Readings:
+    def select(self, rows: AnyArray) -> Readings:
         """Some of the rows, by mask or index."""
         chosen = {
             f.name: getattr(self, f.name)[rows] for f in fields(self) if isinstance(getattr(self, f.name), np.ndarray)
@@ -294,7 +292,7 @@ def _columns(rows: list[Row], notes: Sequence[str], machine: Hexapod) -> Reading
             *(f"column {name} is not in every file and is not used" for name in dropped),
             *[bench] * bool(unknown),
         ),
-        beside=None if on_tip.all() else LoopColumns.of(labels["loop"].tolist(), numbers("length"), numbers("side")),
+        beside=None if on_tip.all() else LoopColumns.of(labels["loop"].tolist(), numbers("length")),
         date=dates if (dates != "").any() else None,
     )
 
@@ -355,7 +353,7 @@ def _points(poses: FloatArray, labels: TextArray) -> TextArray:
     return np.array([label or names[key] for key, label in zip(keys, labels, strict=True)], dtype=str)
 
 
-def reading_columns(data: Readings) -> dict[str, NDArray[Any]]:
+def reading_columns(data: Readings) -> dict[str, AnyArray]:
     """Column -> values of a table of the readings, in the shop's units; those that no file has are left out."""
     pose = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles), data.direction], axis=1)
     with np.errstate(divide="ignore"):

@@ -9,8 +9,6 @@ from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import Variable, directions, planes
 from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors
 from toolpath_stiff.inference.errors import deviation_percent
-from toolpath_stiff.report import history
-from toolpath_stiff.report.history import history_section, history_text
 from toolpath_stiff.report.loops import loops_section, loops_text
 from toolpath_stiff.report.pages import Section, page_of, readings_head
 from toolpath_stiff.report.tables import ShownTable
@@ -34,7 +32,6 @@ QUESTIONS = {
         "Three times the same around the axis: geometry or the law of all struts. One side only: one strut, one joint, "
         "the table, or a cable.",
     ),
-    history.PICTURE: history.QUESTION,
     "strips.png": (
         "Drift, a bad clamping, one bad reading?",
         "A slope is drift, a step is a clamping, a lone bar is a reading to take again.",
@@ -79,8 +76,6 @@ def page(comparison: Comparison, drawn: Mapping[str, bytes]) -> str:
         *("planes.png", "machine.png", "strips.png"),
         ("Readings far off", far_off(summary, MOST_FAR_OFF)),
         loops_section(summary.loops),
-        history_section(summary.history),
-        history.PICTURE,
         "variables.png",
         ("Checks without a model", _model_free(summary)),
         "load_path.png",
@@ -191,7 +186,7 @@ def text(comparison: Comparison) -> str:
         if finding.indistinguishable_from:
             others = ", ".join(finding.indistinguishable_from)
             lines.append(f"  ({plain(finding.pattern)} looks the same here as: {plain(others)})")
-    lines += [*loops_text(summary.loops), *history_text(summary.history), "", "checks without a model"]
+    lines += [*loops_text(summary.loops), "", "checks without a model"]
     lines += [f"  {plain(check.text)}" for check in summary.model_free]
     lines += [f"  {check}: {reason}" for check, reason in summary.not_checked.items()]
     if summary.outliers:

@@ -13,7 +13,6 @@ from toolpath_stiff.comparison.residuals import directions, planes
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.colours import DIRECTIONS, FAINT, INK, MUTED, RED, RESIDUAL, WITHIN
 from toolpath_stiff.report.pictures.before_after import BAND, MAPS, maps, one_to_one, panels
-from toolpath_stiff.report.pictures.history import history
 from toolpath_stiff.report.pictures.load_path import load_path
 from toolpath_stiff.report.pictures.style import Look, new_figure, panel, round_ticks
 from toolpath_stiff.report.pictures.variables import variables
@@ -204,11 +203,6 @@ def where_it_fails(comparison: Comparison) -> Figure:
     return figure
 
 
-def over_dates(comparison: Comparison) -> Figure | None:
-    """Struts over their dates."""
-    return history(comparison.summary.history)
-
-
 PICTURES = {
     "measured_modelled.png": measured_modelled,
     "planes.png": by_plane,
@@ -216,5 +210,4 @@ PICTURES = {
     "strips.png": strips,
     "variables.png": variables,
     "load_path.png": load_path,
-    "history.png": over_dates,
 }
