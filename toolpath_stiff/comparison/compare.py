@@ -105,8 +105,7 @@ class Comparison(FolderResult):
     @cached_property
     def document(self) -> Document:
         """The content of compare.json."""
-        document: Document = to_dict(self.summary)
-        return document
+        return dict(to_dict(self.summary))
 
     def to_dict(self) -> dict[str, Any]:
         """The content of compare.json."""
@@ -123,8 +122,7 @@ class Comparison(FolderResult):
 
     def variance(self, weights: FloatArray) -> float:
         """Of a combination of residuals with weights (n,), by noise and by what it leaves unexplained."""
-        of_places = float((self.places.sums(weights) ** 2).sum())
-        return float(self.covariance.squares(weights)) + self.excess**2 * of_places
+        return float(self.covariance.squares(weights) + self.excess**2 * (self.places.sums(weights) ** 2).sum())
 
 
 def compare(

@@ -15,10 +15,8 @@ def load_path_shares(model: StiffnessModel, data: Readings) -> dict[str, FloatAr
     """Link, "strut 1" to "strut 6" and effects -> (3,) m/N along X, Y, Z, mean over the measured poses."""
     poses = repeat_groups(data, apart=("direction", "force", "loop"))
     distinct = data.select(np.unique(poses, return_index=True)[1])
-    by_axis = []
-    for axis in np.eye(3):
-        rows = replace(distinct, direction=np.broadcast_to(axis, (len(distinct), 3)).copy())
-        by_axis.append(_by_link(model, rows).mean(axis=0))
+    axes = (np.broadcast_to(axis, (len(distinct), 3)).copy() for axis in np.eye(3))
+    by_axis = [_by_link(model, replace(distinct, direction=axis)).mean(axis=0) for axis in axes]
     names = [*(f"strut {i + 1}" for i in range(6)), *(active.effect.name for active in model.effects)]
     return dict(zip(names, np.array(by_axis).T, strict=True))
 

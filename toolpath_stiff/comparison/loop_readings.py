@@ -54,7 +54,7 @@ def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> tup
         count, mean, modelled = int(of_loop.sum()), float(toward @ read), float(toward @ model)
         ratio = float(toward @ (read - model)) / error
         text = f"{name}: {mean:.2f} nm/N read in the mean of {count}, {modelled:.2f} nm/N modelled"
-        side = "more" if ratio > 0.0 else "less"
-        text += f": {abs(ratio):.1f} standard deviations {side}" if abs(ratio) >= STANDS_OUT else ", which agrees"
+        off = f": {abs(ratio):.1f} standard deviations {'more' if ratio > 0.0 else 'less'}"
+        text += off if abs(ratio) >= STANDS_OUT else ", which agrees"
         means.append(LoopMean(name, count, mean, modelled, ratio * error, error, ratio, text))
     return tuple(means)

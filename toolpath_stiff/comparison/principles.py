@@ -89,10 +89,10 @@ def model_free_checks(machine: Hexapod, data: Readings) -> tuple[list[Check], di
     """The checks that n readings allow; for the others, why not."""
     cells, turns = Groups.by(repeat_groups(data)).members(), symmetries(machine)
     threefold = sum(np.linalg.det(q) > 0 for q in turns) == 2
-    across = "no pose on the axis was measured along X and Y with the spindle vertical"
     turned = "a turn by 120 degrees does not leave this machine's joints as they are"
+    across = "no pose on the axis was measured along X and Y with the spindle vertical"
     kinds = {
-        ON_AXIS: (_on_axis(data, cells) if threefold else (), across if threefold else turned),
+        ON_AXIS: (_on_axis(data, cells), across) if threefold else ((), turned),
         IMAGES: (_images(data, cells, turns), "no two readings are images of each other under its symmetry"),
         "proportionality": (_proportionality(data), "no pose was measured at two loads"),
         "set-ups": (_setups(data), "no pose was measured in two set-ups"),
@@ -111,10 +111,9 @@ def assess(checks: list[Check], data: Readings, covariance: Covariance, draws: F
         return []
     weights = np.array([check.weights for check in checks])
     sd = np.sqrt(covariance.squares(weights))
-    value = weights @ np.log(data.stiffness)
     largest = np.abs(draws @ (weights / sd[:, None]).T).max(axis=1)
     outcomes = []
-    for check, size, spread in zip(checks, value.tolist(), sd.tolist(), strict=True):
+    for check, size, spread in zip(checks, (weights @ np.log(data.stiffness)).tolist(), sd.tolist(), strict=True):
         p = (1.0 + float((largest >= abs(size) / spread).sum())) / (1.0 + len(largest))
         percent, error = 100.0 * np.expm1(size), 100.0 * spread
         text = check.text.format(percent=f"{percent:+.2g} % (scatter alone: +-{2 * error:.2g} %)")

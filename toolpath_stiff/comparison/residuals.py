@@ -118,9 +118,8 @@ def planes(data: Readings) -> TextArray:
 
 def plane_heights_mm(data: Readings) -> dict[str, float]:
     """Mean height of each plane's readings, mm; the lowest first."""
-    names = planes(data)
-    heights = {str(name): float(mm_from_m(data.position[names == name, 2]).mean()) for name in np.unique(names)}
-    return dict(sorted(heights.items(), key=lambda plane: plane[1]))
+    where, z = planes(data), mm_from_m(data.position[:, 2])
+    return dict(sorted(((str(p), float(z[where == p].mean())) for p in np.unique(where)), key=lambda plane: plane[1]))
 
 
 def radius(data: Readings) -> FloatArray:

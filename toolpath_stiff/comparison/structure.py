@@ -258,7 +258,8 @@ class _Fit:
         """Orthonormal basis (n, b) of the white base; (n, q) what removes it and what all share from a square."""
         axes, share = self.scattering.axes(grid)
         weight = self.scattering.weights[grid][:, None]
-        basis = _orthonormal(self.scattering.shrunk(self._fixed * weight, grid))
+        left, singular, _ = np.linalg.svd(self.scattering.shrunk(self._fixed * weight, grid), full_matrices=False)
+        basis = left[:, singular > 1e-9 * max(float(singular.max(initial=0.0)), 1e-300)]
         both = [axes * np.sqrt(1.0 - (1.0 - share) ** 2), self.scattering.shrunk(basis, grid)]
         return basis, np.concatenate(both, axis=1) * weight
 
@@ -311,14 +312,6 @@ class _Fit:
         return t / factor[:, None], chosen, factor
 
 
-def _orthonormal(columns: FloatArray) -> FloatArray:
-    """(n, r) orthonormal basis of columns (n, m) of any rank."""
-    if columns.shape[1] == 0:
-        return np.zeros((len(columns), 0))
-    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, singular > 1e-9 * max(float(singular[0]), 1e-300)])
-
-
 @dataclass(frozen=True)
 class FoundPatterns:
     """All answers under one noise model.
@@ -359,12 +352,12 @@ def find_structure(residual: FloatArray, patterns: list[Pattern], scattering: Sc
     excess = left = 0.0
     for step in range(MOST_PATTERNS + 1):
         fit = _Fit(scattering, columns, base)
-        statistic, grid, factor = fit.statistics(residual[None])
-        t, left = statistic[0], float(EXCESSES[grid[0]])
+        (t,), (grid,), (factor,) = fit.statistics(residual[None])
+        left = float(EXCESSES[grid])
         drawn = np.abs(fit.statistics(scattering.draws(left))[0]).max(axis=1)
         p = (1.0 + (drawn[:, None] >= np.abs(t)[None, :] - 1e-12).sum(axis=0)) / (1.0 + len(drawn))
-        x, sizes, _ = fit.columns(int(grid[0]))
-        coefficients, alike = t * float(factor[0]) / sizes, np.abs(x.T @ x) > ALIKE
+        x, sizes, _ = fit.columns(int(grid))
+        coefficients, alike = t * float(factor) / sizes, np.abs(x.T @ x) > ALIKE
         np.fill_diagonal(alike, val=False)
         answers = [
             FoundPattern(pattern, float(t[i]), float(p[i]), float(coefficients[i]),

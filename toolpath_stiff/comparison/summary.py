@@ -211,8 +211,7 @@ def summary_of(
 
 def _errors(values: FloatArray, structures: Sequence[FoundPatterns], rows: BoolArray) -> GroupErrors:
     """Errors of some readings, and what scatter alone would give."""
-    scatter = [found.scattering for found in structures]
-    squares = {scattering.noise.name: float(scattering.square[rows].mean()) for scattering in scatter}
+    squares = {f.scattering.noise.name: float(f.scattering.square[rows].mean()) for f in structures}
     measured = max(float((values[rows] ** 2).mean()), 1e-300)
     return GroupErrors(
         readings=int(rows.sum()),
@@ -225,12 +224,11 @@ def _errors(values: FloatArray, structures: Sequence[FoundPatterns], rows: BoolA
 def _refitted(given: StrutLaw, fit: Fit) -> LawRefitted:
     """What refitting the strut law's constants would leave, as in a diagnosis."""
     law = scaled_law(given, fit.law)
-    stiffness = [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)]
     return LawRefitted(
         **error_figures(fit.residual),
         # Of a constant law one, which belongs to no length.
         at_mm=[] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)],
-        N_per_um=stiffness[: len(law.parameters)],
+        N_per_um=[n_per_um_from_n_per_m(k) for k in (law.stiffness_1, law.stiffness_2)][: len(law.parameters)],
     )
 
 

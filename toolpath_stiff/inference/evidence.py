@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -184,7 +185,7 @@ class Problem:
         self.observed = np.log(predictor.data.stiffness)
         self.base_compliance = np.exp(-predictor.log_stiffness())
         self.rest = self.base_compliance - predictor.strut_part()
-        self._priors: dict[tuple[int, int], tuple[CandidateTable, SizePrior]] = {}
+        self.prior = cache(self._prior)
         jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
         self.sight = Sight(self.base_compliance, self.projected(jacobian))
 
@@ -200,12 +201,9 @@ class Problem:
         """
         return self.scatter.precision.beside(jacobian.T, law_prior(jacobian.shape[1]))
 
-    def prior(self, table: CandidateTable, j: int) -> SizePrior:
+    def _prior(self, table: CandidateTable, j: int) -> SizePrior:
         """Prior of a component's size, worked out once."""
-        key = (id(table), j)
-        if key not in self._priors:
-            self._priors[key] = (table, SizePrior.of(table, j, self.sight))
-        return self._priors[key][1]
+        return SizePrior.of(table, j, self.sight)
 
     def compliance(self, law: FloatArray, delta: FloatArray) -> FloatArray:
         """(..., n) for laws (..., 2) and added compliances (..., n)."""
@@ -275,7 +273,9 @@ class Problem:
             scatter = again
         components = [every[i][0].candidate.components[every[i][1]] for i in free]
         bounded = dict(zip(unknowns[2:], components, strict=True))
-        beyond = [i for i, component in bounded.items() if len(tables) > 1 and _just_beyond(component, x[i])]
+        # A little beyond its bound: tables of two effects describe neither exactly.
+        out = [i for i, component in bounded.items() if len(tables) > 1 and not component.allows(x[i])]
+        beyond = [i for i in out if bounded[i].allows(x[i] / (1.0 + BEYOND))]
         if beyond:  # put onto their bounds, the others once more beside them
             for i in beyond:
                 x[i] = np.clip(x[i], *bounded[i].bounds)
@@ -360,11 +360,6 @@ def split(tables: Sequence[CandidateTable], sizes: FloatArray) -> Iterator[tuple
     """Each table with its own of the sizes (p,)."""
     ends = np.cumsum([len(table.candidate.components) for table in tables])
     return zip(tables, np.split(sizes, ends[:-1]), strict=True)
-
-
-def _just_beyond(component: Component, size: float) -> bool:
-    """Of a size a little beyond its bound: tables of two effects describe neither exactly."""
-    return not component.allows(size) and component.allows(size / (1.0 + BEYOND))
 
 
 def normal_equations(

@@ -129,13 +129,6 @@ class Forms:
         self.solved = np.ascontiguousarray(np.concatenate([*solved, np.zeros((len(precision), 0))], axis=1))  # A L
         ends = np.cumsum([0, *(form.shape[1] for form in solved)])
         self.slices = [slice(*pair) for pair in pairwise(ends.tolist())]
-        self._drawn: tuple[FloatArray | None, FloatArray] = None, np.zeros((0, 0))
-
-    def of_draws(self, draws: FloatArray) -> FloatArray:
-        """(s, all features) L^T A r of simulated residuals (s, n), kept for the next fit."""
-        if self._drawn[0] is not draws:
-            self._drawn = draws, draws @ self.solved
-        return self._drawn[1]
 
 
 class FormStatistics:
@@ -158,13 +151,9 @@ class FormStatistics:
         reached = self.reached[:, self.forms.slices[k]]
         return np.asarray(self.forms.grams[k] - reached.T @ reached)
 
-    def loads(self, residuals: FloatArray, taken: FloatArray, known: FloatArray | None = None) -> FloatArray:
-        """(s, all features) L^T P (r - taken) of residuals (s, n); `known`: L^T A r."""
-        whole = residuals @ self.forms.solved if known is None else known.copy()
-        for s in np.flatnonzero(taken.any(axis=1)).tolist():
-            some = np.flatnonzero(taken[s])  # few readings of each set
-            whole[s] -= taken[s, some] @ self.forms.solved[some]
-        return np.asarray(whole - (residuals - taken) @ self.removed.T @ self.reached)
+    def loads(self, residuals: FloatArray) -> FloatArray:
+        """(s, all features) L^T P r of residuals (s, n)."""
+        return np.asarray(residuals @ self.forms.solved - residuals @ self.removed.T @ self.reached)
 
     def surprises(self, loads: FloatArray) -> FloatArray:
         """(s, forms) of loads (s, all features)."""
@@ -217,11 +206,11 @@ def absolute_gate(
     pulls, taken = set_wild_aside(projected.times(draws), projected, scatter)
     observed_squares, squares = float(squares_of(*observed)[0]), squares_of(pulls, taken)
     structure = FormStatistics(forms, projected)
-    seen = structure.surprises(structure.loads(residual[None], observed[1]))
+    seen = structure.surprises(structure.loads(residual[None] - observed[1]))
     # Squares far beyond all simulated ones settle it; what the structure would look like by chance matters no more.
     simulated = np.zeros((len(squares), seen.shape[1]))
     if signatures or observed_squares <= HOPELESS * squares.max():
-        simulated = structure.surprises(structure.loads(draws, taken, forms.of_draws(draws)))
+        simulated = structure.surprises(structure.loads(draws - taken))
     # Rows: the data, then every draw; columns: what may look bad, larger is worse.
     looks = [np.concatenate([[observed_squares], squares]), np.concatenate([seen, simulated]).max(axis=1)]
     if signatures:

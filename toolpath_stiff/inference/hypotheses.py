@@ -248,7 +248,7 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[fl
     projected = problem.projected(score.jacobian)
     _, taken = set_wild_aside(projected.times(score.residual[None]), projected, problem.scatter)
     structure = FormStatistics(forms, projected)
-    loads = structure.loads(score.residual[None], taken)
+    loads = structure.loads(score.residual[None] - taken)
     order = np.argsort(structure.surprises(loads)[0])[::-1][:FORMS].tolist()
     gains = []
     for index in order:
