@@ -20,7 +20,6 @@ from toolpath_stiff.readings.dates import date_text, day_of
 from toolpath_stiff.readings.history import history
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.readings.strut_series import DRAWS, StrutReadings
-from toolpath_stiff.report.pictures.history import history as history_picture
 
 DATES = ("2018-03-01", "2018-09-10", "2019-04-02", "2019-06-11", "2020-01-15", "2020-08-03", "2021-02-11")
 DAYS = np.array([day_of(text) for text in DATES])
@@ -177,7 +176,6 @@ def test_bench_records_to_a_history_and_back(tmp_path, monkeypatch, capsys):
     assert not two["changes"] and two["sides"]["p"] > 0.05
     (change,) = three["changes"]
     assert (change["kind"], change["after"], change["before"]) == ("step", "2019-04-02", "2019-06-11")
-    assert history_picture(found.history).axes
     assert "strut 3 became 12 % softer between 2019-04-02 and 2019-06-11 (95 %)" in str(found)
 
     data = read_measurements("bench_measurements.csv", nist())

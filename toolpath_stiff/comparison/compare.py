@@ -25,7 +25,6 @@ from toolpath_stiff.comparison.summary import ComparisonSummary, summary_of
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import Document, certain, to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.noise import Noise, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import repeat_groups
@@ -57,9 +56,6 @@ class Comparison(FolderResult):
         (n,) ln(measured / modelled).
     scatter
         (n,) standard deviation of `residual` from scatter alone, under the last noise.
-    covariance, places, excess
-        Of the residuals under the last noise; readings that are mechanically the same, and the relative sd by which
-        these scatter more than noise.
     numbers, names
         What the residuals were held against.
     tests
@@ -92,9 +88,6 @@ class Comparison(FolderResult):
     log_model: FloatArray
     residual: FloatArray
     scatter: FloatArray
-    covariance: Covariance
-    places: Groups
-    excess: float
     numbers: tuple[Variable, ...]
     names: tuple[ReadingNames, ...]
     tests: tuple[FoundPattern, ...]
@@ -119,10 +112,6 @@ class Comparison(FolderResult):
 
     def _short(self) -> str:
         return f"{self.summary.machine}, mean error {self.summary.baseline.mean_abs_error_percent:.2f} %"
-
-    def variance(self, weights: FloatArray) -> float:
-        """Of a combination of residuals with weights (n,), by noise and by what it leaves unexplained."""
-        return float(self.covariance.squares(weights) + self.excess**2 * (self.places.sums(weights) ** 2).sum())
 
 
 def compare(
@@ -199,9 +188,6 @@ def compare(
         log_model,
         values,
         np.sqrt(scattering.square),
-        scattering.covariance,
-        scattering.places,
-        structures[-1].excess,
         tuple(numbers),
         tuple(names),
         shared_tests(structures),

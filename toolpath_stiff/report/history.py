@@ -8,13 +8,8 @@ TITLE = "Struts measured alone, over their dates"
 HEAD = ("strut", ">readings", ">dates", ">N/mm", ">scatter %", ">drift, % a year", ">tension", ">compression")
 
 
-def dated(history: StrutHistory) -> bool:
-    """Whether some strut was measured on several dates."""
-    return any(len(strut.dates) > 1 for strut in history.struts)
-
-
 def _shown(history: StrutHistory) -> bool:
-    return dated(history) or any(strut.sides for strut in history.struts)
+    return any(len(strut.dates) > 1 or strut.sides for strut in history.struts)
 
 
 def _row(strut: StrutOverTime) -> tuple[str, ...]:
@@ -35,7 +30,6 @@ def _table(history: StrutHistory) -> ShownTable:
 
 
 def _remark(history: StrutHistory) -> str:
-    """How far readings scatter from date to date."""
     scatter = history.scatter_percent
     return "" if scatter is None else f"scatter from date to date {scatter:.2g} %: {history.scatter_from}"
 
