@@ -141,13 +141,6 @@ def test_what_to_do_is_said(reduced, text, message):
         reduced(text)
 
 
-def test_many_equal_errors_are_told_together(reduced):
-    with pytest.raises(InputErrors) as caught:
-        reduced("strut,date,force_N,displacement_um\n" + "1,04.13.2021,0,0\n" * 500)
-    lines = str(caught.value).splitlines()
-    assert len(lines) == 2 and lines[1].endswith("raw.csv: the same in 499 further lines: 3-501")
-
-
 def test_lost_readings_are_passed_over(reduced):
     found = reduced(written(ramps(2), ramps(2) / K) + "3,2021-03-04,,0\n3,2021-03-04,0,NaN\n")
     assert found.to_dict()["loops"][0]["stiffness_N_per_mm"] == pytest.approx(40_000.0, rel=1e-4)

