@@ -7,7 +7,7 @@ from operator import attrgetter
 import numpy as np
 import pytest
 
-from toolpath_stiff.analysis.document import required_stiffness_missed
+from toolpath_stiff.analysis.results import required_stiffness_missed
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import load_directions, parse_load, principal_directions
 from toolpath_stiff.analysis.poses import evaluate_poses

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.nc.test_nc_against_rs274 import TOOLS, Writer, cycle_program
-from toolpath_stiff.analysis.program_check import extents, figures, machine_findings, radii_findings
+from toolpath_stiff.analysis.program_check import extents, figures, machine_findings
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
@@ -51,7 +51,6 @@ def test_figures_of_a_program_by_hand():
     cutting = half / 10 + 4 + 120 + 30 / (200 / 60)
     assert found.times_s == pytest.approx({"cutting": cutting, "rapid": 0.4, "dwell": 2, "total": cutting + 2.4})
     assert found.extents_mm["y"] == pytest.approx([-40, 10])
-    assert found.extents_with_rapids_mm["z"] == [0, 30]
 
 
 def test_findings_go_on_after_an_error():
@@ -73,12 +72,6 @@ def test_findings_go_on_after_an_error():
 def test_what_cannot_be_a_program_is_one_error(text):
     found = checked(text)
     assert [f.severity for f in found.findings if f.severity == "error"] == ["error"]
-
-
-def test_arcs_whose_radii_disagree_within_tolerance():
-    moves = parse_program("F100 G0 X50\nG3 X0 Y50.02 I-50\nG0 X50 Y0\nG3 X0 Y50.001 I-50\n").moves
-    (finding,) = radii_findings(moves)
-    assert finding.line == 2 and "50.0200" in finding.text and finding.severity == "warning"
 
 
 def test_reach_and_strut_speeds():

@@ -1,7 +1,8 @@
-"""Checks of a program before any stiffness: extents, lengths, times, arcs, reach and strut speeds."""
+"""Checks of a program before any stiffness: extents, lengths, times, reach and strut speeds."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -9,13 +10,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.evaluation import other_poses
-from toolpath_stiff.analysis.statistics import operation_heading, rows_of_parts
-from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.documents import to_dict
+from toolpath_stiff.analysis.evaluation import evaluate
+from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.analysis.statistics import by_operation, by_tool, rows_of_parts
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
@@ -24,26 +24,24 @@ from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.path.placing import place
-from toolpath_stiff.path.sampling import BLOCK, Samples, move_durations, sample_moves
+from toolpath_stiff.path.sampling import move_durations, sample_moves
 from toolpath_stiff.results import Result, frame_of
-from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
+from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RADII_APART = m_from_mm(2e-3)  # what rounding I, J, K, X, Y to 0.001 mm explains, and a little more
 MOST_NAMED = 20  # lines named for one kind of finding
 Extents = dict[str, list[float]]
 
 
 @dataclass(frozen=True)
 class Figures:
-    """Extents of the tip in program coordinates of G54, lengths and times of some moves."""
+    """Extents of the cuts in program coordinates of G54, lengths and times of some moves."""
 
     extents_mm: Extents
     extents_deg: Extents
-    extents_with_rapids_mm: Extents
     lengths_mm: dict[str, float]
     times_s: dict[str, float]
 
@@ -55,11 +53,10 @@ def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Figures:
     parts = (("cutting", cutting), ("rapid", ~cutting))
     lengths = {name: mm_from_m(float(length[rows].sum())) for name, rows in parts}
     times = {name: float(duration[rows].sum()) for name, rows in parts} | {"dwell": float(moves.dwell.sum())}
-    cuts, everything = extents(moves.take(cutting)), extents(moves)
+    ends = extents(moves.take(cutting))
     return Figures(
-        {axis: cuts[axis] for axis in "xyz" if cuts},
-        {axis: cuts[axis] for axis in "abc" if cuts},
-        {axis: everything[axis] for axis in "xyz" if everything},
+        {axis: ends[axis] for axis in "xyz" if ends},
+        {axis: ends[axis] for axis in "abc" if ends},
         {**lengths, "total": sum(lengths.values())},
         {**times, "total": sum(times.values())},
     )
@@ -94,19 +91,6 @@ def _arc_extremes(arcs: Moves) -> FloatArray:
     return np.concatenate(points)
 
 
-def radii_findings(moves: Moves) -> list[Finding]:
-    """Arcs whose end lies off the circle of their start by more than rounding."""
-    arcs = moves.take(moves.arc_sweep != 0.0)
-    frame = arc_frame(arcs, np.arange(len(arcs)))
-    bad = np.flatnonzero(np.abs(frame.radius_end - frame.radius_start) > RADII_APART)
-    findings = []
-    for i in bad[:MOST_NAMED]:
-        first, last = mm_from_m(float(frame.radius_start[i])), mm_from_m(float(frame.radius_end[i]))
-        text = f"the arc's radius is {first:.4f} mm at its start and {last:.4f} mm at its end"
-        findings.append(Finding(int(arcs.line[i]), 0, "arc radii", text, WARNING))
-    return findings + _rest("arc radii", len(bad))
-
-
 def machine_findings(
     program: ReadProgram, machine: Hexapod, step: float, speed_limit: float | None
 ) -> tuple[list[Finding], dict[str, float]]:
@@ -127,76 +111,46 @@ def machine_findings(
     """
     moves, origin = place(program.moves, program.origin), program.origin
     samples = sample_moves(moves, step=step, rapid_feed=machine.rapid_feed, origin=origin)
-    strut_lengths, within = _struts_and_reach(machine, samples)
-    cutting = samples.motion != RAPID
-    findings = []
-    for line in np.unique(samples.line[~within.reachable])[:MOST_NAMED]:
-        there = np.flatnonzero((samples.line == line) & ~within.reachable)
-        worst = int(there[np.argmin(within.margin[there])])
-        cuts = bool(cutting[there].any())
-        text = f"{'a cutting move' if cuts else 'a rapid'} leaves the machine's reach: {within.describe(worst)}"
-        findings.append(Finding(int(line), 0, "reach", text, ERROR if cuts else WARNING))
-    findings += _rest("reach", len(np.unique(samples.line[~within.reachable])))
-    same = (samples.move[1:] == samples.move[:-1]) & cutting[1:] & (np.diff(samples.t) > 0.0)
-    speed = np.abs(np.diff(strut_lengths, axis=0)[same]) / np.diff(samples.t)[same, None]
-    if not len(speed):
+    poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+    there = evaluate(StiffnessModel(machine), *poses, Load("z"))
+    outside, cuts = ~there.reachable, samples.cutting & ~there.reachable
+
+    def beyond(i: int) -> str:
+        rows = np.flatnonzero((samples.line == lines[i]) & outside)
+        move = "a cutting move" if lines[i] in samples.line[cuts] else "a rapid"
+        worst = int(rows[np.argmin(there.reach.margin[rows])])
+        return f"{move} leaves the machine's reach: {there.reach.describe(worst)}"
+
+    lines = np.unique(samples.line[outside])
+    findings = _findings("reach", lines, beyond, np.isin(lines, samples.line[cuts]))
+    time = np.diff(samples.t)
+    same = (samples.move[1:] == samples.move[:-1]) & samples.cutting[1:] & (time > 0.0)
+    if not same.any():
         return findings, {}
-    fastest, lines = speed.max(axis=1), samples.line[1:][same]
-    top = int(np.argmax(fastest))
+    speed = (np.abs(np.diff(there.strut_lengths, axis=0)[same]) / time[same, None]).max(axis=1)
+    fastest, line = mm_per_min_from_m_per_s(speed), samples.line[1:][same]
     if speed_limit is not None:
-        over = np.unique(lines[fastest > speed_limit])
-        for line in over[:MOST_NAMED]:
-            most = mm_per_min_from_m_per_s(float(fastest[lines == line].max()))
-            text = (
-                f"a strut moves at {most:.0f} mm/min at the programmed feed, beyond "
-                f"{mm_per_min_from_m_per_s(speed_limit):.0f} mm/min"
-            )
-            findings.append(Finding(int(line), 0, "strut speed", text, WARNING))
-        findings += _rest("strut speed", len(over))
-    return findings, {"mm_per_min": mm_per_min_from_m_per_s(float(fastest[top])), "line": int(lines[top])}
+        over, limit = np.unique(line[speed > speed_limit]), mm_per_min_from_m_per_s(speed_limit)
+
+        def too_fast(i: int) -> str:
+            most = fastest[line == over[i]].max()
+            return f"a strut moves at {most:.0f} mm/min at the programmed feed, beyond {limit:.0f} mm/min"
+
+        findings += _findings("strut speed", over, too_fast)
+    top = int(np.argmax(speed))
+    return findings, {"mm_per_min": float(fastest[top]), "line": int(line[top])}
 
 
-def _struts_and_reach(machine: Hexapod, samples: Samples) -> tuple[FloatArray, Reach]:
-    """(n, 6) m strut lengths of n samples, and their reach; block by block, as work arrays of a long path are large."""
-    other = other_poses(samples.position, samples.abc, samples.tool_length)
-    poses, of_sample = np.flatnonzero(other), np.cumsum(other) - 1
-    n = len(poses)
-    lengths = np.empty((n, 6))
-    margin, limit, value = np.empty(n), np.empty(n, dtype=np.int64), np.empty(n)
-    for start in range(0, n, BLOCK):
-        rows = poses[start : start + BLOCK]
-        here = slice(start, start + BLOCK)
-        position, rotation = samples.position[rows], rotation_matrices(samples.abc[rows])
-        struts = solve_struts(machine, position, rotation, samples.tool_length[rows])
-        within = reach(machine, position, struts, rotation)
-        lengths[here] = struts.lengths
-        margin[here], limit[here], value[here] = within.margin, within.limit, within.value
-    return lengths[of_sample], Reach(margin[of_sample], limit[of_sample], value[of_sample], machine_limits(machine))
-
-
-def _rest(code: str, count: int) -> list[Finding]:
-    if count <= MOST_NAMED:
-        return []
-    return [Finding(0, 0, code, f"and {count - MOST_NAMED} more of the kind {code!r}", WARNING)]
-
-
-@dataclass(frozen=True)
-class ToolRow(Figures):
-    """What a tool does; `remark` is the tool table's."""
-
-    tool: int
-    remark: str
-
-
-@dataclass(frozen=True)
-class OperationRow(Figures):
-    """What an operation does; from its heading to the last line of its moves."""
-
-    operation: int
-    name: str
-    tool: int
-    first_line: int
-    last_line: int
+def _findings(
+    code: str, lines: IntArray, words: Callable[[int], str], errors: BoolArray | None = None
+) -> list[Finding]:
+    """A finding for each of some lines, the first ones in words; errors where `errors` (n,) says so, else warnings."""
+    named = [
+        Finding(line, 0, code, words(i), ERROR if errors is not None and errors[i] else WARNING)
+        for i, line in enumerate(lines[:MOST_NAMED].tolist())
+    ]
+    more = len(lines) - len(named)
+    return named + ([Finding(0, 0, code, f"and {more} more of the kind {code!r}", WARNING)] if more else [])
 
 
 @dataclass(frozen=True, repr=False)
@@ -212,7 +166,7 @@ class ProgramCheck(Result):
     used, unsupported, findings
         Codes; words not acted upon; errors, warnings and notes, in the order of lines.
     whole, tools, operations
-        Figures of all moves, of each tool in order of use, of each operation in the order of the run.
+        Figures of all moves; a row with the same of each tool in order of use, of each operation in that of the run.
     fastest_strut
         Largest speed of a strut in a cut with its line; empty without a machine.
     modal_start, modal_end
@@ -242,8 +196,8 @@ class ProgramCheck(Result):
     unsupported: tuple[Finding, ...]
     findings: tuple[Finding, ...]
     whole: Figures
-    tools: tuple[ToolRow, ...]
-    operations: tuple[OperationRow, ...]
+    tools: tuple[Document, ...]
+    operations: tuple[Document, ...]
     fastest_strut: dict[str, float]
     modal_start: dict[str, str]
     modal_end: dict[str, str]
@@ -301,11 +255,9 @@ def check_program(
     program, findings = checked.program, list(checked.findings)
     speed: dict[str, float] = {}
     rapid_feed = machine.rapid_feed if machine else defaults.RAPID_FEED
-    if len(program.moves):
-        findings += radii_findings(program.moves)
-        if machine is not None:
-            more, speed = machine_findings(program, machine, step, strut_speed)
-            findings += more
+    if machine is not None and len(program.moves):
+        more, speed = machine_findings(program, machine, step, strut_speed)
+        findings += more
     return ProgramCheck(
         program=program.name,
         interpreter=program.interpreter,
@@ -324,26 +276,18 @@ def check_program(
     )
 
 
-def tool_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[ToolRow, ...]:
+def tool_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[Document, ...]:
     """Figures of each tool in order of use; rapids at `rapid_feed`, m/s."""
-    numbers, first, of_move = np.unique(program.moves.tool, return_index=True, return_inverse=True)
-    remarks = {tool.number: tool.remark for tool in program.tools}
-    parts = _parts(program.moves, of_move, len(numbers), rapid_feed)
-    return tuple(
-        ToolRow(**vars(parts[i]), tool=int(numbers[i]), remark=remarks.get(int(numbers[i]), ""))
-        for i in np.argsort(first).tolist()
-    )
+    return _rows(program.moves, *by_tool(program), rapid_feed)
 
 
-def operation_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[OperationRow, ...]:
+def operation_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[Document, ...]:
     """Figures of each operation in the order of the run; rapids at `rapid_feed`, m/s."""
     stretches = operations(program)
-    parts = _parts(program.moves, stretches.of_move, len(stretches.rows), rapid_feed)
-    return tuple(
-        OperationRow(**vars(part), **operation_heading(row)) for row, part in zip(stretches.rows, parts, strict=True)
-    )
+    return _rows(program.moves, by_operation(stretches), stretches.of_move, rapid_feed)
 
 
-def _parts(moves: Moves, of_move: IntArray, count: int, rapid_feed: float) -> list[Figures]:
-    """The figures of moves in `count` parts, each in the part that `of_move` (n,) says."""
-    return [figures(moves.take(part), rapid_feed) for part in rows_of_parts(of_move, count)] if count else []
+def _rows(moves: Moves, headings: list[Document], of_move: IntArray, rapid_feed: float) -> tuple[Document, ...]:
+    parts = rows_of_parts(of_move, len(headings))
+    figures_of = (to_dict(figures(moves.take(part), rapid_feed)) for part in parts)
+    return tuple({**figures, **heading} for figures, heading in zip(figures_of, headings, strict=True))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolpath_stiff.analysis.loads import Load, headline_rows
+from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
 from toolpath_stiff.arrays import AnyArray, ArrayColumns, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
@@ -148,7 +148,7 @@ def work_path(
     samples = sample_moves(moves, step)
     samples = samples.take(~_bound(moves)[samples.move])
     counted = samples.cutting & (samples.weight > 0.0)
-    headline = headline_rows(load or Load(), samples.tangent, samples.abc, counted)
+    headline = headline_rows(counted, plunging_rows(load or Load(), samples.tangent, samples.abc, counted))
     columns = {name: getattr(samples, name) for name in COLUMNS}
     anchored = _anchored(program, np.array(present or program.origin), read)
     return WorkPath(**columns, headline=headline, anchored=anchored)

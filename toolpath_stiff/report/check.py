@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from toolpath_stiff.analysis.program_check import Figures, OperationRow, ProgramCheck, ToolRow
+from toolpath_stiff.analysis.program_check import ProgramCheck
+from toolpath_stiff.documents import Document
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import duration
 from toolpath_stiff.units import number
@@ -11,12 +12,17 @@ MOST_ROWS = 40  # all are in --json
 FIGURES = (">cutting mm", ">time", ">X", ">Y", ">Z")
 
 
-def _by_part(tools: Sequence[ToolRow], operations: Sequence[OperationRow]) -> list[str]:
+def _by_part(tools: Sequence[Document], operations: Sequence[Document]) -> list[str]:
     """One row a tool that cuts, one row an operation, with the extents of the cuts; no table of a single row."""
     digits = len(str(min(len(operations), MOST_ROWS)))
-    by_tool = [(f"{_tool(row.tool)} {row.remark}", *_figures(row)) for row in tools if row.extents_mm]
+    by_tool = [(f"{_tool(row['tool'])} {row['remark']}", *_figures(row)) for row in tools if row["extents_mm"]]
     by_operation = [
-        (f"{row.operation:>{digits}} {row.name}", _tool(row.tool), f"{row.first_line}-{row.last_line}", *_figures(row))
+        (
+            f"{row['operation']:>{digits}} {row['name']}",
+            _tool(row["tool"]),
+            f"{row['first_line']}-{row['last_line']}",
+            *_figures(row),
+        )
         for row in operations[:MOST_ROWS]
     ]
     tables = [
@@ -32,11 +38,11 @@ def _tool(number: int) -> str:
     return f"T{number}" if number else "-"
 
 
-def _figures(row: Figures) -> list[str]:
-    extents = (row.extents_mm.get(axis) for axis in "xyz")
+def _figures(row: Document) -> list[str]:
+    extents = (row["extents_mm"].get(axis) for axis in "xyz")
     return [
-        number(row.lengths_mm["cutting"], 1),
-        duration(row.times_s["total"]),
+        number(row["lengths_mm"]["cutting"], 1),
+        duration(row["times_s"]["total"]),
         *("-" if ends is None else f"{number(ends[0], 1)}..{number(ends[1], 1)}" for ends in extents),
     ]
 

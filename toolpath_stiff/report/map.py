@@ -67,9 +67,4 @@ def text(planes: StiffnessMap) -> str:
             if spot := row.get(name):
                 place = f"X{spot['x_mm']:g} Y{spot['y_mm']:g}"
                 lines.append(f"  {name:<9} {spot['stiffness_N_per_mm']:8.0f} N/mm at {place}")
-        circle = row.get("circle", {})
-        if circle.get("maxima_deg"):
-            maxima, minima = (", ".join(f"{v:g}" for v in circle[f"{k}_deg"]) for k in ("maxima", "minima"))
-            about = f"on the circle of {circle['radius_mm']:g} mm"
-            lines.append(f"  {about}: maxima at {maxima} degrees, minima at {minima} degrees")
     return "\n".join(lines)
