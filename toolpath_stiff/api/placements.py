@@ -33,8 +33,7 @@ from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import work_path
 from toolpath_stiff.placement.placing import place_again, place_program
-from toolpath_stiff.placement.result import Placement
-from toolpath_stiff.placement.task import PlacementTask, Rewriting
+from toolpath_stiff.placement.result import Placement, PlacementTask
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
@@ -137,6 +136,9 @@ def place(
     >>> found.worse
     []
     """
+    for option, value in (("decimals", decimals), ("linearise", linearise_mm)):
+        if write is None and value is not None:
+            raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
     on, part = machine_from(machine), program_from(program)
     model = on.running(part)
     default = model.machine.default_origin
@@ -152,26 +154,16 @@ def place(
         load=parse_load(load),
         step=m_from_mm(step_mm),
         force=force_N,
-        rewriting=_rewriting(part, write, decimals, linearise_mm),
+        write="" if write is None else str(write),
+        decimals=decimals,
+        linearise=None if linearise_mm is None else m_from_mm(linearise_mm),
+        reading=part.read_as,
     )
     if pick is None:
         placed = place_program(task, counter(progress, f"{part.name}: search"))
     else:
         placed = place_again(task, earlier, pick)
     return replace(placed, inputs=(*part.inputs, *on.inputs))
-
-
-def _rewriting(
-    part: Program, write: str | Path | None, decimals: int | None, linearise_mm: float | None
-) -> Rewriting | None:
-
-    if write is not None:
-        chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-        return Rewriting(str(write), decimals, chord, part.read_as)
-    if decimals is not None or linearise_mm is not None:
-        option = "decimals" if decimals is not None else "linearise"
-        raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
-    return None
 
 
 def _keep_out(text: str) -> KeepOut:
@@ -261,11 +253,8 @@ def try_placement(
     """
     on, part = machine_from(machine), program_from(program)
     model, direction = on.running(part), parse_load(load)
-    default = model.machine.default_origin
-    read = part.moves(None, default)
-    present = read.origin if read.origin_source == "program" else default
-    path = work_path(read, m_from_mm(step_mm), direction, present, lambda origin: part.moves(origin, default))
-    return PlacementTrial(read, Evaluator(model, path, direction, force_N))
+    read = part.moves(None, model.machine.default_origin)
+    return PlacementTrial(read, Evaluator(model, work_path(read, m_from_mm(step_mm), direction), direction, force_N))
 
 
 @checked

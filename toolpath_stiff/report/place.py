@@ -3,8 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.placement.result import Placement, Written
-from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
+from toolpath_stiff.placement.result import COLUMNS, Placement, PlacementRow, Written
 from toolpath_stiff.report.place_page import page_pieces
 from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.units import number
@@ -14,7 +13,7 @@ COSTS = ("best_on_front_N_per_mm", "chosen_N_per_mm")
 
 def text(placed: Placement) -> str:
     """A placement in words: what got worse, the placement, what it brings, what it costs."""
-    first = len(placed.worse) + placed.search.nothing_better
+    first = len(placed.worse) + placed.nothing_better
     before, after = (
         [("warning", text) for text in part] for part in (placed.warnings[:first], placed.warnings[first:])
     )
@@ -49,7 +48,7 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
         ("  margin", f"{100.0 * margin:.1f} % of a limit's span at least, rapids included"),
         ("LinuxCNC", blocks.linuxcnc or blocks.linuxcnc_reason),
         ("Fanuc-style", blocks.fanuc or blocks.fanuc_reason),
-        ("front", f"{len(placed.front)} placements, {number(placed.search.pose_evaluations)} poses evaluated"),
+        ("front", f"{len(placed.front)} placements, {number(placed.pose_evaluations)} poses evaluated"),
     ]
 
 

@@ -14,8 +14,7 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.placement.paths import placed_path
-from toolpath_stiff.placement.result import Placement
-from toolpath_stiff.placement.rows import PlacementRow
+from toolpath_stiff.placement.result import Placement, PlacementRow
 from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.words import machine_text, plain
@@ -36,7 +35,7 @@ def page_pieces(placed: Placement) -> Iterator[str]:
     data = {
         "front": [vars(row) for row in placed.front],
         "chosen": (placed.chosen.number or 0) - 1,
-        "recommended": placed.search.recommended - 1,
+        "recommended": placed.recommended - 1,
         "before": vars(present) if present else None,
         "before_reason": plain(placed.present_reason),
         "force": best.force,

@@ -2,8 +2,7 @@
 
 from matplotlib.figure import Figure
 
-from toolpath_stiff.placement.result import Placement
-from toolpath_stiff.placement.rows import FIGURES
+from toolpath_stiff.placement.result import FIGURES, Placement
 from toolpath_stiff.report.colours import INK, ORANGE, STIFFNESS
 from toolpath_stiff.report.pictures.setup_sheet import setup_sheet
 from toolpath_stiff.report.pictures.style import Look, colour_scale, in_thousands, new_figure, panel
