@@ -174,7 +174,8 @@ def tip_compliances(
     compliance = np.full((len(tip), 3, 3), np.nan)
     compliance[stand.reachable] = core.tip_compliance(model, *_some(poses, stand.reachable), force)
     _refuse_no_number(model, tip, stand.reachable & np.isnan(compliance[:, 0, 0]))
-    return struts.lengths, model.machine.strut_law.extrapolates(struts.lengths).any(axis=1), stand, compliance
+    extrapolated = np.asarray(model.machine.strut_law.extrapolates(struts.lengths).any(axis=1))
+    return struts.lengths, extrapolated, stand, compliance
 
 
 def compliance_along(

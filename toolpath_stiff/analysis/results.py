@@ -152,7 +152,7 @@ class Analysis(EvaluatedPath, FolderResult):
 
     @cached_property
     def _document(self) -> dict[str, Any]:
-        document = without_nan(_summary(self))
+        document: dict[str, Any] = without_nan(_summary(self))
         if self.required is not None:
             document["required"] = {
                 "required_N_per_mm": n_per_mm_from_n_per_m(self.required),

@@ -148,7 +148,7 @@ class EvaluatedPath:
         return operations(self.program)
 
 
-def stiffness_figures(path: EvaluatedPath, rows: BoolArray | IntArray) -> dict[str, float | None]:
+def stiffness_figures(path: EvaluatedPath, rows: BoolArray | IntArray) -> Document:
     """Mean (by length), min, max, range in N/mm and mean deflection in um of some counted samples.
 
     None for each where there are no such samples.
@@ -219,7 +219,7 @@ def per_operation(path: EvaluatedPath) -> list[Document]:
 def per_tool(path: EvaluatedPath) -> list[Document]:
     """The figures of each tool that cuts, in order of use; its length is that of its first cut."""
     (headings, of_move), moves = by_tool(path.program), path.program.moves
-    rows = []
+    rows: list[Document] = []
     for i, (heading, part) in enumerate(zip(headings, _parts(path, of_move, len(headings)), strict=True)):
         cuts = np.flatnonzero((of_move == i) & (moves.motion != RAPID))
         if len(cuts):

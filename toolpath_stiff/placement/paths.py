@@ -78,7 +78,7 @@ def work_path(program: ReadProgram, step: float, load: Load | None = None) -> Wo
     InputError
         A cutting move has an end in machine coordinates (G53): it does not move with the work.
     """
-    moves, bound = program.moves, program.moves.from_machine.any(axis=1)
+    moves, bound = program.moves, np.asarray(program.moves.from_machine.any(axis=1))
     fixed = (moves.motion != RAPID) & bound
     if fixed.any():
         raise ProgramError(

@@ -134,14 +134,11 @@ def numbered_rows(task: PlacementTask, path: WorkPath, found: PlacementResult) -
 def _analyzed_row(analysis: Analysis, like: PlacementRow | None = None) -> PlacementRow:
     """Placement and figures of an analysis, headline and plunges; number and margins are those of a row `like` it."""
     headline, plunges = (stiffness_figures(analysis, rows) for rows in (analysis.headline, analysis.set_aside))
-    return PlacementRow(
-        like.number if like else None,
-        *_mm_deg(analysis.origin),
-        *(headline[key] for key in (*FIGURES.values(), "mean_deflection_um")),
-        *(plunges[FIGURES[name]] for name in ("mean", "weakest")),
-        share(analysis.at.extrapolated, analysis.samples.cutting),
-        *((like.margin, like.rapid_margin) if like else ()),
-    )
+    cells: list[Any] = [headline[key] for key in (*FIGURES.values(), "mean_deflection_um")]
+    cells += [plunges["mean_N_per_mm"], plunges["min_N_per_mm"]]
+    cells.append(share(analysis.at.extrapolated, analysis.samples.cutting))
+    margins = {"margin": like.margin, "rapid_margin": like.rapid_margin} if like else {}
+    return PlacementRow(like.number if like else None, *_mm_deg(analysis.origin), *cells, **margins)
 
 
 def _mm_deg(placement: Pose | FloatArray) -> ShopPose:
@@ -183,7 +180,7 @@ def _analyzed(task: PlacementTask, program: ReadProgram, origin: Pose) -> tuple[
 
 def _rewritten(task: PlacementTask, best: Analysis) -> tuple[bytes | None, Written]:
     """The transformed program's bytes, and how it compares; or why there are none."""
-    numbers = {"decimals": task.decimals, "linearise": task.linearise}
+    numbers: dict[str, Any] = {"decimals": task.decimals, "linearise": task.linearise}
     try:
         rewritten = rewrite_program(best.program, best.origin, task.present, **numbers, **task.reading)
         differences = rewriting_differences(best, rewritten, task.present, **task.reading)

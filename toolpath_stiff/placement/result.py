@@ -196,7 +196,7 @@ class Placement(FolderResult):
     @cached_property
     def worse(self) -> list[Document]:
         """Figures that are worse there than at the present placement, and by how much."""
-        worse = []
+        worse: list[Document] = []
         for figure, key in FIGURES.items() if self.present is not None else ():
             chosen, before = getattr(self.chosen, key), getattr(self.present, key)
             by = chosen - before if figure == "range" else before - chosen
