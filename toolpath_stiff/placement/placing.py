@@ -137,7 +137,7 @@ def _analyzed_row(analysis: Analysis, like: PlacementRow | None = None) -> Place
     cells: list[Any] = [headline[key] for key in (*FIGURES.values(), "mean_deflection_um")]
     cells += [plunges["mean_N_per_mm"], plunges["min_N_per_mm"]]
     cells.append(share(analysis.at.extrapolated, analysis.samples.cutting))
-    margins = {"margin": like.margin, "rapid_margin": like.rapid_margin} if like else {}
+    margins: dict[str, Any] = {"margin": like.margin, "rapid_margin": like.rapid_margin} if like else {}
     return PlacementRow(like.number if like else None, *_mm_deg(analysis.origin), *cells, **margins)
 
 
