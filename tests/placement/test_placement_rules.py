@@ -1,9 +1,7 @@
-"""What a recommended placement keeps: never worse than now, rapids, margins, strut law, bounds; and `--pick`."""
+"""What a recommended placement keeps: never worse than now, rapids, margins, strut law, bounds."""
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import shutil
 import subprocess
@@ -304,77 +302,6 @@ def test_a_climb_ends_no_lower_than_nelder_mead():
         start = README_BOUNDS.unit(np.array([first], dtype=float))[0]
         theirs = minimize(loss, start, method="Nelder-Mead", options={"maxfev": 500})
         assert goal.value(evaluator.figures(ours[None]))[0] / 1e6 >= -0.99 * theirs.fun
-
-
-SEARCH = ["--x=-100:100", "--y=-100:100", "--z", "700:1100", "--step", "5", "--points", "12", "--no-plots"]
-
-
-@pytest.fixture(scope="module")
-def searched_folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("earlier")
-    shutil.copy(ROOT / "programs/pocket.nc", folder / "part.nc")
-    with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()):
-        assert main(["place", "part.nc", *SEARCH, "--out", "out"]) == 0
-    return folder
-
-
-@pytest.fixture
-def earlier(searched_folder, tmp_path, monkeypatch):
-    """A folder of one's own with the search in it; the search is made once."""
-    shutil.copytree(searched_folder, tmp_path / "copy")
-    monkeypatch.chdir(tmp_path / "copy")
-    return json.loads(Path("out/placement.json").read_text())
-
-
-def test_pick_takes_a_point_of_the_front_without_a_search(earlier, monkeypatch, capsys):
-    from toolpath_stiff.placement import search as placement
-
-    def never(*_, **__):
-        raise AssertionError("searched again")
-
-    monkeypatch.setattr(placement, "search_placements", never)
-    number = 1 if earlier["recommended"]["number"] != 1 else 2
-    command = ["place", "part.nc", *SEARCH, "--out", "out", "--pick", str(number), "--write", "placed.nc"]
-    assert main([*command, "--decimals", "7"]) == 0
-    summary = json.loads(Path("out/placement.json").read_text())
-    row = earlier["front"][number - 1]
-    assert summary["picked"] and summary["chosen"]["number"] == number
-    assert summary["front"] == earlier["front"] and summary["recommended"] == earlier["recommended"]
-    assert f"Z{row['z_mm']:.4f}".rstrip("0").rstrip(".") in summary["offset_blocks"]["linuxcnc"]
-    again = analyze(NIST, parse_program(Path("placed.nc").read_text(), "placed.nc"), origin=PRESENT, step=5e-3)
-    assert headline_figures(again)["mean_N_per_mm"] == pytest.approx(row["mean_N_per_mm"], rel=1e-6)
-    printed = capsys.readouterr().out
-    assert f"placement {number} of {len(earlier['front'])}, picked" in printed
-    # From the picked one's own folder another may be picked.
-    assert main(["place", "part.nc", *SEARCH, "--out", "out", "--pick", str(earlier["recommended"]["number"])]) == 0
-    back = json.loads(Path("out/placement.json").read_text())
-    assert back == earlier
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (["--pick", "99"], "--pick 99"),
-        (["--pick", "0"], "--pick 0"),
-        (["--pick", "2", "--machine", "softer.toml"], "have changed since the search"),
-        (["--pick", "2", "--step", "9"], "have changed since the search"),
-    ],
-)
-def test_pick_refuses_another_search(earlier, capsys, change, words):
-    toml = (ROOT / "toolpath_stiff/data/machines/nist.toml").read_text()
-    Path("softer.toml").write_text(toml.replace("[46.5, 32.5]", "[46.0, 32.0]"))
-    before = Path("out/placement.json").read_bytes()
-    assert main(["place", "part.nc", *SEARCH, "--out", "out", *change]) == 2
-    assert words in capsys.readouterr().err
-    assert Path("out/placement.json").read_bytes() == before
-
-
-def test_pick_refuses_a_changed_program(earlier, capsys):
-    text = Path("part.nc").read_text()
-    Path("part.nc").write_text(text.replace("M30", "G1 X90 Y90 F500\nM30"))
-    assert Path("part.nc").read_text() != text
-    assert main(["place", "part.nc", *SEARCH, "--out", "out", "--pick", "1"]) == 2
-    assert "have changed since the search" in capsys.readouterr().err
 
 
 def test_a_program_that_only_plunges_says_so(tmp_path, capsys):

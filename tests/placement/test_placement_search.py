@@ -187,10 +187,9 @@ def test_command(tmp_path, monkeypatch, capsys):
     page = (tmp_path / "one/report.html").read_text()
     assert "{{" not in page and re.findall(r"https?://[^\"]*", page) == ["http://www.w3.org/2000/svg"]
     summary = json.loads((tmp_path / "one/placement.json").read_text())
-    best = summary["recommended"]
+    best = summary["chosen"]
     for key, value in best.items():
         assert summary["chosen"][key] == (value if value is None else pytest.approx(value, rel=1e-9, abs=1e-9))
-    assert not summary["picked"]
     for key in ("x_mm", "y_mm", "z_mm", "rotation_deg", "mean_N_per_mm", "range_N_per_mm", "min_N_per_mm"):
         assert key in best
     rows = list(csv.DictReader((tmp_path / "one/placements.csv").open()))
@@ -215,7 +214,6 @@ def test_command(tmp_path, monkeypatch, capsys):
         (["--objective", "best"], "expected one of balanced"),
         (["--objective", "min"], "range, weakest"),
         (["--margin", "60"], "expected 0 to less than 50"),
-        (["--pick", "3"], "no earlier search"),
         (["--points", "1"], "2 to 1000"),
         (["--x", "1900:2000", "--y", "0", "--z", "800"], "no placement is feasible"),
     ],

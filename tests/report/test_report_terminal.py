@@ -3,9 +3,9 @@ from __future__ import annotations
 import copy
 
 import pytest
-from toolpath_stiff.analysis.document import compare_summaries
 
 from tests.report.factory import make_analysis, short, spiral
+from toolpath_stiff.analysis.results import compare_summaries
 from toolpath_stiff.report.analysis import MOST_OPERATIONS, terminal_text
 from toolpath_stiff.report.analysis_tables import comparison
 from toolpath_stiff.report.words import WIDTH, duration

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import work_path
-from toolpath_stiff.placement.placing import place_again, place_program
+from toolpath_stiff.placement.placing import place_program
 from toolpath_stiff.placement.result import Placement, PlacementTask
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
@@ -63,8 +63,6 @@ def place(
     objective: Annotated[str, Option("--objective", choices=tuple(OBJECTIVES))] = "balanced",
     points: Annotated[int, Option("--points", at_least=2, at_most=MOST_FRONT_POINTS)] = 60,
     seed: Annotated[int, Option("--seed", at_least=0)] = 1,
-    pick: Annotated[int | None, Option("--pick")] = None,
-    earlier: Placement | str | Path | Mapping[str, Any] | None = None,
     origin_mm_deg: Origin = None,
     load: LoadDirection = LOAD,
     step_mm: Step = 1.0,
@@ -74,7 +72,7 @@ def place(
     linearise_mm: Linearised = None,
     progress: Progress | None = None,
 ) -> Placement:
-    r"""Search where the work should sit, or take another point of an earlier search.
+    r"""Search where the work should sit.
 
     Parameters
     ----------
@@ -98,11 +96,6 @@ def place(
         Most points of the front.
     seed
         Of the search.
-    pick
-        Take this point (its number in placements.csv) of the front of an earlier search, without searching again.
-        Everything else has to be as it was.
-    earlier
-        That search as its result, its document or the file `placement.json`.
     origin_mm_deg
         The present placement, X, Y, Z or X, Y, Z, A, B, C of program zero; unless given, where the program's G10 says,
         else the machine's default.
@@ -159,10 +152,7 @@ def place(
         linearise=None if linearise_mm is None else m_from_mm(linearise_mm),
         reading=part.read_as,
     )
-    if pick is None:
-        placed = place_program(task, counter(progress, f"{part.name}: search"))
-    else:
-        placed = place_again(task, earlier, pick)
+    placed = place_program(task, counter(progress, f"{part.name}: search"))
     return replace(placed, inputs=(*part.inputs, *on.inputs))
 
 

@@ -7,13 +7,11 @@ from typing import Annotated
 
 import toolpath_stiff as tps
 from toolpath_stiff.cli.calls import call, run_to_folder
-from toolpath_stiff.cli.outputs import check_single, destination, show, tell, write_single
+from toolpath_stiff.cli.outputs import check_single, destination, show, write_single
 from toolpath_stiff.cli.parser import FOLDER, PROGRAM, command
 from toolpath_stiff.cli.program import READ
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.options import Option, numbers
-from toolpath_stiff.results_folder import incomplete
 
 
 @command("place", PROGRAM, "place", *READ, *FOLDER)
@@ -25,7 +23,7 @@ def place(args: Namespace) -> int:
       tps place programs/pocket.nc --z-values 400,600,800 --rotate 0 --objective mean
       tps place programs/pocket.nc --keep-out vice:100,100,0,300,300,900
       tps place programs/pocket.nc --rotate 0 --write placed.nc
-      tps place programs/pocket.nc --rotate 0 --pick 7 --write placed.nc
+      tps place programs/pocket.nc --x 40 --y 25.5 --z 900 --rotate 0 --write placed.nc
 
     The recommended placement is never worse than the present one in mean, range or weakest place, if one such can be
     found.
@@ -36,9 +34,7 @@ def place(args: Namespace) -> int:
     """
     check_single(args, args.write)
     target = destination(args, tps.Placement, [args.program])
-    if args.pick is not None:
-        tell("warning", filter(None, [incomplete(target.folder)]))
-    placement = call(args, tps.place, earlier=Path(target.folder, "placement.json"))
+    placement = call(args, tps.place)
     written = [target.write(placement, plots=not args.no_plots)]
     if args.write and not placement.refusal:
         write_single(args, {Path(args.write): placement.program_bytes})
@@ -46,8 +42,8 @@ def place(args: Namespace) -> int:
     show(args, placement, *written)
     if placement.refusal:
         raise InputError(
-            f"{args.write} was not written; the search is kept in {target.folder} "
-            f"({both_names('--pick')} takes it up): {placement.refusal}"
+            f"{args.write} was not written; the search is kept in {target.folder}: {placement.refusal}",
+            hint=f"place it there without a search by {placement.fixed}",
         )
     return 0
 

@@ -1,12 +1,6 @@
-"""Placing a program: search or an earlier search's front, one placement chosen, analyzed, the program written for it.
+"""Placing a program: the search, the placement that it recommends analyzed, the program written for it."""
 
-`place_program` searches; `place_again` takes another point of a front that was found before, and refuses where
-its figures are no longer those of that search.
-"""
-
-import json
-from collections.abc import Callable, Mapping
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,13 +9,12 @@ from toolpath_stiff.analysis.loads import plunging_rows
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import WorkPath, work_path
-from toolpath_stiff.placement.result import COLUMNS, FIGURES, SEARCH, Placement, PlacementRow, PlacementTask, Written
+from toolpath_stiff.placement.result import COLUMNS, FIGURES, Placement, PlacementRow, PlacementTask, Written
 from toolpath_stiff.placement.search import PlacementResult, search_placements
 from toolpath_stiff.placement.working import Search
 from toolpath_stiff.rewriting.program import RewrittenProgram, check_rewritable, rewrite_program
@@ -64,39 +57,28 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
     search.report = progress or search.report
     found = search_placements(search)
-    values = (found.best + 1, search.poses, found.searches, found.alone)
-    return _placed(task, numbered_rows(task, path, found), dict(zip(SEARCH, values, strict=True)), found.best + 1)
-
-
-def place_again(task: PlacementTask, earlier: Placement | Document | str | Path | None, number: int) -> Placement:
-    """Place the program at point `number` (from 1) of the front of an earlier search, without a search.
-
-    Raises
-    ------
-    InputError
-        The front has no such point, or its figures are others now: program, machine, load or step have changed.
-    """
-    _check(task)
-    where = f" in {earlier}" if isinstance(earlier, str | Path) else ""
-    try:
-        document = earlier.to_dict() if isinstance(earlier, Placement) else earlier
-        document = document if isinstance(document, Mapping) else json.loads(Path(document or "").read_text("utf-8"))
-        search = {name: document["search"][name] for name in SEARCH}
-        front = [PlacementRow(**row) for row in document["front"]]
-    except (OSError, ValueError, KeyError, TypeError):
-        fault = f"--pick: there is no earlier search of this version{where}"
-        raise InputError(fault, hint="search again, without --pick") from None
-    if not 1 <= number <= len(front):
-        raise InputError(f"--pick {number}", expected=f"1 to {len(front)}, the points of the front in placements.csv")
-    placed, row = _placed(task, front, search, number), front[number - 1]
-    changes = [getattr(row, key) - getattr(placed.chosen, key) for key in FIGURES.values()]
-    if max(map(abs, changes)) > 1e-6 * abs(row.mean_N_per_mm):
-        raise InputError(
-            f"--pick {number}: the figures of this point have changed since the search",
-            expected="the same program, machine, load and step as in the search",
-            hint="repeat the search's own command with --pick added, or search again without it",
-        )
-    return placed
+    front = numbered_rows(task, path, found)
+    before, reason = _analyzed(task, task.program, task.present)
+    row = front[found.best]
+    program = task.read(row.origin) if task.program.moves.from_machine.any() else task.program
+    best, beyond = _analyzed(task, program, row.origin)
+    if best is None:
+        raise UnreachableError(f"placement {row.number} of the front: {beyond}", hint="search again")
+    rewritten, written = _rewritten(task, best) if task.write else (None, None)
+    return Placement(
+        task=task,
+        front=front,
+        searches=found.searches,
+        pose_evaluations=search.poses,
+        nothing_better=found.alone,
+        chosen=_analyzed_row(best, row),
+        present=_analyzed_row(before) if before else None,
+        present_reason=reason,
+        best=best,
+        before=before,
+        rewritten=rewritten,
+        written=written,
+    )
 
 
 def _check(task: PlacementTask) -> None:
@@ -145,29 +127,6 @@ def _mm_deg(placement: Pose | FloatArray) -> ShopPose:
     """A placement (6,) in mm and degrees; the rotation within 0 to 360."""
     x, y, z, a, b, c = pose_in_mm(map(float, placement))
     return x, y, z, a, b, c % 360.0
-
-
-def _placed(task: PlacementTask, front: list[PlacementRow], search: dict[str, Any], number: int) -> Placement:
-    """Analyze, before and at the chosen point."""
-    before, reason = _analyzed(task, task.program, task.present)
-    row = front[number - 1]
-    program = task.read(row.origin) if task.program.moves.from_machine.any() else task.program
-    best, beyond = _analyzed(task, program, row.origin)
-    if best is None:
-        raise UnreachableError(f"placement {number} of the front: {beyond}", hint="search again")
-    rewritten, written = _rewritten(task, best) if task.write else (None, None)
-    return Placement(
-        task=task,
-        front=front,
-        **search,
-        chosen=_analyzed_row(best, row),
-        present=_analyzed_row(before) if before else None,
-        present_reason=reason,
-        best=best,
-        before=before,
-        rewritten=rewritten,
-        written=written,
-    )
 
 
 def _analyzed(task: PlacementTask, program: ReadProgram, origin: Pose) -> tuple[Analysis | None, str]:

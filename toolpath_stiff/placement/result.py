@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # The three objectives and where their values stand.
 FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "weakest": "min_N_per_mm"}
 WORSE = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
-SEARCH = ("recommended", "pose_evaluations", "searches", "nothing_better")  # what placement.json says of the search
+SEARCH = ("pose_evaluations", "searches", "nothing_better")  # what placement.json says of the search
 VARIED = ("--x", "--y", "--z", "--tilt-a", "--tilt-b", "--rotate")  # options of the columns of a placement
 ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
 AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
@@ -129,8 +129,8 @@ class Placement(FolderResult):
         What was to be placed, and how, in SI.
     front
         Placements of which none is better than another in all three figures, by rising mean.
-    recommended, searches, pose_evaluations
-        Number of the recommended placement; searches from the beginning, poses evaluated in them.
+    searches, pose_evaluations
+        Searches from the beginning, poses evaluated in them.
     nothing_better
         Whether nothing but the present placement was found, in spite of all of them.
     chosen, present
@@ -157,8 +157,8 @@ class Placement(FolderResult):
     ('', 'G0 X0 Y0 Z5')
     >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
     (1, ['placements.csv', 'placement.json'], 'balanced')
-    >>> found.picked, list(found.trade_offs), found.machine_stated["machine"]
-    (False, ['mean', 'range', 'weakest'], 'nist')
+    >>> found.fixed[:8], list(found.trade_offs), found.machine_stated["machine"]
+    ('--x=0 --', ['mean', 'range', 'weakest'], 'nist')
     >>> found.offsets.linuxcnc[:3]
     'G21'
     >>> type(found.plot()).__name__
@@ -170,7 +170,6 @@ class Placement(FolderResult):
 
     task: PlacementTask
     front: list[PlacementRow]
-    recommended: int
     searches: int
     pose_evaluations: int
     nothing_better: bool
@@ -189,9 +188,9 @@ class Placement(FolderResult):
         return self.chosen.origin_mm_deg
 
     @property
-    def picked(self) -> bool:
-        """Another one of the front than the recommended placement is chosen."""
-        return self.chosen.number != self.recommended
+    def fixed(self) -> str:
+        """The options that fix the chosen placement."""
+        return " ".join(f"{name}={value:.6g}" for name, value in zip(VARIED, self.origin_mm_deg, strict=True))
 
     @cached_property
     def worse(self) -> list[Document]:
@@ -214,21 +213,20 @@ class Placement(FolderResult):
                 "nothing better than the present placement was found within the bounds, in "
                 f"{self.searches} searches from the beginning, {self.pose_evaluations} poses evaluated"
             )
-        which = "picked" if self.picked else "recommended"
         for row in self.worse:
             chosen, before = row["chosen_N_per_mm"], row["before_N_per_mm"]
             warnings.append(
-                f"WORSE: at the {which} placement {WORSE[row['figure']]} than at the present one, {number(chosen)} "
+                f"WORSE: at the recommended placement {WORSE[row['figure']]} than at the present one, {number(chosen)} "
                 f"instead of {number(before)} N/mm ({100.0 * row['worse_by_N_per_mm'] / before:.1f} % worse)"
             )
-        if self.worse and not self.picked:
+        if self.worse:
             warnings.append("no placement was found within the bounds that is as good as the present one in all three")
         if self.before is None:
             nothing = "the present placement is out of reach, so nothing says what must not get worse"
             warnings.append(f"{nothing}: {self.present_reason}")
         else:
             warnings += self._rules_broken(self.before, "present")
-        warnings += self._rules_broken(self.best, which)
+        warnings += self._rules_broken(self.best, "recommended")
         if self.chosen.extrapolated_share:
             warnings.append(
                 f"the strut law is extrapolated at {100.0 * self.chosen.extrapolated_share:.0f} % of the samples: "
@@ -307,8 +305,6 @@ class Placement(FolderResult):
                 "force_N": self.best.force,
                 "objective": self.task.rules.objective,
                 "chosen": self.chosen,
-                "picked": self.picked,
-                "recommended": self.front[self.recommended - 1],
                 "before": self.present,
                 "before_reason": self.present_reason or None,
                 "trade_offs": self.trade_offs,

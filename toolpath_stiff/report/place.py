@@ -24,12 +24,8 @@ def text(placed: Placement) -> str:
 def facts(placed: Placement) -> list[tuple[str, str]]:
     """The chosen placement in words, each with its label."""
     best, present, blocks = placed.chosen, placed.present, placed.offsets
-    which = (
-        f"placement {best.number} of {len(placed.front)}, picked"
-        if placed.picked
-        else f"objective {placed.task.rules.objective}"
-    )
-    zero = f"X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees ({which})"
+    which = f"(objective {placed.task.rules.objective})"
+    zero = f"X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees {which}"
     tilt = f"set-up tilted by A{best.a_deg:.3f} B{best.b_deg:.3f} degrees"
     mean, now = best.plunge_mean_N_per_mm, f", before {number(present.plunge_mean_N_per_mm)}" if present else ""
     margin = min(value for value in (best.margin, best.rapid_margin, 1.0) if value is not None)
@@ -39,7 +35,7 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
     ]
     return [
         ("program", f"{placed.best.program.name} on {machine_text(placed.machine_stated)}, load {placed.best.load}"),
-        ("picked" if placed.picked else "recommended", zero),
+        ("recommended", zero),
         *([("", tilt)] if best.a_deg or best.b_deg else []),
         ("  stiffness", _figures_words(best)),
         ("  before", _figures_words(present) if present else f"out of reach: {placed.present_reason}"),

@@ -34,8 +34,7 @@ def page_pieces(placed: Placement) -> Iterator[str]:
     path, note = drawn_path(placed, [*placed.front, *([present] if present else [])])
     data = {
         "front": [vars(row) for row in placed.front],
-        "chosen": (placed.chosen.number or 0) - 1,
-        "recommended": placed.recommended - 1,
+        "recommended": (placed.chosen.number or 0) - 1,
         "before": vars(present) if present else None,
         "before_reason": plain(placed.present_reason),
         "force": best.force,

@@ -22,7 +22,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.files import read_bytes, read_text
+from toolpath_stiff.files import Content, read_bytes, read_text
 from toolpath_stiff.results_folder import Rules, write_folder
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, clamp_of, draw_case, rows_of
@@ -93,7 +93,9 @@ def unseal(file: str | Path) -> tuple[DrawnCase, Document]:
     if not content.startswith(MAGIC) or not hmac.compare_digest(digest, hmac.digest(KEY, body, "sha256")):
         raise InputError("the seal is broken: the file was changed or is no sealed truth", file=str(file))
     sealed: Document = json.loads(zlib.decompress(body[4 : 4 + int.from_bytes(body[:4], "big")]))
-    machine = {name: np.array(value) if isinstance(value, list) else value for name, value in sealed["machine"].items()}
+    machine: Table = {
+        name: np.array(value) if isinstance(value, list) else value for name, value in sealed["machine"].items()
+    }
     machine["unknown"] = machine["unknown"] and Unknown(**machine["unknown"])
     nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
     return DrawnCase({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"])), sealed
@@ -221,7 +223,7 @@ def new_exercise(folder: str | Path, case: DrawnCase, rules: Rules = NO_OTHER) -
 
     `rules`: what must not be replaced. An exercise in the folder is not, by default: its sealed truth would be lost.
     """
-    contents = {MACHINE: case.nominal.text, MEASUREMENTS: csv_text(case.rows), SEALED: seal(case)}
+    contents: dict[str, Content] = {MACHINE: case.nominal.text, MEASUREMENTS: csv_text(case.rows), SEALED: seal(case)}
     write_folder(folder, contents, command="rig new", rules=rules)
     return len(case.rows["x_mm"])
 

@@ -181,7 +181,11 @@ def _ends(nominal: Nominal, hidden: HiddenMachine, rows: Rows, place: Geometry) 
     if nominal.tool_length > 0.0:
         grown = (1.0 + rows.extension / nominal.tool_length) ** hidden.overhang_exponent
     here = (rows.setup == hidden.setup) & bool(hidden.setup)
-    ends = [("spindle", place.rotation[:, :, j], c) for j, c in enumerate((radial * grown, radial * grown, axial))]
+    ends: list[tuple[str, FloatArray, FloatArray | float]]
+    ends = [
+        ("spindle", place.rotation[:, :, j], c)
+        for j, c in enumerate((radial * grown, radial * grown, np.full(n, axial)))
+    ]
     ends += [("table", AXES[j], hidden.table[j]) for j in range(3)]
     ends += [("table", np.cross(AXES[j], place.work_point), hidden.rocking) for j in range(2)]
     ends += [("table", AXES[j], np.where(here, hidden.setup_compliance[j], 0.0)) for j in range(3)]

@@ -73,9 +73,9 @@ def _vertex(k: int, number: int, way: str, place: Geometry, direction: FloatArra
     """Displacement of a vertex outwards, upwards or along the load."""
     outward, upward = unknowns[2 * number : 2 * number + 2].tolist()
     if way:
-        return outward if way == "radial" else upward
+        return float(outward if way == "radial" else upward)
     joints = place.frame_joints[k][place.vertices == number].mean(axis=0)[:2]
-    return float(direction[:2] @ joints / np.linalg.norm(joints)) * outward + float(direction[2]) * upward
+    return float(direction[:2] @ joints / np.linalg.norm(joints) * outward + direction[2] * upward)
 
 
 def with_loops(

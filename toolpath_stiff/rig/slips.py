@@ -6,8 +6,6 @@ truth of what it did, so that a search for such slips can be judged.
 A slip of a pose or of a sign is made where a form has it once: in one row, or in all rows of a clamping.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.random import Generator
 
@@ -83,7 +81,8 @@ def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = 
         rows, written = _exchanged(table, rng)
     elif kind in WRITTEN_PER_N_PER_MM:
         rows = np.array([int(rng.integers(len(table["x_mm"])))])
-        written = _with(table, "stiffness_N_per_mm", rows, lambda k: np.round(k * WRITTEN_PER_N_PER_MM[kind], 3))
+        meant = np.asarray(table["stiffness_N_per_mm"])[rows]
+        written = _with(table, "stiffness_N_per_mm", rows, np.round(meant * WRITTEN_PER_N_PER_MM[kind], 3))
     else:
         rows, written = _mistyped(table, case.nominal, kind, rng)
     before, after = (
@@ -102,10 +101,10 @@ def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = 
     }
 
 
-def _with(table: Table, name: str, rows: IntArray, change: Callable[[FloatArray], FloatArray | float]) -> Table:
+def _with(table: Table, name: str, rows: IntArray, written: FloatArray | float) -> Table:
     """The table with other values in some rows of a column."""
     values = np.array(table[name], dtype=float)
-    values[rows] = change(values[rows])
+    values[rows] = written
     return {**table, name: values}
 
 
@@ -148,7 +147,7 @@ def _exchanged(table: Table, rng: Generator) -> tuple[IntArray, Table]:
         same = (clamps == clamps[first]) & (loads == loads[first])
         if len(others := np.flatnonzero(same & (directions != directions[first]))):
             rows = np.sort([first, int(rng.choice(others))])
-            return rows, _with(table, "stiffness_N_per_mm", rows, lambda k: k[::-1])
+            return rows, _with(table, "stiffness_N_per_mm", rows, np.asarray(table["stiffness_N_per_mm"])[rows[::-1]])
     raise InputError("no two directions of one clamping and load", expected="a campaign with several")
 
 
@@ -163,7 +162,7 @@ def _mistyped(table: Table, nominal: Nominal, kind: str, rng: Generator) -> tupl
         if abs(before) < smallest:
             continue
         after = round(before + float(rng.choice([-1.0, 1.0])) * wrong_by, 3) if wrong_by else -before
-        trial = _with(table, name, rows, lambda _, after=after: after)
+        trial = _with(table, name, rows, after)
         tried = rows_of(trial).take(rows)
         if reachable(nominal, tried.position, tried.angles, tried.extension).all():
             return rows, trial

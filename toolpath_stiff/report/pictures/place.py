@@ -21,7 +21,7 @@ def front(placed: Placement) -> Figure:
     scale: Look = {"vmin": min(everything), "vmax": max(*everything, min(everything) * (1.0 + 1e-6))}
     dots = axes.scatter(mean, spread, s=34, c=weakest, cmap=STIFFNESS, ec=INK, lw=0.4, zorder=2, **scale)
     dots.set_label("front: no placement is better in all three")
-    which = f"{'picked' if placed.picked else 'recommended'}, number {best.number}"
+    which = f"recommended, number {best.number}"
     ring: Look = {"ms": 16, "mfc": "none", "mec": ORANGE, "mew": 2.5}
     axes.plot(best.mean_N_per_mm, best.range_N_per_mm, "o", label=which, **ring)
     if before:
