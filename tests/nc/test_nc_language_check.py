@@ -47,10 +47,10 @@ def test_figures_of_a_program_by_hand():
     ).moves
     found = figures(moves, rapid_feed=0.1)
     half = math.pi * 10
-    assert found.lengths_mm == pytest.approx({"cutting": half + 40 + 10 + 30, "rapid": 40, "total": half + 120})
+    assert found["lengths_mm"] == pytest.approx({"cutting": half + 40 + 10 + 30, "rapid": 40, "total": half + 120})
     cutting = half / 10 + 4 + 120 + 30 / (200 / 60)
-    assert found.times_s == pytest.approx({"cutting": cutting, "rapid": 0.4, "dwell": 2, "total": cutting + 2.4})
-    assert found.extents_mm["y"] == pytest.approx([-40, 10])
+    assert found["times_s"] == pytest.approx({"cutting": cutting, "rapid": 0.4, "dwell": 2, "total": cutting + 2.4})
+    assert found["extents_mm"]["y"] == pytest.approx([-40, 10])
 
 
 def test_findings_go_on_after_an_error():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_POINTS = 5_000_000
+COLUMNS = ("x_mm", "y_mm", "z_mm", "stiffness_N_per_mm", "reachable")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -49,8 +49,8 @@ class StiffnessMap(FolderResult):
     [800.0, 1200.0]
     >>> found.to_frame().columns.tolist(), len(found.to_frame())
     (['x_mm', 'y_mm', 'z_mm', 'stiffness_N_per_mm', 'reachable'], 50)
-    >>> [plane["x_mm"].size for plane in found.columns()]
-    [25, 25]
+    >>> found.columns()["x_mm"].size
+    50
     >>> type(found.plot()).__name__
     'Figure'
     """
@@ -89,22 +89,16 @@ class StiffnessMap(FolderResult):
             row[name] = {**place, "stiffness_N_per_mm": float(layer[j, k])}
         return row
 
-    def columns(self) -> Iterator[dict[str, AnyArray]]:
+    def columns(self) -> dict[str, AnyArray]:
         """Column of `map.csv` -> values, plane by plane."""
-        ys, xs = np.meshgrid(mm_from_m(self.y), mm_from_m(self.x), indexing="ij")
-        for i, height in enumerate(self.z):
-            yield {
-                "x_mm": xs.ravel(),
-                "y_mm": ys.ravel(),
-                "z_mm": np.full(xs.size, mm_from_m(float(height))),
-                "stiffness_N_per_mm": n_per_mm_from_n_per_m(self.stiffness[i].ravel()),
-                "reachable": self.reachable[i].ravel(),
-            }
+        zs, ys, xs = np.meshgrid(mm_from_m(self.z), mm_from_m(self.y), mm_from_m(self.x), indexing="ij")
+        stiffness = n_per_mm_from_n_per_m(self.stiffness)
+        values = (xs, ys, zs, stiffness, self.reachable)
+        return {name: column.ravel() for name, column in zip(COLUMNS, values, strict=True)}
 
     def to_frame(self) -> pd.DataFrame:
         """One row a point of the grid: x_mm, y_mm, z_mm, stiffness_N_per_mm (nan out of reach), reachable."""
-        planes = list(self.columns())
-        return frame_of({name: np.concatenate([plane[name] for plane in planes]) for name in planes[0]})
+        return frame_of(self.columns())
 
     def _short(self) -> str:
         return f"{self.model.machine.name}, load {self.load}, {self.stiffness.size} points"

@@ -49,8 +49,7 @@ def parse_load(text: str) -> Load:
         vector = np.array([])
     if vector.shape != (3,) or not np.isfinite(vector).all() or not np.abs(vector).max() > 0.0:
         raise InputError(
-            f"load {text!r} is not a direction",
-            expected=f"one of {', '.join(LOADS)}, or DX,DY,DZ such as 1,0,-0.5",
+            f"load {text!r} is not a direction", expected=f"one of {', '.join(LOADS)}, or DX,DY,DZ such as 1,0,-0.5"
         )
     x, y, z = (vector / np.linalg.norm(vector)).tolist()
     return Load("fixed", (x, y, z))

@@ -12,16 +12,14 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.analysis.statistics import by_operation, by_tool, rows_of_parts
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.documents import Document, to_dict
+from toolpath_stiff.documents import to_dict
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.findings import ERROR, WARNING, Finding, UsedCode, in_order
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
-from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import move_durations, sample_moves
@@ -36,30 +34,19 @@ MOST_NAMED = 20  # lines named for one kind of finding
 Extents = dict[str, list[float]]
 
 
-@dataclass(frozen=True)
-class Figures:
-    """Extents of the cuts in program coordinates of G54, lengths and times of some moves."""
-
-    extents_mm: Extents
-    extents_deg: Extents
-    lengths_mm: dict[str, float]
-    times_s: dict[str, float]
-
-
-def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Figures:
-    """Extents, lengths and times of moves; rapids at `rapid_feed`, m/s."""
+def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> dict[str, dict[str, Any]]:
+    """Extents of the cuts in program coordinates of G54, lengths and times of moves; rapids at `rapid_feed`, m/s."""
     cutting = moves.motion != RAPID
-    length, duration = move_lengths(moves), move_durations(moves, rapid_feed)
+    length, duration, ends = move_lengths(moves), move_durations(moves, rapid_feed), extents(moves.take(cutting))
     parts = (("cutting", cutting), ("rapid", ~cutting))
     lengths = {name: mm_from_m(float(length[rows].sum())) for name, rows in parts}
     times = {name: float(duration[rows].sum()) for name, rows in parts} | {"dwell": float(moves.dwell.sum())}
-    ends = extents(moves.take(cutting))
-    return Figures(
-        {axis: ends[axis] for axis in "xyz" if ends},
-        {axis: ends[axis] for axis in "abc" if ends},
-        {**lengths, "total": sum(lengths.values())},
-        {**times, "total": sum(times.values())},
-    )
+    return {
+        "extents_mm": {axis: ends[axis] for axis in "xyz" if ends},
+        "extents_deg": {axis: ends[axis] for axis in "abc" if ends},
+        "lengths_mm": {**lengths, "total": sum(lengths.values())},
+        "times_s": {**times, "total": sum(times.values())},
+    }
 
 
 def extents(moves: Moves) -> Extents:
@@ -165,8 +152,10 @@ class ProgramCheck(Result):
         Whether it was read to its end.
     used, unsupported, findings
         Codes; words not acted upon; errors, warnings and notes, in the order of lines.
-    whole, tools, operations
-        Figures of all moves; a row with the same of each tool in order of use, of each operation in that of the run.
+    extents_mm, extents_deg
+        Smallest and largest X, Y, Z and A, B, C of the cuts in program coordinates of G54.
+    lengths_mm, times_s
+        Of cuts, of rapids, together; dwells among the times.
     fastest_strut
         Largest speed of a strut in a cut with its line; empty without a machine.
     modal_start, modal_end
@@ -195,18 +184,17 @@ class ProgramCheck(Result):
     used: tuple[UsedCode, ...]
     unsupported: tuple[Finding, ...]
     findings: tuple[Finding, ...]
-    whole: Figures
-    tools: tuple[Document, ...]
-    operations: tuple[Document, ...]
+    extents_mm: Extents
+    extents_deg: Extents
+    lengths_mm: dict[str, float]
+    times_s: dict[str, float]
     fastest_strut: dict[str, float]
     modal_start: dict[str, str]
     modal_end: dict[str, str]
 
     def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command; the figures of all moves stand among its own keys."""
-        document: dict[str, Any] = {}
-        for key, value in to_dict(self).items():
-            document |= value if key == "whole" else {key: value}
+        """The JSON document of the command."""
+        document: dict[str, Any] = to_dict(self)
         return document
 
     @property
@@ -254,7 +242,6 @@ def check_program(
     checked = check(request)
     program, findings = checked.program, list(checked.findings)
     speed: dict[str, float] = {}
-    rapid_feed = machine.rapid_feed if machine else defaults.RAPID_FEED
     if machine is not None and len(program.moves):
         more, speed = machine_findings(program, machine, step, strut_speed)
         findings += more
@@ -267,27 +254,8 @@ def check_program(
         used=checked.used,
         unsupported=checked.unsupported,
         findings=in_order(findings),
-        whole=figures(program.moves, rapid_feed),
-        tools=tool_rows(program, rapid_feed),
-        operations=operation_rows(program, rapid_feed),
+        **figures(program.moves, machine.rapid_feed if machine else defaults.RAPID_FEED),
         fastest_strut=speed,
         modal_start=checked.start,
         modal_end=checked.end,
     )
-
-
-def tool_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[Document, ...]:
-    """Figures of each tool in order of use; rapids at `rapid_feed`, m/s."""
-    return _rows(program.moves, *by_tool(program), rapid_feed)
-
-
-def operation_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[Document, ...]:
-    """Figures of each operation in the order of the run; rapids at `rapid_feed`, m/s."""
-    stretches = operations(program)
-    return _rows(program.moves, by_operation(stretches), stretches.of_move, rapid_feed)
-
-
-def _rows(moves: Moves, headings: list[Document], of_move: IntArray, rapid_feed: float) -> tuple[Document, ...]:
-    parts = rows_of_parts(of_move, len(headings))
-    figures_of = (to_dict(figures(moves.take(part), rapid_feed)) for part in parts)
-    return tuple({**figures, **heading} for figures, heading in zip(figures_of, headings, strict=True))

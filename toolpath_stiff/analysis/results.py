@@ -41,14 +41,7 @@ from toolpath_stiff.stiffness.model import (
     conditions_stated,
     effects_stated,
 )
-from toolpath_stiff.units import (
-    Pose,
-    mm_from_m,
-    mm_per_min_from_m_per_s,
-    n_per_mm_from_n_per_m,
-    number,
-    pose_in_mm,
-)
+from toolpath_stiff.units import Pose, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m, number, pose_in_mm
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -196,35 +196,25 @@ def class_figures(path: EvaluatedPath, rows: IntArray) -> Document:
     }
 
 
-def by_operation(rows: Operations) -> list[Document]:
-    """Number, name, tool and lines of each operation, as its row begins."""
-    names = ("name", "tool", "first_line", "last_line")
-    return [{"operation": row.number, **{name: getattr(row, name) for name in names}} for row in rows.rows]
-
-
-def by_tool(program: ReadProgram) -> tuple[list[Document], IntArray]:
-    """Number and remark of each tool in order of use, as its row begins; (n,) which of them makes each move."""
-    numbers, first, of_move = np.unique(program.moves.tool, return_index=True, return_inverse=True)
-    remarks, order = {tool.number: tool.remark for tool in program.tools}, np.argsort(first)
-    return [{"tool": n, "remark": remarks.get(n, "")} for n in numbers[order].tolist()], np.argsort(order)[of_move]
-
-
 def per_operation(path: EvaluatedPath) -> list[Document]:
     """The figures of each operation, in the order of the run; their lengths, times and samples add up to the whole."""
-    headings = by_operation(path.operations)
-    parts = _parts(path, path.operations.of_move, len(headings))
+    rows, names = path.operations.rows, ("name", "tool", "first_line", "last_line")
+    headings = [{"operation": row.number, **{name: getattr(row, name) for name in names}} for row in rows]
+    parts = _parts(path, path.operations.of_move, len(rows))
     return [{**heading, **part} for heading, part in zip(headings, parts, strict=True)]
 
 
 def per_tool(path: EvaluatedPath) -> list[Document]:
     """The figures of each tool that cuts, in order of use; its length is that of its first cut."""
-    (headings, of_move), moves = by_tool(path.program), path.program.moves
+    moves, remarks = path.program.moves, {tool.number: tool.remark for tool in path.program.tools}
+    numbers, of_move = np.unique(moves.tool, return_inverse=True)
+    parts, cuts = _parts(path, of_move, len(numbers)), np.flatnonzero(moves.motion != RAPID)
+    used, first = np.unique(of_move[cuts], return_index=True)
     rows: list[Document] = []
-    for i, (heading, part) in enumerate(zip(headings, _parts(path, of_move, len(headings)), strict=True)):
-        cuts = np.flatnonzero((of_move == i) & (moves.motion != RAPID))
-        if len(cuts):
-            length = mm_from_m(float(moves.tool_length[cuts[0]]))
-            rows.append({**heading, "length_mm": None if np.isnan(length) else length, **part})
+    for i, cut in sorted(zip(used.tolist(), cuts[first].tolist(), strict=True), key=lambda pair: pair[1]):
+        tool, length = int(numbers[i]), mm_from_m(float(moves.tool_length[cut]))
+        heading = {"tool": tool, "remark": remarks.get(tool, ""), "length_mm": None if np.isnan(length) else length}
+        rows.append({**heading, **parts[i]})
     return rows
 
 
@@ -235,7 +225,7 @@ def _parts(path: EvaluatedPath, of_move: IntArray, count: int) -> list[Document]
     duration = move_durations(moves, path.machine.rapid_feed) + moves.dwell
     margin = np.where(samples.cutting & path.at.reachable, path.at.reach.margin, np.inf)
     parts: list[Document] = []
-    for made, rows in zip(rows_of_parts(of_move, count), rows_of_parts(of_move[samples.move], count), strict=True):
+    for made, rows in zip(_rows_of(of_move, count), _rows_of(of_move[samples.move], count), strict=True):
         nearest = int(rows[np.argmin(margin[rows])])
         known = bool(np.isfinite(margin[nearest]))
         parts.append(
@@ -253,7 +243,7 @@ def _parts(path: EvaluatedPath, of_move: IntArray, count: int) -> list[Document]
     return parts
 
 
-def rows_of_parts(part: IntArray, count: int) -> list[IntArray]:
+def _rows_of(part: IntArray, count: int) -> list[IntArray]:
     """The rows of each of `count` parts, in order; `part` (n,) says in which each row is."""
     order = np.argsort(part, kind="stable")
     return np.split(order, np.searchsorted(part[order], np.arange(1, count)))[:count]

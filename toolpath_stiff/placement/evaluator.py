@@ -87,12 +87,7 @@ class Evaluator:
     """Evaluates placements of one path and counts the poses that this took."""
 
     def __init__(
-        self,
-        model: StiffnessModel,
-        path: WorkPath,
-        load: Load,
-        force: float,
-        keepouts: tuple[KeepOut, ...] = (),
+        self, model: StiffnessModel, path: WorkPath, load: Load, force: float, keepouts: tuple[KeepOut, ...] = ()
     ) -> None:
         self.model, self.path, self.load, self.force, self.keepouts = model, path, load, force, keepouts
         self.poses = 0

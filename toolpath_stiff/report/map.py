@@ -46,11 +46,10 @@ def page(planes: StiffnessMap, drawn: dict[str, bytes]) -> Iterator[str]:
     )
 
 
-def map_csv(planes: StiffnessMap) -> Iterator[str]:
-    """`map.csv`, a slice at a time."""
-    yield ",".join(DECIMALS) + "\n"
-    for columns in planes.columns():
-        yield csv_rows({**columns, "reachable": columns["reachable"].astype(int)}, DECIMALS)
+def map_csv(planes: StiffnessMap) -> str:
+    """`map.csv`."""
+    columns = planes.columns()
+    return ",".join(DECIMALS) + "\n" + csv_rows({**columns, "reachable": columns["reachable"].astype(int)}, DECIMALS)
 
 
 DATA = {"map.csv": map_csv, "map.json": StiffnessMap.to_json}

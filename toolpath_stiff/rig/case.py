@@ -18,13 +18,7 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE, with_effect
-from toolpath_stiff.rig.hidden import (
-    HiddenMachine,
-    Nuisances,
-    disturb_machine,
-    disturb_readings,
-    readings,
-)
+from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, disturb_machine, disturb_readings, readings
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
 from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME

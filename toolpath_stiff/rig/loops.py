@@ -79,12 +79,7 @@ def _vertex(k: int, number: int, way: str, place: Geometry, direction: FloatArra
 
 
 def with_loops(
-    nominal: Nominal,
-    hidden: HiddenMachine,
-    measured: Table,
-    rows: Rows,
-    nuisances: Nuisances,
-    rng: Generator,
+    nominal: Nominal, hidden: HiddenMachine, measured: Table, rows: Rows, nuisances: Nuisances, rng: Generator
 ) -> Table:
     """A measured table whose rows of loops beside the tip hold what their indicators read, in um, for a stiffness."""
     loops = list(measured.get("loop", ()))

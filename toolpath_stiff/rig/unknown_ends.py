@@ -90,13 +90,7 @@ def worn_table_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_ends(links, (lever, u.size))
 
 
-@act(
-    "table",
-    "setup,load",
-    SOFT,
-    shape=HOLDS,
-    columns="force_N,setup",
-)
+@act("table", "setup,load", SOFT, shape=HOLDS, columns="force_N,setup")
 def fixture_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The fixture of one set-up holds by friction: beyond it the work gives sideways."""
     sideways = state.rows.force * np.linalg.norm(state.rows.direction[:, :2], axis=1)
