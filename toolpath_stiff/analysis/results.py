@@ -427,11 +427,10 @@ def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[
     """
     samples, counted = analysis.samples, analysis.counted
     cuts = samples.cutting & ((samples.weight > 0.0) | (not counted.any()))
-    stiffness = np.where(counted, analysis.at.stiffness, np.nan)[cuts]
     lines, index = np.unique(samples.line[cuts], return_inverse=True)
     lowest = np.full(len(lines), np.inf)
-    with np.errstate(invalid="ignore"):
-        np.minimum.at(lowest, index, stiffness)
-    missed = np.flatnonzero(~(lowest >= required))
-    order = missed[np.argsort(np.nan_to_num(lowest[missed], nan=-np.inf), kind="stable")]
-    return [(int(lines[i]), n_per_mm_from_n_per_m(float(lowest[i]))) for i in order]
+    np.minimum.at(lowest, index, np.where(counted, analysis.at.stiffness, -np.inf)[cuts])
+    missed = np.flatnonzero(lowest < required)
+    missed = missed[np.argsort(lowest[missed], kind="stable")]
+    shown = n_per_mm_from_n_per_m(np.where(np.isfinite(lowest), lowest, np.nan))[missed]
+    return list(zip(lines[missed].tolist(), shown.tolist(), strict=True))

@@ -11,9 +11,9 @@ import hashlib
 import hmac
 import io
 import json
-import math
 import re
 import zlib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -196,13 +196,10 @@ def _value(name: str, cell: str) -> float | int | str:
     low, high, default = NUMBERS[name]
     if not cell and default is not None:
         return default
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:
-        raise ValueError(f"a number from {low:g} to {high:g}")
-    return value
+    with suppress(ValueError):
+        if low <= float(cell) <= high:
+            return float(cell)
+    raise ValueError(f"a number from {low:g} to {high:g}")
 
 
 def blind_case(
