@@ -28,7 +28,6 @@ ARGUMENTS = {
     "region": "regions",
     "require": "require_N_per_mm",
     "step": "step_mm",
-    "strut-speed": "strut_speed_mm_per_min",
     "strut-spread": "strut_spread_percent",
     "temperature": "temperature_C",
     "z-values": "z_values_mm",

@@ -78,7 +78,7 @@ def test_reach_and_strut_speeds():
     """A strut's speed is the part of the tip's velocity along it: u . v, at constant orientation."""
     machine = load_machine("nist")
     found = checked("G0 X0 Y0 Z0\nG1 X30 F6000\nG0 X2000\nG1 X2001", default_origin=machine.default_origin)
-    findings, speed = machine_findings(found.program, machine, 1e-4, 0.05)
+    findings, speed = machine_findings(found.program, machine, 1e-4)
     assert [(f.line, f.severity) for f in findings if f.code == "reach"] == [(3, "warning"), (4, "error")]
     from toolpath_stiff.machine.kinematics import solve_struts
 
@@ -87,7 +87,6 @@ def test_reach_and_strut_speeds():
     beyond = np.array(machine.default_origin[:3]) + np.array([[2.0, 0, 0], [2.001, 0, 0]])
     along = max(along, float(np.abs(solve_struts(machine, beyond).directions[:, :, 0]).max() * 6000))
     assert speed["mm_per_min"] == pytest.approx(along, rel=1e-3)
-    assert any(f.code == "strut speed" for f in findings)
 
 
 def test_the_command(tmp_path, capsys):
@@ -107,7 +106,6 @@ def test_the_command(tmp_path, capsys):
     program.write_text("")
     assert main(["check", str(program)]) == 2
     assert main(["check", str(program), "--interpreter", "auto"]) == 2
-    assert main(["check", str(program), "--machine", "none", "--strut-speed", "5"]) == 2
     capsys.readouterr()
 
 

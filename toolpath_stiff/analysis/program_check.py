@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -12,7 +11,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.model import Hexapod
@@ -78,66 +77,31 @@ def _arc_extremes(arcs: Moves) -> FloatArray:
     return np.concatenate(points)
 
 
-def machine_findings(
-    program: ReadProgram, machine: Hexapod, step: float, speed_limit: float | None
-) -> tuple[list[Finding], dict[str, float]]:
-    """Moves beyond reach, and the struts' speeds (m/s) at the programmed feeds.
+def machine_findings(program: ReadProgram, machine: Hexapod, step: float) -> tuple[list[Finding], dict[str, float]]:
+    """Moves beyond reach; the largest speed of a strut in a cut at the programmed feeds, with its line.
 
-    Parameters
-    ----------
-    program, machine
-        The program, where it sits on the machine, and that.
-    step
-        Distance of the samples, m.
-    speed_limit
-        m/s that no strut may exceed in a cut; None: none is known.
-
-    Returns
-    -------
-    findings, and the largest speed of a strut in a cut with its line.
+    The program sits where it was read for; `step` is the distance of the samples, m.
     """
     moves, origin = place(program.moves, program.origin), program.origin
     samples = sample_moves(moves, step=step, rapid_feed=machine.rapid_feed, origin=origin)
     poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
     there = evaluate(StiffnessModel(machine), *poses, Load("z"))
-    outside, cuts = ~there.reachable, samples.cutting & ~there.reachable
-
-    def beyond(i: int) -> str:
-        rows = np.flatnonzero((samples.line == lines[i]) & outside)
-        move = "a cutting move" if lines[i] in samples.line[cuts] else "a rapid"
-        worst = int(rows[np.argmin(there.reach.margin[rows])])
-        return f"{move} leaves the machine's reach: {there.reach.describe(worst)}"
-
-    lines = np.unique(samples.line[outside])
-    findings = _findings("reach", lines, beyond, np.isin(lines, samples.line[cuts]))
+    lines, findings = np.unique(samples.line[~there.reachable]).tolist(), []
+    for line in lines[:MOST_NAMED]:
+        rows = np.flatnonzero((samples.line == line) & ~there.reachable)
+        limit = there.reach.describe(int(rows[np.argmin(there.reach.margin[rows])]))
+        cuts = samples.cutting[rows].any()
+        text = f"{'a cutting move' if cuts else 'a rapid'} leaves the machine's reach: {limit}"
+        findings.append(Finding(line, 0, "reach", text, ERROR if cuts else WARNING))
+    if more := len(lines) - len(findings):
+        findings.append(Finding(0, 0, "reach", f"and {more} more lines leave the machine's reach", WARNING))
     time = np.diff(samples.t)
     same = (samples.move[1:] == samples.move[:-1]) & samples.cutting[1:] & (time > 0.0)
     if not same.any():
         return findings, {}
     speed = (np.abs(np.diff(there.strut_lengths, axis=0)[same]) / time[same, None]).max(axis=1)
-    fastest, line = mm_per_min_from_m_per_s(speed), samples.line[1:][same]
-    if speed_limit is not None:
-        over, limit = np.unique(line[speed > speed_limit]), mm_per_min_from_m_per_s(speed_limit)
-
-        def too_fast(i: int) -> str:
-            most = fastest[line == over[i]].max()
-            return f"a strut moves at {most:.0f} mm/min at the programmed feed, beyond {limit:.0f} mm/min"
-
-        findings += _findings("strut speed", over, too_fast)
-    top = int(np.argmax(speed))
-    return findings, {"mm_per_min": float(fastest[top]), "line": int(line[top])}
-
-
-def _findings(
-    code: str, lines: IntArray, words: Callable[[int], str], errors: BoolArray | None = None
-) -> list[Finding]:
-    """A finding for each of some lines, the first ones in words; errors where `errors` (n,) says so, else warnings."""
-    named = [
-        Finding(line, 0, code, words(i), ERROR if errors is not None and errors[i] else WARNING)
-        for i, line in enumerate(lines[:MOST_NAMED].tolist())
-    ]
-    more = len(lines) - len(named)
-    return named + ([Finding(0, 0, code, f"and {more} more of the kind {code!r}", WARNING)] if more else [])
+    fastest, top = mm_per_min_from_m_per_s(float(speed.max())), int(np.argmax(speed))
+    return findings, {"mm_per_min": fastest, "line": int(samples.line[1:][same][top])}
 
 
 @dataclass(frozen=True, repr=False)
@@ -225,9 +189,7 @@ class ProgramCheck(Result):
         return f"{self.program}, {errors}"
 
 
-def check_program(
-    request: Request, machine: Hexapod | None, step: float = defaults.STEP, strut_speed: float | None = None
-) -> ProgramCheck:
+def check_program(request: Request, machine: Hexapod | None, step: float = defaults.STEP) -> ProgramCheck:
     """Everything that is to be said of a program, in the shop's units.
 
     Parameters
@@ -236,14 +198,14 @@ def check_program(
         The program, and how it is read; its default origin is the machine's.
     machine
         Whose reach and strut speeds are checked; None: the program alone.
-    step, strut_speed
-        Distance of the samples, m; largest speed of a strut, m/s.
+    step
+        Distance of the samples, m.
     """
     checked = check(request)
     program, findings = checked.program, list(checked.findings)
     speed: dict[str, float] = {}
     if machine is not None and len(program.moves):
-        more, speed = machine_findings(program, machine, step, strut_speed)
+        more, speed = machine_findings(program, machine, step)
         findings += more
     return ProgramCheck(
         program=program.name,

@@ -8,7 +8,7 @@ from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import checked
-from toolpath_stiff.placement.case_study import MOST_REGIONS, CaseStudy, Region, read_regions, run_case_study
+from toolpath_stiff.placement.case_study import MOST_REGIONS, CaseStudy, Region, run_case_study
 from toolpath_stiff.units import m_from_mm
 
 
@@ -16,7 +16,7 @@ from toolpath_stiff.units import m_from_mm
 def case_study(
     program: Program | str | Path | None = None,
     machine: Machine | str | Path = "nist",
-    regions: Mapping[str, Sequence[float]] | str | Path | None = None,
+    regions: Mapping[str, Sequence[float]] | None = None,
     *,
     step_mm: Step = 1.0,
 ) -> CaseStudy:
@@ -29,15 +29,15 @@ def case_study(
     machine
         A machine, its name or its file.
     regions
-        Name -> x, y, z of program zero in mm and, if turned, the angle in degrees; or a table with the columns region,
-        x_mm, y_mm, z_mm, rotation_deg. Unless given, four of the reference machine.
+        Name -> x, y, z of program zero in mm and, if turned, the angle in degrees. Unless given, four of the reference
+        machine.
     step_mm
         Distance of the samples.
 
     Raises
     ------
     InputError
-        Regions or program cannot be read.
+        A region or the program cannot be read.
     UnreachableError
         The machine cannot reach a region.
 
@@ -54,17 +54,14 @@ def case_study(
     part = None if program is None else program_from(program)
     model = on.running(part)
     read = None if part is None else lambda origin: part.moves(origin, model.machine.default_origin)
-    file = (str(regions),) if isinstance(regions, str | Path) else ()
-    inputs = (*(part.inputs if part else ()), *file, *on.inputs)
+    inputs = (*(part.inputs if part else ()), *on.inputs)
     return run_case_study(model, m_from_mm(step_mm), read, None if regions is None else _regions(regions), inputs)
 
 
-def _regions(given: Mapping[str, Sequence[float]] | str | Path) -> dict[str, Region]:
+def _regions(named: Mapping[str, Sequence[float]]) -> dict[str, Region]:
     """Regions by name in mm and degrees, checked."""
-    file = "" if isinstance(given, Mapping) else str(given)
-    named: Mapping[str, Sequence[float]] = given if isinstance(given, Mapping) else read_regions(file)
     if not 0 < len(named) <= MOST_REGIONS:
-        raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}", file=file)
+        raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}")
     regions = {}
     for name, place in named.items():
         numbers = [float(value) for value in place]

@@ -12,8 +12,6 @@ from toolpath_stiff.analysis.results import analyze as analyze_path
 from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
-from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.options import Option, arguments_of, checked
@@ -21,7 +19,7 @@ from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.path.table import SampledPath
 from toolpath_stiff.results import Progress, counter
-from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, n_per_m_from_n_per_mm
+from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_mm
 
 Jobs = Annotated[int | None, Option("--jobs", at_least=1)]
 Table = Annotated[str, Option("--format", choices=("csv", "parquet"))]
@@ -151,9 +149,8 @@ def check(
     *,
     origin_mm_deg: Origin = None,
     step_mm: Step = 1.0,
-    strut_speed_mm_per_min: Annotated[float | None, Option("--strut-speed", "mm/min", above=0, at_most=1e6)] = None,
 ) -> ProgramCheck:
-    r"""What a program uses, what is not understood, extents and times; with a machine its reach and strut speeds.
+    r"""What a program uses, what is not understood, extents and times; with a machine its reach and fastest strut.
 
     Where the reader would refuse the program the check says so and goes on with the next block.
 
@@ -165,13 +162,11 @@ def check(
         Where program zero sits.
     step_mm
         Largest distance of the samples at which the machine is asked.
-    strut_speed_mm_per_min
-        Speed of a strut above which a cut is a finding.
 
     Raises
     ------
     InputError
-        The file cannot be read at all, or a speed is given without a machine.
+        The file cannot be read at all.
 
     Examples
     --------
@@ -182,11 +177,6 @@ def check(
     """
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
-    if on is None and strut_speed_mm_per_min is not None:
-        raise InputError(f"{both_names('--strut-speed')} without a machine", hint="name one with --machine")
-    speed = None
-    if strut_speed_mm_per_min is not None:
-        speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
     hexapod = None if on is None else on.model.machine
     request = part.placed(origin_si(origin_mm_deg), ZERO if hexapod is None else hexapod.default_origin)
-    return check_program(request, hexapod, m_from_mm(step_mm), speed)
+    return check_program(request, hexapod, m_from_mm(step_mm))

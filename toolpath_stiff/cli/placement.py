@@ -64,7 +64,6 @@ def case_study(
     args: Namespace,
     program: Annotated[str | None, Option("PROGRAM")] = None,
     region: Annotated[Sequence[Region], Option("--region", "NAME:X,Y,Z[,TURN]", read=_region, count="append")] = (),
-    regions: Annotated[str | None, Option("--regions", "FILE", instead_of="region")] = None,
 ) -> int:
     """The paper's four regions: one path at two heights, displaced and turned.
 
@@ -72,11 +71,9 @@ def case_study(
       tps case-study
       tps case-study programs/pocket.nc
       tps case-study programs/pocket.nc --region left:-200,0,800 --region right:200,0,800,90
-      tps case-study programs/pocket.nc --regions reports/case_study/case_study.csv
 
     Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
     displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
-    A file of regions has the columns region, x_mm, y_mm, z_mm, rotation_deg (CSV or FILE.xlsx[#SHEET]).
 
     Parameters
     ----------
@@ -85,10 +82,8 @@ def case_study(
     region
         Where program zero sits, mm, and how far the path is turned about it, degrees; once for each region (default:
         four of the reference machine).
-    regions
-        The same as a table.
     """
     named = dict(region)
     if len(named) < len(region):
         raise InputError("--region: a name is given twice", expected="a name of its own for each region")
-    return run_to_folder(args, tps.case_study, tps.CaseStudy, [program or args.machine], regions=named or regions)
+    return run_to_folder(args, tps.case_study, tps.CaseStudy, [program or args.machine], regions=named or None)

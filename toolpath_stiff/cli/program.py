@@ -194,7 +194,6 @@ def check(
     for example:
       tps check part.nc
       tps check part.nc --dialect fanuc --json
-      tps check part.nc --strut-speed 5000         warn of cuts in which a strut is faster, mm/min
       tps check part.nc --machine none             the program alone, no reach and no strut speeds
       tps check part.ngc --interpreter auto        by LinuxCNC's interpreter where ours does not read it to its end
 

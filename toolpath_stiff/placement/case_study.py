@@ -21,13 +21,12 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.documents import Document
-from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
+from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
-from toolpath_stiff.tables import Columns, read_table
 from toolpath_stiff.units import Pose, mm_from_m, number, pose_in_si
 
 if TYPE_CHECKING:
@@ -210,32 +209,6 @@ def _heights(model: StiffnessModel, of_path: float) -> list[float]:
     step = STEP_MM * max(1, math.ceil((high - low) / STEP_MM / MOST_STEPS))
     steps = range(math.ceil(low / step), math.floor(high / step) + 1)
     return sorted({of_path, *(step * i for i in steps)})
-
-
-def read_regions(file: str) -> dict[str, Region]:
-    """Regions of a table (CSV or FILE.xlsx[#SHEET]): x_mm, y_mm, z_mm, and if there rotation_deg and region, its name.
-
-    `case_study.csv` is such a table.
-
-    Raises
-    ------
-    InputError
-        A column is missing, a cell is no number, or a name stands twice; with line.
-    """
-    table = read_table(file, "regions", Columns(REGION_COLUMNS, ("region",)))
-    regions: dict[str, Region] = {}
-    for row_number, (line, cells) in enumerate(table.rows, 1):
-        row = {"rotation_deg": "0", **table.record(cells)}
-        name = row.get("region") or str(row_number)
-        try:
-            x, y, z, turn = (float(row[column]) for column in REGION_COLUMNS)
-        except (KeyError, ValueError):
-            x = y = z = turn = math.nan
-        if name in regions or not math.isfinite(x + y + z + turn):
-            expected = f"a name once, and finite numbers: {', '.join(REGION_COLUMNS)}"
-            raise TableError(f"region {name}: {', '.join(cells)}", expected=expected, file=file, line=line)
-        regions[name] = (x, y, z, turn)
-    return regions
 
 
 def _rows(places: Mapping[str, Region], analyses: Mapping[str, Analysis]) -> list[Document]:
