@@ -1,14 +1,12 @@
 """A blind exercise as a folder: measurements.csv, machine.toml and sealed.bin; measuring again; opening the seal.
 
-The sealed truth is opaque to a look into the file, and tampering is noticed. It is no cryptography: the key stands
-below, so whoever wants to cheat can; the seal keeps an honest user from reading the answer by accident. The truth is
-written as JSON, compressed, padded to one length (so that the size tells nothing), scrambled with a SHA-256 key stream
-and preceded by a keyed digest.
+The sealed truth is opaque to a look into the file, and a change is noticed. It is no cryptography: whoever wants to
+cheat can; the seal keeps an honest user from reading the answer by accident. The truth is written as JSON, compressed,
+padded to one length with bytes that look the same (so that the size tells nothing) and preceded by a digest.
 """
 
 import csv
 import hashlib
-import hmac
 import io
 import json
 import re
@@ -33,8 +31,7 @@ from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, rea
 from toolpath_stiff.rig.unknown import Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE
 
-MAGIC = b"tps-rig-sealed-1\n"
-KEY = b"toolpath_stiff.rig: not a secret, only a blindfold"
+MAGIC = b"tps-rig-sealed-2\n"
 DIGEST = hashlib.sha256().digest_size
 BLOCK = 8192  # bytes; several times what one case needs
 
@@ -79,33 +76,23 @@ def seal(case: DrawnCase) -> bytes:
         "clamps": int(max(case.rows.get("clamp", [0]))),
     }
     packed = zlib.compress(json.dumps(content, sort_keys=True).encode(), 9)
-    length = len(packed).to_bytes(4, "big")
-    body = (length + packed).ljust(-(-(len(packed) + 4) // BLOCK) * BLOCK, b"\0")
-    digest = hmac.digest(KEY, body, "sha256")
-    return MAGIC + digest + _scrambled(body, digest)
+    body = packed + hashlib.shake_256(packed).digest(-len(packed) % BLOCK)
+    return MAGIC + hashlib.sha256(body).digest() + body
 
 
 def unseal(file: str | Path) -> tuple[DrawnCase, Document]:
     """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
     content = read_bytes(file, "the sealed truth")
-    digest = content[len(MAGIC) : len(MAGIC) + DIGEST]
-    body = _scrambled(content[len(MAGIC) + DIGEST :], digest)
-    if not content.startswith(MAGIC) or not hmac.compare_digest(digest, hmac.digest(KEY, body, "sha256")):
+    digest, body = content[len(MAGIC) : len(MAGIC) + DIGEST], content[len(MAGIC) + DIGEST :]
+    if not content.startswith(MAGIC) or hashlib.sha256(body).digest() != digest:
         raise InputError("the seal is broken: the file was changed or is no sealed truth", file=str(file))
-    sealed: Document = json.loads(zlib.decompress(body[4 : 4 + int.from_bytes(body[:4], "big")]))
+    sealed: Document = json.loads(zlib.decompressobj().decompress(body))
     machine: Table = {
         name: np.array(value) if isinstance(value, list) else value for name, value in sealed["machine"].items()
     }
     machine["unknown"] = machine["unknown"] and Unknown(**machine["unknown"])
     nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
     return DrawnCase({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"])), sealed
-
-
-def _scrambled(body: bytes, nonce: bytes) -> bytes:
-    """The body, every byte exclusive-or with a key stream; its own inverse."""
-    count = -(-len(body) // DIGEST)
-    stream = b"".join(hashlib.sha256(KEY + nonce + i.to_bytes(4, "big")).digest() for i in range(count))
-    return bytes(a ^ b for a, b in zip(body, stream, strict=False))
 
 
 def score(hidden: list[str], claim: list[str]) -> str:
