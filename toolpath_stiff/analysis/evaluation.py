@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.loads import Load, geometric_directions, load_directions, principal_directions
+from toolpath_stiff.analysis.loads import Load, geometric_directions, load_directions
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import PoseError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Extremes, Reach, machine_limits, reach
 from toolpath_stiff.rotations import rotation_matrices
@@ -154,8 +154,6 @@ def _by_solution(model: StiffnessModel, load: Load, tangent: FloatArray, poses: 
     tip, rotation, _ = poses
     lengths, extrapolated, stand, compliance = tip_compliances(model, poses, force)
     direction, substituted = load_directions(load, compliance, tip, rotation, tangent)
-    if model.load_dependent and load.kind == "softest":
-        direction = extreme_directions(model, compliance, poses, force)
     stiffness = 1.0 / compliance_along(model, direction, compliance, poses, force)
     _refuse_no_number(model, tip, stand.reachable & ~((stiffness > 0.0) & (stiffness < np.inf)))
     return Evaluation(stiffness, substituted, lengths, extrapolated, stand)
@@ -189,28 +187,16 @@ def compliance_along(
     return along
 
 
-def extreme_directions(
-    model: StiffnessModel, compliance: FloatArray, poses: Poses, force: float, softest: bool = True
-) -> FloatArray:
-    """(n, 3) unit vectors of the softest, else the stiffest direction; nan out of reach; as of `compliance_along`."""
-    within, directions = ~np.isnan(compliance[:, 0, 0]), np.full((len(compliance), 3), np.nan)
-    if model.load_dependent:
-        directions[within] = core.extreme_directions(model, *_some(poses, within), force, softest)
-    else:
-        directions[within] = principal_directions(compliance[within], softest)
-    return directions
-
-
 def _some(poses: Poses, rows: BoolArray) -> Poses:
     tip, rotation, tool = poses
     return tip[rows], None if rotation is None else rotation[rows], tool
 
 
 def _refuse_no_number(model: StiffnessModel, tip: FloatArray, bad: BoolArray) -> None:
-    """Raise `PoseError` where the limits let poses pass (n,) that have no stiffness."""
+    """Raise `InputError` where the limits let poses pass (n,) that have no stiffness."""
     if bad.any():
         x, y, z = (mm_from_m(float(v)) + 0.0 for v in tip[int(np.argmax(bad))])
-        raise PoseError(
+        raise InputError(
             f"machine {model.machine.name} is singular at X{x:g} Y{y:g} Z{z:g} mm: the tip has no stiffness there",
             hint="keep such poses out of reach: min_index of [limits.singularity] in the machine file, such as 0.05",
         )

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.evaluation import compliance_along, extreme_directions, tip_compliances
+from toolpath_stiff.analysis.evaluation import compliance_along, tip_compliances
+from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.documents import without_nan
@@ -156,7 +157,7 @@ def evaluate_poses(
     """Evaluate n poses: position (n, 3) m, abc (n, 3) rad."""
     poses = (position, rotation_matrices(abc), np.nan)
     lengths, extrapolated, stand, compliance = tip_compliances(model, poses, force)
-    soft, stiff = (extreme_directions(model, compliance, poses, force, softest) for softest in (True, False))
+    soft, stiff = (principal_directions(compliance, softest) for softest in (True, False))
 
     def along(direction: FloatArray) -> FloatArray:
         return np.asarray(1.0 / compliance_along(model, direction, compliance, poses, force))

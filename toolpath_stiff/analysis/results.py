@@ -26,7 +26,6 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
@@ -93,8 +92,7 @@ class Analysis(EvaluatedPath, FolderResult):
     @cached_property
     def warnings(self) -> list[str]:
         """What deserves a look, the program's own warnings included."""
-        tool_given = not np.isnan(self.samples.tool_length[self.samples.cutting]).any()
-        return [*map(str, self.program.warnings), *condition_warnings(self.model, tool_given), *_warnings(self)]
+        return [*map(str, self.program.warnings), *condition_warnings(self.model), *_warnings(self)]
 
     @property
     def moves(self) -> Moves:
@@ -154,7 +152,7 @@ class Analysis(EvaluatedPath, FolderResult):
         if self.on_other is not None:
             other = self.on_other.to_dict()
             document["compare"] = compare_summaries(document, other)
-            option = both_names("--compare", other["machine"])  # without these the two machines may look the same
+            option = f"--compare {other['machine']}"  # without these the two machines may look the same
             idle = [f"{option}: {row['effect']} does not act: {row['reason']}" for row in other["effects_idle"]]
             document["warnings"] = [*self.warnings, *idle]
         return document
@@ -302,7 +300,7 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     if not bad.any() or (partial and not bad[cutting].all()):
         return
     first = int(np.argmax(bad))
-    hint = f"place the work elsewhere with {both_names('--origin')}"
+    hint = "place the work elsewhere with --origin"
     hint += "" if partial else ", or keep the reachable part with --partial"
     if _words_turn_the_platform(analysis.program):
         hint += "; if the program was posted for another machine, name it with [kinematics] in a controller file"
@@ -326,7 +324,7 @@ def _assumptions(analysis: Analysis) -> list[str]:
     if analysis.origin_source == "default":
         sentences.append(
             f"program zero (G54) sits at {_pose_words(analysis.origin, 'g')} in machine coordinates, the machine's "
-            f"default; {both_names('--origin')} puts it elsewhere"
+            f"default; --origin puts it elsewhere"
         )
     for quantity, origin in machine.origins.items():
         if origin != "published":

@@ -57,7 +57,7 @@ def parameter_band(
 ) -> ParameterBand | None:
     """The band of a path, given its stiffness (n,); None where the machine file states no uncertainty of what acts."""
     uncertainty = model.given.uncertainty if model.given is not None else None
-    idle = {active.effect.name for active in model.instruments} | {effect.effect for effect in idle_effects(model)}
+    idle = {active.effect.name for active in model.instruments} | idle_effects(model).keys()
     sd = {} if uncertainty is None else dict(zip(uncertainty.names, uncertainty.sd.tolist(), strict=True))
     kept = [i for i, (name, size) in enumerate(sd.items()) if size > 0.0 and name.partition(".")[0] not in idle]
     if uncertainty is None or not kept:

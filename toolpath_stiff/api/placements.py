@@ -129,19 +129,17 @@ def place(
     >>> found.worse
     []
     """
-    for option, value in (("decimals", decimals), ("linearise", linearise_mm)):
-        if write is None and value is not None:
-            raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
+    if write is None and not (decimals is None and linearise_mm is None):
+        raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     on, part = machine_from(machine), program_from(program)
-    model = on.running(part)
+    model, origin = on.running(part), origin_si(origin_mm_deg)
     default = model.machine.default_origin
-    origin = origin_si(origin_mm_deg)
     read = part.moves(origin, default)
     task = PlacementTask(
         model=model,
         program=read,
         present=origin or (read.origin if read.origin_source == "program" else default),
-        read=lambda origin: part.moves(origin, default),
+        read=lambda other: part.moves(other, default),
         bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
@@ -170,19 +168,15 @@ def _bounds(
 ) -> Bounds:
     """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     heights = sorted(set(map(float, heights_mm)))
-    sides = [None if side is None else _pair(side) for side in box]
-    if heights:
-        sides[2] = (heights[0], heights[-1])
+    sides = [*box[:2], (heights[0], heights[-1]) if heights else box[2]]
     workspace = mm_from_m(machine.limits.workspace).T.tolist()
-    for i, (low, high) in enumerate(workspace):
-        if sides[i] is None and not np.isfinite(high - low):
-            raise InputError(f"the machine file bounds no workspace in {'xyz'[i]}", hint=f"give --{'xyz'[i]} LO:HI")
-    lengths = np.array([side or reach for side, reach in zip(sides, workspace, strict=True)])
+    for axis, side, reach in zip("xyz", sides, workspace, strict=True):
+        if side is None and not np.isfinite(reach).all():
+            raise InputError(f"the machine file bounds no workspace in {axis}", hint=f"give --{axis} LO:HI")
+    lengths = np.array([_pair(reach if side is None else side) for side, reach in zip(sides, workspace, strict=True)])
     angles = np.array([_pair(turn) for turn in turns])
-    if not np.abs(lengths).max() <= FARTHEST_MM:
-        raise InputError("bounds beyond 100 m", expected="mm")
-    if not np.abs(angles).max() <= FARTHEST_TURN_DEG:
-        raise InputError(f"a turn or tilt beyond {FARTHEST_TURN_DEG:g} degrees", expected="at most two whole turns")
+    if not np.abs(lengths).max() <= FARTHEST_MM or not np.abs(angles).max() <= FARTHEST_TURN_DEG:
+        raise InputError("bounds beyond reason", expected=f"within 100 m and {FARTHEST_TURN_DEG:g} degrees")
     low, high = np.concatenate([m_from_mm(lengths), rad_from_deg(angles)]).T
     return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
 
@@ -215,10 +209,10 @@ class PlacementTrial:
     def at(self, origin_mm_deg: Sequence[float]) -> dict[str, float | None]:
         """Mean, range and weakest in N/mm, margins as shares of a limit's span; None where a cut is out of reach."""
         figures = self._evaluator.figures(np.array([pose_si("origin", origin_mm_deg)]))
-        names = {"mean_N_per_mm": figures.mean, "range_N_per_mm": figures.spread, "min_N_per_mm": figures.lowest}
-        values = {name: float(n_per_mm_from_n_per_m(value[0])) for name, value in names.items()}
-        values |= {"margin": float(figures.margin[0]), "rapid_margin": float(figures.rapid_margin[0])}
-        return {name: value if np.isfinite(value) else None for name, value in values.items()}
+        sizes = {"mean_N_per_mm": figures.mean, "range_N_per_mm": figures.spread, "min_N_per_mm": figures.lowest}
+        values = {name: n_per_mm_from_n_per_m(size) for name, size in sizes.items()}
+        values |= {"margin": figures.margin, "rapid_margin": figures.rapid_margin}
+        return {name: float(value[0]) if np.isfinite(value[0]) else None for name, value in values.items()}
 
 
 @checked

@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import Annotated
 
 import toolpath_stiff as tps
-from toolpath_stiff.api.inputs import pose_si
-from toolpath_stiff.cli.calls import call, given, run_to_folder
-from toolpath_stiff.cli.outputs import check_new, check_single, show, tell, write_single, written_text
+from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
+from toolpath_stiff.correction.geometry import recovery_text
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import command_line, hint
+from toolpath_stiff.hints import command_line
 from toolpath_stiff.options import Option, finite_number, numbers
 
 OUT_OF_REACH = NOT_GOOD = 1  # exit codes
@@ -53,26 +52,19 @@ def pose(
     if (csv is None) == (not pose):
         raise InputError("give either a pose or --csv FILE", expected="tps pose X Y Z [A B C], or tps pose --csv FILE")
     if csv is None:
-        return show(args, call(args, tps.pose, pose_mm_deg=pose))
+        return run.show(args, run.call(args, tps.pose, pose_mm_deg=pose))
     table, notes = tps.read_poses(csv)
-    tell("note", notes)
-    stiffness = call(args, tps.pose, pose_mm_deg=table)
+    run.tell("note", notes)
+    stiffness = run.call(args, tps.pose, pose_mm_deg=table)
     sys.stdout.write(stiffness.to_json() if args.json else stiffness.csv())
-    tell("warning", (*stiffness.warnings, *stiffness.out_of_reach(MOST_NAMED)))
+    run.tell("warning", (*stiffness.warnings, *stiffness.out_of_reach(MOST_NAMED)))
     return 0 if stiffness.reachable.all() else OUT_OF_REACH
-
-
-def _heights(text: str) -> list[float]:
-    heights = sorted(numbers(text))
-    if len(set(heights)) < len(heights):
-        raise ValueError("each height once")
-    return heights
 
 
 @command("map", "map_stiffness", "Machine.load", "Machine.under", *FOLDER)
 def map(
     args: Namespace,
-    slices: Annotated[Sequence[float], Option("--slices", "Z,Z,...", read=_heights, instead_of="z_mm")] = (),
+    slices: Annotated[Sequence[float], Option("--slices", "Z,Z,...", read=numbers, instead_of="z_mm")] = (),
 ) -> int:
     """Stiffness over planes of the workspace: picture, table, 3-D page.
 
@@ -89,7 +81,7 @@ def map(
         Several heights, mm.
     """
     heights = {"z_mm": slices} if slices else {}
-    return run_to_folder(args, tps.map_stiffness, tps.StiffnessMap, [args.machine], **heights)
+    return run.to_folder(args, tps.map_stiffness, tps.StiffnessMap, [args.machine], **heights)
 
 
 @command("machine list", JSON)
@@ -98,16 +90,10 @@ def list_machines(args: Namespace) -> int:
     machines = [tps.Machine.load(name).to_dict() for name in tps.Machine.names()]
     listed = [{key: machine[key] for key in ("name", "title", "source")} for machine in machines]
     text = "\n".join("{name:<16} {title}\n{0:<16} {source}".format("", **entry) for entry in listed)
-    return show(args, text, document=lambda: listed)
+    return run.show(args, text, document=lambda: listed)
 
 
-def _pose(text: str) -> Sequence[float]:
-    pose = numbers(text)
-    pose_si("--pose", pose)
-    return pose
-
-
-Picture = Annotated[str | None, Option("--out", "FILE.png|DIR", help="the picture, or its folder (default: reports)")]
+Picture = Annotated[str | None, Option("--out", "FILE.png", help="the picture (default: in reports)")]
 
 
 @command("machine show", REPLACE, JSON)
@@ -116,48 +102,45 @@ def show_machine(
     machine: Annotated[str, Option("NAME|FILE", count="?")] = "nist",
     pose: Annotated[
         Sequence[float] | None,
-        Option("--pose", "X,Y,Z[,A,B,C]", read=_pose, help="pose of the picture, mm and degrees"),
+        Option("--pose", "X,Y,Z[,A,B,C]", read=numbers, help="pose of the picture, mm and degrees"),
     ] = None,
     out: Picture = None,
 ) -> int:
     """Figures of a machine with their origin, and a picture of it."""
     shown = tps.Machine.load(machine)
-    drawn = {_picture_file(out, shown.name): shown.picture(pose)} if out or not args.json else {}
-    written = write_single(args, drawn)
-    show(args, shown.text(pose), written_text(written), document=lambda: shown.to_dict()["figures"])
+    picture = {_picture_file(out, shown.name): shown.picture(pose)} if out or not args.json else {}
+    written = run.written_text(run.write_single(args, picture))
+    run.show(args, shown.text(pose), written, document=lambda: shown.to_dict()["figures"])
     return 0 if shown.standing(pose)[2].reachable[0] else OUT_OF_REACH
 
 
 def _picture_file(out: str | None, name: str) -> Path:
-    """Where a picture goes: the file of --out, or the folder, as of every other command. Raises `InputError`."""
-    place = Path(out or "reports")
-    if place.is_dir() or not place.suffix:
-        return place / f"{name}.png"
-    if place.suffix.lower() != ".png":
-        raise InputError(f"--out {out}: {place.suffix} is no picture's ending here", expected="FILE.png or a folder")
-    return place
+    """The file of --out, or the default. Raises `InputError`."""
+    file = Path(out or f"reports/{name}.png")
+    if file.suffix.lower() != ".png":
+        raise InputError(f"--out {out}", expected="a name that ends in .png")
+    return file
 
 
 @command("machine check", "Machine.load", REPLACE, JSON, without=["machine"])
 def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Picture = None) -> int:
     """Check a machine file for mistakes, draw it; exit code 1 if it cannot be right."""
     if not Path(file).is_file():
-        new = command_line("machine", "new", file)
-        raise InputError(f"cannot read machine file {file!r}", hint=f"`{new}` writes a template")
+        template = command_line("machine", "new", file)
+        raise InputError(f"cannot read machine file {file!r}", hint=f"`{template}` writes a template")
     target = _picture_file(out, f"{Path(file).stem}_machine")
-    check = tps.Machine.load(Path(file), **given(args, tps.Machine.load)).check()
-    written = write_single(args, {target: check.picture()} if out or not args.json else {})
-    show(args, check, written_text(written))
+    check = tps.Machine.load(Path(file), **run.given(args, tps.Machine.load)).check()
+    written = run.write_single(args, {target: check.picture()} if out or not args.json else {})
+    run.show(args, check, run.written_text(written))
     return 0 if check.good else NOT_GOOD
 
 
 @command("machine new", REPLACE)
 def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
-    check_new(args, file)
-    written = write_single(args, {Path(file): tps.machine_template(file).text})
-    print(f"{written_text(written)}\n{hint('edit it, then', command_line('machine', 'check', file))}")
-    return 0
+    return run.write_text(
+        args, file, tps.machine_template(file).text, "edit it, then", "machine", "check", file, fresh=True
+    )
 
 
 @command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
@@ -169,18 +152,16 @@ def from_linuxcnc(
     ] = None,
 ) -> int:
     """Read the genhexkins pins of a LinuxCNC HAL file."""
-    check_single(args, out)
     machine_file = tps.machine_from_linuxcnc(file, args.units)
+    run.tell("note", machine_file.notes)
     if out:
-        print(written_text(write_single(args, {Path(out): machine_file.text})))
-        print(hint("next", command_line("machine", "check", out)))
-    else:
-        sys.stdout.write(str(machine_file))
-    tell("note", machine_file.notes)
+        return run.write_text(args, out, machine_file.text, "next", "machine", "check", out)
+    sys.stdout.write(machine_file.text)
     return 0
 
 
 @command("machine recover", "recover_geometry", JSON)
 def recover(args: Namespace) -> int:
     """Fit the NIST geometry to the paper's Table 1 anew."""
-    return show(args, call(args, tps.recover_geometry))
+    recovery = run.call(args, tps.recover_geometry)
+    return run.show(args, recovery_text(recovery), document=lambda: recovery)

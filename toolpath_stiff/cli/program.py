@@ -1,23 +1,20 @@
-"""The commands on a program: analyze, path, check."""
+"""The commands on a program: analyze, path, check, place, case-study."""
 
 import sys
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
-from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any
 
 import toolpath_stiff as tps
 from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table
-from toolpath_stiff.cli.calls import call, given, machine_for
-from toolpath_stiff.cli.outputs import check_single, destination, show, tell, write_single, written_text
+from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, command
-from toolpath_stiff.cli.progress import say
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.options import Option
-from toolpath_stiff.report.batch.programs import FolderCount, Found, find_programs
+from toolpath_stiff.options import Option, numbers
+from toolpath_stiff.report.analysis import other_samples
+from toolpath_stiff.report.batch.programs import find_programs
 
 BELOW_REQUIRED = 3  # exit code
 INCOMPLETE = 1  # exit code: samples were left out, or of several programs one failed
@@ -85,73 +82,41 @@ def analyze(
         'toolpath-stiff[cluster]').
     """
     files, counts = find_programs(programs)
+    saving: dict[str, Any] = {"plots": not args.no_plots, "table": table, "show_plunges": show_plunges}
     if counts or len(files) > 1 or cluster:
-        return _analyze_many(args, files, counts)
-    return _analyze_one(args, files[0].file)
-
-
-def _analyze_one(args: Namespace, file: str) -> int:
-    from toolpath_stiff.report.analysis import other_samples
-
-    target = destination(args, tps.Analysis, [file], other_samples(args.table))
-    analysis = call(args, tps.analyze, program=tps.Program.read(file, **given(args, tps.Program.read)))
-    saving = {"plots": not args.no_plots, "table": args.table, "show_plunges": args.show_plunges}
-    show(args, analysis, target.write(analysis, **saving))
+        options = run.given(args, tps.analyze, tps.Program.read) | saving | {"jobs": jobs, "replace": args.replace}
+        executor = _executor(cluster) if cluster else None
+        with run.progress_line() as progress:
+            analyses = tps.analyze_many(
+                programs, run.machine_for(args), args.out or "reports", executor=executor, progress=progress, **options
+            )
+        if counts and not args.json:
+            print(*counts, sep="\n")
+        run.show(args, analyses, run.written_text(analyses.written))
+        return (BELOW_REQUIRED if analyses.below_required else 0) if analyses.complete else INCOMPLETE
+    file = files[0].file
+    folder, rules = run.destination(args, tps.Analysis, [file], other_samples(table))
+    analysis = run.call(args, tps.analyze, program=tps.Program.read(file, **run.given(args, tps.Program.read)))
+    run.show(args, analysis, run.written_text(analysis.save(folder, rules=rules, **saving)))
     if analysis.below_required:
         return BELOW_REQUIRED
     return 0 if analysis.complete else INCOMPLETE
 
 
-def _analyze_many(args: Namespace, files: Sequence[Found], counts: Sequence[FolderCount]) -> int:
-    def progress(text: str, done: int, total: int) -> None:
-        if done == 0 and not args.json:  # all arguments have been found right
-            for count in counts:
-                print(count, flush=True)
-        say(f"{done}/{total} programs, {text}")
-
-    try:
-        with _executor(args) as executor:
-            analyses = tps.analyze_many(
-                files,
-                machine_for(args),
-                args.out or "reports",
-                executor=executor,
-                plots=not args.no_plots,
-                replace=args.replace,
-                progress=progress,
-                table=args.table,
-                show_plunges=args.show_plunges,
-                jobs=args.jobs,
-                **given(args, tps.analyze, tps.Program.read),
-            )
-    finally:
-        say("")
-    show(args, analyses, written_text(analyses.written))
-    if not analyses.complete:
-        return INCOMPLETE
-    return BELOW_REQUIRED if analyses.below_required else 0
-
-
-@contextmanager
-def _executor(args: Namespace) -> Iterator[Executor | None]:
-    """The executor of --cluster; None without it. Raises `InputError` where there is no scheduler."""
-    if args.cluster is None:
-        yield None
-        return
+def _executor(address: str) -> Executor:
+    """The executor of a Dask cluster. Raises `InputError` where there is no scheduler."""
     try:
         from distributed import Client
-    except ImportError:
-        hint = "run `pip install 'toolpath-stiff[cluster]'`"
-        raise InputError("--cluster needs the package distributed", hint=hint) from None
-    try:
-        client: Any = Client(args.cluster, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError, ImportError) as error:  # ImportError: a protocol that is not installed
+
+        client: Any = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
+        executor: Executor = client.get_executor(pure=False)
+    except (OSError, ValueError, ImportError) as error:  # ImportError: no such package, or no such protocol
         raise InputError(
-            f"--cluster {args.cluster}: {' '.join(str(error).split())}",
+            f"--cluster {address}: {' '.join(str(error).split())}",
             expected="the address of a Dask scheduler, as tcp://10.0.0.5:8786",
+            hint="run `pip install 'toolpath-stiff[cluster]'` if distributed is missing",
         ) from None
-    with client:
-        yield client.get_executor(pure=False)
+    return executor
 
 
 @command("path", PROGRAM, "sample_path", "Program.read", REPLACE)
@@ -169,15 +134,13 @@ def path(
     the rotary axes a_deg,b_deg,c_deg in machine coordinates, feed_mm_per_min (empty for rapids). Program zero lies at
     0,0,0 unless --origin or the program's own G10 says otherwise. Every move has samples at both of its ends.
     """
-    check_single(args, out)
-    sampled = call(args, tps.sample_path)
+    sampled = run.call(args, tps.sample_path)
     if out:
-        write_single(args, {Path(out): sampled.csv()})
+        run.write_single(args, {Path(out): sampled.csv()})
     else:
-        for piece in takewhile(lambda _: not getattr(sys.stdout, "gone", False), sampled.csv()):
-            sys.stdout.write(piece.decode())
-    tell("warning", (f"{sampled.name}: {warning}" for warning in sampled.warnings))
-    tell("note", sampled.unsupported)
+        sys.stdout.writelines(piece.decode() for piece in sampled.csv())
+    run.tell("warning", (f"{sampled.name}: {warning}" for warning in sampled.warnings))
+    run.tell("note", sampled.unsupported)
     return 0
 
 
@@ -201,6 +164,80 @@ def check(
     extents, lengths and times is then that of the blocks that could be read. Extents are those of the tool tip in
     program coordinates of G54, mm and degrees. Exit code 1 if there is any error.
     """
-    findings = call(args, tps.check, machine=None if machine == NO_MACHINE else machine)
-    show(args, findings)
+    findings = run.call(args, tps.check, machine=None if machine == NO_MACHINE else machine)
+    run.show(args, findings)
     return 1 if findings.errors else 0
+
+
+@command("place", PROGRAM, "place", *READ, *FOLDER)
+def place(args: Namespace) -> int:
+    """Where the work should sit: Pareto front and one recommended placement.
+
+    for example:
+      tps place programs/pocket.nc --x -300:300 --y -300:300 --z 400:1250
+      tps place programs/pocket.nc --z-values 400,600,800 --rotate 0 --objective mean
+      tps place programs/pocket.nc --keep-out vice:100,100,0,300,300,900
+      tps place programs/pocket.nc --rotate 0 --write placed.nc
+      tps place programs/pocket.nc --x 40 --y 25.5 --z 900 --rotate 0 --write placed.nc
+
+    The recommended placement is never worse than the present one in mean, range or weakest place, if one such can be
+    found.
+
+    A placement is where program zero sits and how the work is turned about it: the numbers of --origin. Files written
+    to --out: placements.csv (the front), placement.json, setup.pdf, report.html
+    (click a placement of the front, see the path there).
+    """
+    run.check_single(args, args.write)
+    folder, rules = run.destination(args, tps.Placement, [args.program])
+    placement = run.call(args, tps.place)
+    written = placement.save(folder, plots=not args.no_plots, rules=rules)
+    if args.write and not placement.refusal:
+        written += run.write_single(args, {Path(args.write): placement.program_bytes})
+    run.show(args, placement, run.written_text(written))
+    if placement.refusal:
+        raise InputError(
+            f"{args.write} was not written; the search is kept in {folder}: {placement.refusal}",
+            hint=f"place it there without a search by {placement.fixed}",
+        )
+    return 0
+
+
+def _region(text: str) -> tuple[str, tuple[float, ...]]:
+    name, _, place = text.rpartition(":")
+    values = numbers(place)
+    if not name or len(values) not in (3, 4):
+        raise ValueError("NAME:X,Y,Z or NAME:X,Y,Z,TURN")
+    return name, values
+
+
+Region = tuple[str, tuple[float, ...]]
+
+
+@command("case-study", "case_study", *READ, *FOLDER)
+def case_study(
+    args: Namespace,
+    program: Annotated[str | None, Option("PROGRAM")] = None,
+    region: Annotated[Sequence[Region], Option("--region", "NAME:X,Y,Z[,TURN]", read=_region, count="append")] = (),
+) -> int:
+    """The paper's four regions: one path at two heights, displaced and turned.
+
+    for example:
+      tps case-study
+      tps case-study programs/pocket.nc
+      tps case-study programs/pocket.nc --region left:-200,0,800 --region right:200,0,800,90
+
+    Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
+    displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
+
+    Parameters
+    ----------
+    program
+        NC program or cutter-location file (default: the contour of a 200 mm square).
+    region
+        Where program zero sits, mm, and how far the path is turned about it, degrees; once for each region (default:
+        four of the reference machine).
+    """
+    named = dict(region)
+    if len(named) < len(region):
+        raise InputError("--region: a name is given twice", expected="a name of its own for each region")
+    return run.to_folder(args, tps.case_study, tps.CaseStudy, [program or args.machine], regions=named or None)

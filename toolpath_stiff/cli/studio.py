@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Annotated, cast
 
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.cli.calls import given
+from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FILES, command
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import Option, arguments_of
@@ -56,7 +56,7 @@ def studio(
     no_browser
         Print the address, open nothing.
     """
-    reading = {name: value for name, value in given(args, Program.read).items() if value not in (None, False)}
+    reading = {name: value for name, value in run.given(args, Program.read).items() if value not in (None, False)}
     opened = opened_case(case, trust, machine, exercise)
     for file in args.effects:
         opened.add_effects(file)
@@ -65,5 +65,5 @@ def studio(
     if program:
         opened.add_program(program, **cast("Reading", reading))
     elif reading:
-        opened.read_programs(**cast("Reading", reading))
+        opened.add_program(**cast("Reading", reading))
     return serve(opened, port, browser=not no_browser)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
@@ -71,7 +72,7 @@ def modelled_stiffness(machine: Hexapod, position: FloatArray) -> FloatArray:
     return np.asarray(n_per_mm_from_n_per_m(1.0 / np.einsum("nii->ni", compliance)))
 
 
-def recover_geometry(starts: int = 20, seed: int = 1) -> dict[str, Any]:
+def recover_geometry(starts: int = 20, seed: int = 1) -> Document:
     """Fit the six lengths from scattered starts.
 
     Parameters
@@ -156,7 +157,7 @@ def _scale_effect(lengths: FloatArray, position: FloatArray) -> float:
     return float(np.abs(blown - plain).max())
 
 
-def recovery_text(fit: dict[str, Any]) -> str:
+def recovery_text(fit: Document) -> str:
     """What `recover_geometry` found, for the terminal."""
     lines = [f"{'fitted to the 42 modelled values of Table 1':<44} {'mm':>10}  standard error"]
     for unknown in fit["unknowns"]:

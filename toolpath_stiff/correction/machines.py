@@ -64,7 +64,7 @@ def fitted_machine(
             "origins": {**machine.origins, "strut_law": "fitted"},
             "remarks": {**machine.remarks, "strut_law": remark},
         }
-    if any(SETUP in active.effect.conditions(active.values) for active in fit.effects):
+    if any(SETUP in active.waits_for for active in fit.effects):
         known = sorted({*setups} - {"", *machine.setups})
         changes["setups"] = (*machine.setups, *known)
     return machine.with_changes(**changes, uncertainty=_uncertainty(machine, fit, widened))

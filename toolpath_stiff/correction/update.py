@@ -25,7 +25,7 @@ from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.fits import baseline
 from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.model import build_model, setup_of
+from toolpath_stiff.stiffness.model import build_model
 
 
 def update(task: UpdateTask) -> Update:
@@ -108,7 +108,7 @@ def _provenance(update: Update, command: str) -> Document:
 def _next(updated: Hexapod, task: UpdateTask, request: Asked) -> list[str]:
     """Commands that use the new machine; an effect that belongs to a set-up acts only where that is named."""
     model, file = build_model(updated, task.effect_files), task.machine_file
-    setups = [name for active in model.effects if (name := setup_of(active))]
+    setups = [active.setup for active in model.effects if active.setup]
     shown = options(machine=file, effects=list(task.effect_files), setup=setups[0] if setups else None)
     also = " (analyze, place and pose take the same options)"
     return [

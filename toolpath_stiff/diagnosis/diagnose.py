@@ -37,7 +37,7 @@ from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import Conditions
-from toolpath_stiff.stiffness.model import build_model, setup_of
+from toolpath_stiff.stiffness.model import build_model
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.moves import ReadProgram
@@ -264,7 +264,7 @@ def choice_on_path(
     conditions = given or Conditions(diagnosis.machine.setup, diagnosis.machine.temperature)
     if conditions.setup is None:
         effects = [active for name in names if name != NONE for active in diagnosis.fits[name].effects]
-        conditions = replace(conditions, setup=next(filter(None, map(setup_of, effects)), None))
+        conditions = replace(conditions, setup=next(filter(None, (active.setup for active in effects)), None))
     shown = {}
     for name in names:
         fit = diagnosis.base if name == NONE else diagnosis.fits[name]

@@ -15,13 +15,12 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
-from toolpath_stiff.errors import InputError, MachineFileError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, Limits, StrutLaw
 from toolpath_stiff.machine.schema import MachineToml, Sections, read_sections
-from toolpath_stiff.machine.symmetry import describe_stray, find_symmetry
 from toolpath_stiff.machine.uncertainty import read_uncertainty
 from toolpath_stiff.toml_reader import LARGEST_BYTES, shortened
 from toolpath_stiff.units import (
@@ -72,7 +71,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Hexapod:
     path = Path(name_or_file)
     if not is_file(path):
         template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")
-        raise MachineFileError(
+        raise InputError(
             f"machine {str(name_or_file)!r} is neither a packaged machine nor a file",
             expected=f"one of {', '.join(known)}, or a machine file",
             hint=f"`tps machine list` lists the machines, `{template}` writes a commented template",
@@ -81,7 +80,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Hexapod:
         text = read_bytes(path, "machine file", LARGEST_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         mistake = f"not a text file (byte {error.start})"
-        raise MachineFileError(mistake, expected="a machine file (TOML, UTF-8)", file=str(path)) from None
+        raise InputError(mistake, expected="a machine file (TOML, UTF-8)", file=str(path)) from None
     return parse_machine(text, file=str(path))
 
 
@@ -93,7 +92,7 @@ def _packaged(path: Path) -> Hexapod:
 
 def parse_machine(text: str, file: str = "machine.toml") -> Hexapod:
     """Parse the text of a machine file; `file` is only used in messages. Raises `InputError`."""
-    toml = MachineToml(text, file, kind=MachineFileError)
+    toml = MachineToml(text, file, kind=InputError)
     values = read_sections(toml)
     top = {"title": values[""]["name"], "source": "", **values[""]}
     setup = values.get("setup", {})
@@ -142,9 +141,7 @@ def _check_neutral_pose(toml: MachineToml, machine: Hexapod) -> None:
     size = max(float(np.linalg.norm(arms, axis=1).mean()), 1e-9)
     screws = np.concatenate([directions, np.cross(arms, directions) / size], axis=1)
     if not np.isfinite(screws).all() or np.linalg.svd(screws)[1][-1] < SINGULAR:
-        symmetry = find_symmetry(machine)
-        strays = "; ".join(describe_stray(stray, symmetry.kind) for stray in symmetry.strays)
-        hint = strays or "check the joints as well: similar hexagons without a twist are singular everywhere"
+        hint = "check the joints as well: similar hexagons without a twist are singular everywhere"
         mistake, expected = ": the machine is singular there", "a pose in the middle of the workspace"
         raise toml.fault("limits.joint_angle", "neutral_pose_mm_deg", mistake, expected, hint)
 
@@ -232,7 +229,7 @@ def _entries(toml: MachineToml, kind: str) -> tuple[EffectEntry, ...]:
             key, mistake, expected = "provenance", f" = {shortened(provenance)}", f"a table [{kind}.provenance]"
         if key:
             text, line = f"[[{kind}]] {key}{mistake}", lines.get(key, lines.get(""))
-            raise MachineFileError(text, expected=expected, file=toml.file, line=line)
+            raise InputError(text, expected=expected, file=toml.file, line=line)
         parameters = {key: value for key, value in row.items() if key not in ("name", "provenance")}
         entries.append(EffectEntry(name, parameters, provenance, toml.file, lines))
     return tuple(entries)

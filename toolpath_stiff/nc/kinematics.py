@@ -41,6 +41,8 @@ DIRECTIONS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 PLACE_KEYS = {TABLE: "point_mm", HEAD: "pivot_mm"}
 TOLERANCE_MM, LEAST_TOLERANCE_MM, LARGEST_TOLERANCE_MM = 1e-3, 1e-5, 1.0
 PARALLEL = 1e-6  # sine of the angle between two axes that are one
+UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
+Z = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -73,11 +75,6 @@ class RotaryAxis:
     def column(self) -> int:
         """Its place among A, B, C."""
         return LETTERS.index(self.letter)
-
-    def describe(self) -> str:
-        """A few words: "A turns the table about (1, 0, 0)"."""
-        direction = ", ".join(f"{v:.6g}" for v in self.direction)
-        return f"{self.letter} turns the {self.turns} about ({direction})"
 
 
 @dataclass(frozen=True)
@@ -117,7 +114,9 @@ class PostedKinematics:
 
     def assumption(self, *, switched: bool = False) -> str:
         """What was made of X Y Z A B C, in one sentence; `switched`: tool centre point control came and went."""
-        axes = ", ".join(axis.describe() for axis in self.axes)
+        directions = [", ".join(f"{v:.6g}" for v in axis.direction) for axis in self.axes]
+        turns = zip(self.axes, directions, strict=True)
+        axes = ", ".join(f"{axis.letter} turns the {axis.turns} about ({direction})" for axis, direction in turns)
         where = "the tip on the part (tool centre point control)" if self.tcp else "the machine's axes"
         where += ", of the tip on the part from G43.4 on to G43 or G49" if switched and not self.tcp else ""
         return (
@@ -133,8 +132,10 @@ def read_kinematics(toml: TomlReader) -> PostedKinematics | None:
     if given is None:
         return None
     table = toml.table("kinematics", given, "a table [kinematics] with type, tcp and the rotary axes")
-    kind = toml.needed("kinematics", table, "type", f"one of {', '.join(TYPES)}")
-    toml.choice("kinematics.type", kind, TYPES, ", ".join(TYPES))
+    known_types = ", ".join(TYPES)
+    kind = toml.choice(
+        "kinematics.type", toml.needed("kinematics", table, "type", f"one of {known_types}"), TYPES, known_types
+    )
     parts = TYPES[kind]
     known = ("type", "tcp", "points", "tolerance_mm", *(key for key, _ in parts))
     toml.only("kinematics", table, known, f" in the type {kind!r}")
@@ -211,26 +212,14 @@ def _check_pair(toml: TomlReader, axes: tuple[RotaryAxis, ...], parts: tuple[tup
         raise toml.error(f"{first}.axis and {second}.axis are parallel", "two directions", where=f"{second}.axis")
 
 
-UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
-Z = np.array([0.0, 0.0, 1.0])
-
-
-@dataclass(frozen=True)
-class ToolPoses:
-    """Tips (n, 3) in m and unit vectors of the tool's axis (n, 3), tip to spindle, in part coordinates."""
-
-    tip: FloatArray
-    axis: FloatArray
-
-
 def tool_poses(
     kinematics: PostedKinematics,
     xyz: FloatArray,
     abc: FloatArray,
     tool_length: FloatArray | float = math.nan,
     tip_held: BoolArray | bool = False,
-) -> ToolPoses:
-    """Where the tool stands on the part: the forward kinematics of the machine that a program was posted for.
+) -> tuple[FloatArray, FloatArray]:
+    """Tips (n, 3) in m and tool axes (n, 3), tip to spindle, on the part: forward kinematics of the posted machine.
 
     Parameters
     ----------
@@ -250,8 +239,8 @@ def tool_poses(
     --------
     >>> tilting = RotaryAxis("A", TABLE, direction=(1.0, 0.0, 0.0), point=(0.0, 0.0, 0.0))
     >>> kinematics = PostedKinematics("table", (tilting,), tcp=False)
-    >>> poses = tool_poses(kinematics, np.array([[0.0, 0.0, 0.1]]), np.radians([[90.0, 0.0, 0.0]]))
-    >>> poses.tip.round(9).tolist(), poses.axis.round(9).tolist()
+    >>> tip, axis = tool_poses(kinematics, np.array([[0.0, 0.0, 0.1]]), np.radians([[90.0, 0.0, 0.0]]))
+    >>> tip.round(9).tolist(), axis.round(9).tolist()
     ([[0.0, -0.1, 0.0]], [[0.0, -1.0, 0.0]])
     """
     held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(xyz),))
@@ -265,18 +254,17 @@ def tool_poses(
             # Where nothing turns the numbers stay to their last digit, and a tool's unknown length does not matter.
             turns = ~held & (angle != 0.0)
             tip = np.where(turns[:, None], center + turned(tip - center, rotary, angle), tip)
-    return ToolPoses(tip, axis)
+    return tip, axis
 
 
-def roll_pitch(axis: FloatArray, pitch_before: float = 0.0) -> FloatArray:
+def roll_pitch(axis: FloatArray) -> FloatArray:
     """Roll and pitch (n, 2), rad, of tool axes (n, 3) in their order, at a yaw of 0; see `geometry.roll_pitch_of_axis`.
 
-    Pitch runs on from `pitch_before`, over half a turn too, and stays what it was where the axis lies along y and has
-    none.
+    Pitch runs on from 0, over half a turn too, and stays what it was where the axis lies along y and has none.
     """
     i, j, k = axis.T
     across = np.hypot(i, k)
-    pitch = np.concatenate([[pitch_before], np.arctan2(i, k)])
+    pitch = np.concatenate([[0.0], np.arctan2(i, k)])
     known = np.concatenate([[0], np.where(across > UPRIGHT, np.arange(1, len(pitch)), 0)])
     pitch = np.unwrap(pitch[np.maximum.accumulate(known)])[1:]
     return np.stack([np.arctan2(-j, across), pitch], axis=1) + 0.0

@@ -22,7 +22,6 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import ProgramError, UnreachableError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.results import FolderResult, frame_of
@@ -172,7 +171,7 @@ def run_case_study(
         try:
             analyses[name] = analyzed(place)
         except UnreachableError as error:
-            hint = f"give regions that the machine reaches: {both_names('--region', 'NAME:X,Y,Z[,TURN]')}"
+            hint = "give regions that the machine reaches: --region NAME:X,Y,Z[,TURN]"
             raise UnreachableError(
                 f"region {name}: {error.found}", hint=hint, file=error.file, line=error.line
             ) from None

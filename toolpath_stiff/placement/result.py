@@ -14,7 +14,6 @@ from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.results import FolderResult, frame_of
@@ -247,7 +246,7 @@ class Placement(FolderResult):
         if least < margin:
             words.append(
                 f"the {which} placement has a margin of {100.0 * least:.2f} % of a limit's span in line "
-                f"{line[nearest]}, less than the {100.0 * margin:g} % asked for with {both_names('--margin')}"
+                f"{line[nearest]}, less than the {100.0 * margin:g} % asked for with --margin"
             )
         for box in self.task.rules.keepouts:
             clearance = box.clearances(analysis.samples.position)

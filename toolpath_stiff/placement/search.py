@@ -13,7 +13,6 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import UnreachableError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.placement.climb import Climber
@@ -352,7 +351,7 @@ def _infeasible(search: Search, placement: FloatArray) -> UnreachableError:
         fault = f"runs {mm_from_m(-float(clearance[row])):.1f} mm deep into the keep-out {box.name}"
     elif margin < rules.margin:
         fault = f"has a margin of {100.0 * margin:.2f} % of the limit's span: {limits.describe(row)}"
-        hint = f"widen the bounds, or ask for less than {both_names('--margin', f'{100.0 * rules.margin:g}')}"
+        hint = f"widen the bounds, or ask for less than --margin {100.0 * rules.margin:g}"
     else:
         room = np.where(path.cutting, rows.law[0], np.inf)
         row, hint = int(np.argmin(room)), "widen the bounds, or allow it with --allow-extrapolation"

@@ -10,7 +10,7 @@ over the constants of a shape, so that no link is preferred for having many term
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.portrait.columns import Ground
-from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Factor, Term
+from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Term
 
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 
@@ -62,7 +62,7 @@ class Local:
         return self.where is not None or (self.link == "instrument" and self.direction != "reading")
 
     def term(
-        self, variable: str, shape: str, constants: Constants, column: str = "", times: Factor | None = None
+        self, variable: str, shape: str, constants: Constants, column: str = "", times: Term | None = None
     ) -> Term:
         """With a variable and a shape, and a second one where there is one."""
         column, constants = column or self.column, (*self.constants, *constants)
@@ -150,7 +150,7 @@ class Entry:
     shape: str
     constants: Constants
     log_prior: float
-    times: Factor | None = None
+    times: Term | None = None
 
     @property
     def term(self) -> Term:
@@ -280,8 +280,8 @@ def products(term: Term, ground: Ground) -> list[Term]:
             continue
         for column in columns_of(variable, ground, local.link == "joints"):
             named = ground.shapes(variable, column, False, local.where)[0]
-            factors = (Factor(variable, shape, constants, column) for shape, constants in named if shape != "periodic")
-            terms += [replace(term, times=factor) for factor in factors]
+            kinds = [(shape, constants) for shape, constants in named if shape != "periodic"]
+            terms += [term.with_second(variable, shape, constants, column) for shape, constants in kinds]
     return terms
 
 

@@ -20,7 +20,7 @@ from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.noise import Noise, Scatter
 from toolpath_stiff.portrait.columns import Ground, shapes_near
 from toolpath_stiff.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of, products
-from toolpath_stiff.stiffness.terms import Factor, Term
+from toolpath_stiff.stiffness.terms import Term
 
 DRAWS = 200  # simulated campaigns
 
@@ -308,16 +308,13 @@ class Selection:
         if not terms:
             return None
         best, _ = self._likelier(before, others, terms)
-        second = best.terms[-1].second
+        second = best.terms[-1].times
         assert second is not None
         for finer in FINER:
             near = shapes_near(second, self.ground, finer)
             if not near:
                 return best
-            factors = [Factor(term.variable, term.shape, term.at, term.column) for term in near]
-            best, i = self._likelier(
-                before, others, [replace(best.terms[-1], times=factor) for factor in factors], best
-            )
+            best, i = self._likelier(before, others, [replace(best.terms[-1], times=term) for term in near], best)
             second = second if i is None else near[i]
         return best
 

@@ -13,7 +13,6 @@ COLUMNS = ("region", *REGION_COLUMNS, *FIGURES)
 
 
 def _table(study: CaseStudy) -> str:
-    """The regions."""
     return csv_text(COLUMNS, ([str(row[key]) for key in COLUMNS] for row in study.summary["regions"]))
 
 
@@ -33,9 +32,8 @@ def text(study: CaseStudy) -> str:
         "| --- | --- | --- | --- |",
     ]
     for row in summary["regions"]:
-        place = f"{row['x_mm']:g}, {row['y_mm']:g}, {row['z_mm']:g}"
         lines.append(
-            f"| {row['region']} | {place} | {row['rotation_deg']:g} deg | "
+            f"| {row['region']} | {row['x_mm']:g}, {row['y_mm']:g}, {row['z_mm']:g} | {row['rotation_deg']:g} deg | "
             f"{number(row['mean_N_per_mm'])} ({number(row['range_N_per_mm'])}) |"
         )
     lines += ["", "## The paper's conclusions", ""]

@@ -27,12 +27,10 @@ def text(plan: Plan) -> str:
 
 
 def _rows(plan: Plan) -> str:
-    """The measurement file to fill in."""
     return plan_csv(plan.rows)
 
 
 def _tables(plan: Plan) -> bytes:
-    """What the next visit is chosen from."""
     assert isinstance(plan.choice, RivalPlan)
     return tables_of(plan.choice)
 

@@ -15,7 +15,7 @@ from toolpath_stiff.nc.codes.unsettled import know_place
 from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, ToolEntry, tool_of
+from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
 
 # What a program may set: NGC's numbered parameters below those of the control; Macro B's locals and commons.
@@ -28,14 +28,10 @@ MACRO_POSITIONS = (5001, 5041)  # block end; present position, with the tool len
 TOOL_LENGTHS = range(2001, 2201)  # Fanuc's memory A and Haas: geometry of the length of H1 to H200
 LAST_WORK_OFFSET = 6  # G54 to G59 in Macro B's numbers, which are those of LinuxCNC's parameters
 MODAL = range(4001, 4121)
+ALARM, WITHOUT_PATH = 3000, (3003, 3004, 3006)
 
-
-@dataclass
-class Level:
-    """The variables of one call: numbered from 1, and named ones."""
-
-    numbered: dict[int, float | None] = field(default_factory=dict)
-    named: dict[str, float] = field(default_factory=dict)
+Which = str | int  # a variable: its name or its number
+Values = dict[Which, float | None]
 
 
 @dataclass
@@ -45,12 +41,12 @@ class Variables:
     Attributes
     ----------
     family
-        `expressions.NGC`, `MACRO_B`, or `EITHER` where the program shows no sign of one.
+        `NGC`, `MACRO_B`, or `EITHER` where the program shows no sign of one.
     state
         Of the control.
     levels
         Local variables, the running call's last.
-    common, named
+    common
         Those of all calls.
     line
         Of the block that runs, for `#<_line>`.
@@ -58,57 +54,55 @@ class Variables:
 
     family: str
     state: State
-    levels: list[Level] = field(default_factory=lambda: [Level()])
-    common: dict[int, float | None] = field(default_factory=dict)
-    named: dict[str, float] = field(default_factory=dict)
+    levels: list[Values] = field(default_factory=lambda: [{}])
+    common: Values = field(default_factory=dict)
     line: int = 0
 
-    def get(self, which: str | int, place: Place) -> float | None:
+    def get(self, which: Which, place: Place) -> float | None:
         """The value of a variable; None: empty. Raises `InputError` for one that is not known."""
+        scope = self._scope(which)
+        if scope is not None and which in scope:
+            return scope[which]
         if isinstance(which, int):
-            return self._numbered(which, place)
-        value = self._named(which)
-        if value is None:
-            problem = f"the variable #<{which.lower()}> is read before it is set"
-            raise place.fail(problem, "it in the same subprogram before; not #<_task>, which a preview has otherwise")
-        return value
+            kept = scope is not None or (which == 0 and self.family != NGC)
+            return self._unset(which, place) if kept else self._system(which, place)
+        if which in PREDEFINED:
+            return PREDEFINED[which](self)
+        problem = f"the variable #<{which.lower()}> is read before it is set"
+        raise place.fail(problem, "it in the same subprogram before; not #<_task>, which a preview has otherwise")
 
     def exists(self, name: str) -> bool:
         """Whether a named variable has a value."""
-        return self._named(name) is not None
+        return name in PREDEFINED or name in (self._scope(name) or ())
 
-    def _named(self, name: str) -> float | None:
-        scope = self.named if name.startswith("_") else self.levels[-1].named
-        return PREDEFINED[name](self) if name in PREDEFINED and name not in scope else scope.get(name)
+    def _scope(self, which: Which) -> Values | None:
+        """Where a variable is kept that a program may set; None for one of the control's."""
+        if isinstance(which, str):
+            return self.common if which.startswith("_") else self.levels[-1]
+        if 1 <= which <= LOCALS[self.family]:
+            return self.levels[-1]
+        return self.common if self._settable(which) else None
 
-    def _numbered(self, number: int, place: Place) -> float | None:
-        if number == 0 and self.family != NGC:
-            return None
-        if 1 <= number <= LOCALS[self.family]:
-            values = self.levels[-1].numbered
-        elif self._settable(number):
-            values = self.common
-        elif self.family == EITHER:
-            problem = f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls"
-            raise place.fail(problem, hint="name it with --dialect")
-        else:
-            value = (self._ngc_system if self.family == NGC else self._macro_system)(number, place)
-            if value is None:
-                problem = (
-                    f"#{number} is a parameter of the control that is not known here, or in a unit of the machine's"
-                )
-                raise place.fail(problem, hint="put the number into the program")
-            return value
-        if number in values:
-            return values[number]
+    def _unset(self, number: int, place: Place) -> float | None:
         if self.family == NGC:
             if number > LOCALS[NGC]:
                 self.state.assume(f"#{number} is read before it is set: 0, as in an empty parameter file")
             return 0.0
-        if self.family == EITHER or number in COMMON[1]:  # beyond #500 a control keeps values from earlier programs
+        if number and (self.family == EITHER or number in COMMON[1]):  # a control keeps those from earlier programs
             reason = "0 on LinuxCNC and empty on Fanuc's and Haas' controls, which keep those from #500 on"
             raise place.fail(f"#{number} is read before it is set: {reason}", f"#{number}=... before, or --dialect")
         return None
+
+    def _system(self, number: int, place: Place) -> float:
+        """The value of a variable in which the control keeps something."""
+        if self.family == EITHER:
+            problem = f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls"
+            raise place.fail(problem, hint="name it with --dialect")
+        value = (self._ngc_system if self.family == NGC else self._macro_system)(number, place)
+        if value is None:
+            problem = f"#{number} is a parameter of the control that is not known here, or in a unit of the machine's"
+            raise place.fail(problem, hint="put the number into the program")
+        return value
 
     def _settable(self, number: int) -> bool:
         """Whether a program may set a numbered variable beyond the local ones."""
@@ -118,20 +112,23 @@ class Variables:
             return (ngc and macro) or number == DEBUG_SWITCH
         return ngc if self.family == NGC else macro
 
-    def set(self, which: str | int, value: float | None, place: Place) -> None:
+    def set(self, which: Which, value: float | None, place: Place) -> None:
         """Set a variable. Raises `InputError` for one that a program cannot set."""
-        if isinstance(which, str):
-            assert value is not None
-            if which in PREDEFINED:
-                raise place.fail(f"#<{which.lower()}> is the control's own", "another name")
-            (self.named if which.startswith("_") else self.levels[-1].named)[which] = value
-        elif 1 <= which <= LOCALS[self.family]:
-            self.levels[-1].numbered[which] = value
-        elif self._settable(which):
-            self.common[which] = value
-        elif self.family != MACRO_B or value is None or not self._set_macro_system(which, value, place):
+        if which in PREDEFINED:
+            raise place.fail(f"#<{str(which).lower()}> is the control's own", "another name")
+        scope = self._scope(which)
+        if scope is not None:
+            scope[which] = value
+        elif self.family == MACRO_B and which in WITHOUT_PATH:
+            word = Word("#", 0.0, place.column or 1, f"#{which}")
+            self.state.note(place.line, word, "single block, feed hold or a message: the path does not depend on it")
+        elif self.family == MACRO_B and which == ALARM:
+            raise place.fail(
+                f"the program stops with its alarm {value or 0.0:g} (#3000)", "a program that runs through"
+            )
+        else:
             known = f"#31 to #{NGC_LAST}" if self.family == NGC else "#1 to #33, #100 to #199, #500 to #999"
-            raise place.fail(f"#{which} cannot be set here", known)
+            raise place.fail(f"#{which} cannot be set here", f"{known}; G10 for work offsets and tool lengths")
 
     def angle(self, y: float, x: float) -> float:
         """ATAN[y]/[x], degrees: -180 to 180 on LinuxCNC, 0 to 360 on Fanuc's (parameter 6004, NAT = 0)."""
@@ -163,8 +160,6 @@ class Variables:
     def _ngc_system(self, number: int, place: Place) -> float | None:
         if NGC_POSITION <= number < NGC_POSITION + 6:
             return self.position(number - NGC_POSITION, f"#{number}", place)
-        if NGC_POSITION + 6 <= number < NGC_POSITION + 9:
-            return 0.0  # U, V, W, which this machine does not have
         return {NGC_TOOL: float(self.state.tool), NGC_OFFSET: float(self.state.frames.active + 1)}.get(number)
 
     def _macro_system(self, number: int, place: Place) -> float | None:
@@ -176,17 +171,12 @@ class Variables:
         if number in TOOL_LENGTHS:
             length = tool_of(state.tools, number - TOOL_LENGTHS.start + 1).length
             return None if math.isnan(length) else length / state.length_scale
-        offset = self._offset_place(number)
-        if offset is not None:
-            index, axis = offset
-            value = state.frames.offsets.table[index].axes[axis] / (state.length_scale if axis < 3 else 1.0)
-            return value if state.frames.offsets.table[index].given else None
+        offset, axis = divmod(number - FIRST_OFFSET, OFFSET_STRIDE)  # #5221 to #5326
+        if 0 <= offset < LAST_WORK_OFFSET and axis < len(AXES):
+            work_offset = state.frames.offsets.table[offset]
+            value = work_offset.axes[axis] / (state.length_scale if axis < 3 else 1.0)
+            return value if work_offset.given else None
         return self._modal(number) if number in MODAL else None
-
-    def _offset_place(self, number: int) -> tuple[int, int] | None:
-        """The work offset (from 0) and axis of #5221 to #5326."""
-        index, axis = divmod(number - FIRST_OFFSET, OFFSET_STRIDE)
-        return (index, axis) if 0 <= index < LAST_WORK_OFFSET and axis < len(AXES) else None
 
     def _modal(self, number: int) -> float | None:
         """#4001 to #4120: what was in force before this block, by Fanuc's groups of G codes; then by letters."""
@@ -207,32 +197,6 @@ class Variables:
             120: float(state.selected),
         }
         return group_values.get(number - 4000)
-
-    def _set_macro_system(self, number: int, value: float, place: Place) -> bool:
-        """Set a system variable of Macro B; whether it is one."""
-        state = self.state
-        if number == 3000:
-            raise place.fail(f"the program stops with its alarm {value:g} (#3000)", "a program that runs through")
-        if number in (3003, 3004, 3006):
-            word = Word("#", float(number), place.column or 1, f"#{number}")
-            state.note(place.line, word, "single block, feed hold or a message: the path does not depend on it")
-            return True
-        if number in TOOL_LENGTHS:
-            state.tools = {} if state.tools is None else state.tools
-            tool = number - TOOL_LENGTHS.start + 1
-            state.tools.setdefault(tool, ToolEntry(tool)).length = value * state.length_scale
-            return True
-        offset_place = self._offset_place(number)
-        if offset_place is None:
-            return False
-        index, axis = offset_place
-        if index == state.frames.active:
-            expected = f"G10 L2 P{index + 1}, whose effect is defined"
-            raise place.fail(f"#{number} changes the work offset in force", expected)
-        offset = state.frames.offsets.table[index]
-        offset.axes[axis] = value * (state.length_scale if axis < 3 else 1.0)
-        offset.given = True
-        return True
 
 
 def _axis(axis: int) -> Callable[[Variables], float]:
