@@ -23,7 +23,7 @@ from toolpath_stiff.analysis.statistics import (
 )
 from toolpath_stiff.analysis.uncertainty import band_figures
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import Document, to_dict, without_nan
+from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Hexapod
@@ -31,6 +31,7 @@ from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
+from toolpath_stiff.poses import Pose, pose_in_mm
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import (
     StiffnessModel,
@@ -40,7 +41,7 @@ from toolpath_stiff.stiffness.model import (
     conditions_stated,
     effects_stated,
 )
-from toolpath_stiff.units import Pose, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m, number, pose_in_mm
+from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd

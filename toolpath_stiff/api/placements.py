@@ -148,7 +148,7 @@ def place(
         write="" if write is None else str(write),
         decimals=decimals,
         linearise=None if linearise_mm is None else m_from_mm(linearise_mm),
-        reading=part.read_as,
+        control=part.request.controller,
     )
     placed = place_program(task, counter(progress, f"{part.name}: search"))
     return replace(placed, inputs=(*part.inputs, *on.inputs))
@@ -282,4 +282,6 @@ def rewrite(
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
+    return rewrite_program(
+        part.moves(new), new, old, decimals=decimals, linearise=chord, control=part.request.controller
+    )

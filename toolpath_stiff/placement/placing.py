@@ -10,6 +10,7 @@ from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.evaluator import Evaluator
@@ -17,8 +18,9 @@ from toolpath_stiff.placement.paths import WorkPath, work_path
 from toolpath_stiff.placement.result import COLUMNS, FIGURES, Placement, PlacementRow, PlacementTask, Written
 from toolpath_stiff.placement.search import PlacementResult, search_placements
 from toolpath_stiff.placement.working import Search
+from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 from toolpath_stiff.rewriting.program import RewrittenProgram, check_rewritable, rewrite_program
-from toolpath_stiff.units import Pose, ShopPose, n_per_mm_from_n_per_m, pose_in_mm, um_from_m
+from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
 
 def place_program(task: PlacementTask, progress: Callable[[int, int], None] | None = None) -> Placement:
@@ -141,8 +143,8 @@ def _rewritten(task: PlacementTask, best: Analysis) -> tuple[bytes | None, Writt
     """The transformed program's bytes, and how it compares; or why there are none."""
     numbers: dict[str, Any] = {"decimals": task.decimals, "linearise": task.linearise}
     try:
-        rewritten = rewrite_program(best.program, best.origin, task.present, **numbers, **task.reading)
-        differences = rewriting_differences(best, rewritten, task.present, **task.reading)
+        rewritten = rewrite_program(best.program, best.origin, task.present, **numbers, control=task.control)
+        differences = rewriting_differences(best, rewritten, task.present, task.control)
     except InputError as error:
         return None, Written(task.write, refused=str(error))
     zero = dict(zip(COLUMNS[1:7], _mm_deg(task.present), strict=True))
@@ -150,7 +152,7 @@ def _rewritten(task: PlacementTask, best: Analysis) -> tuple[bytes | None, Writt
 
 
 def rewriting_differences(
-    placed: Analysis, rewritten: RewrittenProgram, original_origin: Pose, **reading: Any
+    placed: Analysis, rewritten: RewrittenProgram, original_origin: Pose, control: Controller = UNKNOWN_CONTROL
 ) -> dict[str, float]:
     """Relative differences of mean, range and smallest stiffness: the rewritten program against the placed one.
 
@@ -162,10 +164,10 @@ def rewriting_differences(
         Is read and analyzed at the original origin with the same load, force and step.
     original_origin
         m and rad, as it was given to `rewrite_program`.
-    **reading
-        `offsets`, `tools`, `block_delete`, as for `parse_program`.
+    control
+        Offsets, tools and block-delete switches that the program was read with.
     """
-    program = parse_program(rewritten.text, placed.program.name, origin=original_origin, **reading)
+    program = parse_program(rewritten.text, placed.program.name, origin=original_origin, controller=control)
     again = analyze(
         placed.model, program, origin=original_origin, load=placed.load, step=placed.step, force=placed.force
     )

@@ -12,14 +12,16 @@ import numpy as np
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import Document, to_dict
+from toolpath_stiff.documents import Document, number, to_dict
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
+from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm, pose_in_si
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
 from toolpath_stiff.stiffness.model import StiffnessModel, effects_stated
-from toolpath_stiff.units import Pose, ShopPose, mm_from_m, number, pose_in_mm, pose_in_si
+from toolpath_stiff.units import mm_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +55,7 @@ class PlacementTask:
         Name of the file that the program itself is written to; "": it is not.
     decimals, linearise
         Of its numbers; within so much of arcs its chords, m.
-    reading
+    control
         What the program was read with.
     """
 
@@ -69,7 +71,7 @@ class PlacementTask:
     write: str = ""
     decimals: int | None = None
     linearise: float | None = None
-    reading: Mapping[str, Any] = field(default_factory=dict)
+    control: Controller = UNKNOWN_CONTROL
 
 
 @dataclass(frozen=True)

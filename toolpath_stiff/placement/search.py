@@ -20,8 +20,9 @@ from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.goals import Goal
 from toolpath_stiff.placement.paths import placed_path, with_rows
 from toolpath_stiff.placement.working import ENDS, NO_FLOORS, Search
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import mm_from_m, pose_in_mm
+from toolpath_stiff.units import mm_from_m
 
 SCOUTS = 250  # placements tried at random before the evolution, for each that is free of x, y, z, A, B, C
 LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 12, 60, 120  # after each leg the few samples hear of what they missed

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 
 from toolpath_stiff.analysis.results import Analysis, compare_summaries
 from toolpath_stiff.analysis.statistics import FIGURES, PLUNGES_ONLY
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.report.pages import markup
 from toolpath_stiff.report.tables import LABEL, ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, duration, machine_text, shortened
-from toolpath_stiff.units import number
 
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}

@@ -6,12 +6,13 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.documents import number
 from toolpath_stiff.placement.result import COLUMNS, Placement, PlacementRow, Written
 from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.place_path import drawn_path
 from toolpath_stiff.report.words import machine_text, plain
-from toolpath_stiff.units import mm_from_m, number
+from toolpath_stiff.units import mm_from_m
 
 COSTS = ("best_on_front_N_per_mm", "chosen_N_per_mm")
 
