@@ -41,8 +41,7 @@ def _count(word: Word, fault: Fault) -> int:
 def arguments_of(words: Iterable[Word], increments: bool, fault: Fault) -> dict[int, float | None]:
     """The local variables that the words of a macro call give."""
     words = [word for word in words if word.letter not in "PL"]
-    letters = [word.letter for word in words]
-    second = any(letters.count(letter) > 1 for letter in "IJK")
+    second = any(sum(word.letter == letter for word in words) > 1 for letter in "IJK")
     arguments: dict[int, float | None] = {}
     triple, previous = -1, "K"
     for word in words:

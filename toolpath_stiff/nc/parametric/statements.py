@@ -236,8 +236,7 @@ def _whole(word: Word, value: float, place: Place) -> float:
     """The code or number that a value stands for, as LinuxCNC's interpreter rounds it."""
     whole = round(value, 1 if word.letter in "GM" else 0)
     if abs(whole - value) > EQUAL or whole < 0.0:
-        code = f"a code such as {word.letter}1 or {word.letter}59.3"
-        expected = code if word.letter in "GM" else "a whole number from 0"
+        expected = f"a code such as {word.letter}1" if word.letter in "GM" else "a whole number from 0"
         raise place.fail(f"{word.text} is {word.letter}{value:g}", expected, column=word.column)
     return whole
 
