@@ -16,8 +16,8 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.interpreter import execute
-from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.nc.state import CurrentBlock, Segment, State
+from toolpath_stiff.nc.moves import RAPID, Move
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
 from toolpath_stiff.rewriting.turn import Turn, differences
 from toolpath_stiff.units import MM_PER_INCH
@@ -139,7 +139,7 @@ class Controls:
         self.edit = LineEdit("", Block(0, ()))
         self.current: CurrentBlock | None = None
         self.axes: list[str] = []
-        self.trace: list[Segment] = []
+        self.trace: list[Move] = []
         source.trace = self.trace
 
     def refusal(self, problem: str, hint: str = "") -> InputError:

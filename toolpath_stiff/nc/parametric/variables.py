@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.nc.codes.motion import know_height
-from toolpath_stiff.nc.codes.unsettled import know_place
+from toolpath_stiff.nc.codes.points import know_place
 from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import CurrentBlock, State
