@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from toolpath_stiff.column_names import converted, heading_key, parted, same_quantity
+from toolpath_stiff.column_names import columns_option, converted, heading_key, parted, same_quantity
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import decoded, read_bytes
 from toolpath_stiff.workbooks import Rows, is_workbook, sheet_rows, split_name
@@ -184,13 +184,14 @@ def _named(written: Sequence[str], columns: Columns, file: str, line: int) -> li
     for name in heading:
         if name and heading.count(name) > 1:
             raise InputError(f"column {name} stands twice", file=file, line=line)
-        meant = "" if name in known.values() else _meant(name, absent)
-        if meant:
-            hint = f"did you mean {meant}? Otherwise give it another name"
-            if columns.sources is not None:
-                quantity, unit = parted(meant)
-                hint += f', or say its unit: --columns "{quantity}={name}:{parted(name)[1] or unit}"'
-            raise InputError(f"column {name!r}", expected=meant, hint=hint, file=file, line=line)
+    slips = {name: meant for name in heading if name not in known.values() and (meant := _meant(name, absent))}
+    if slips:
+        name, meant = next(iter(slips.items()))
+        hint = f"did you mean {meant}? Otherwise give it another name"
+        if columns.sources is not None:
+            entries = [f"{parted(of)[0]}={theirs}:{parted(theirs)[1] or parted(of)[1]}" for theirs, of in slips.items()]
+            hint += f", or say its unit: {columns_option(entries)}"
+        raise InputError(f"column {name!r}", expected=meant, hint=hint, file=file, line=line)
     return heading
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from toolpath_stiff.analysis.machine_check import check_machine
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.errors import PoseError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
 from toolpath_stiff.stiffness.model import build_model
 
@@ -88,7 +88,7 @@ def test_most_flipped_signs_are_found_at_their_strut():
             joints[joint, axis] *= -1.0
             if abs(joints[joint, axis]) > 1e-3:
                 slips += 1
-                with suppress(PoseError):  # singular, which is said
+                with suppress(InputError):  # singular, which is said
                     doubtful = check_machine(build_model(machine.with_changes(**{body: joints}))).doubtful
                     named += any(text.startswith(f"strut {joint + 1} is") for text in doubtful)
     assert named > 0.8 * slips

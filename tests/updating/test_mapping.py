@@ -117,7 +117,7 @@ def test_a_mapping_reads_any_long_table(layout, write):
         ("German", ["(found Bein, Datum, Kraft [kN], Weg [mm])", "or in a.csv.columns.toml"]),
         (
             "units of the headings",
-            ["'Displacement [mm]'", '--columns "displacement=Displacement [mm]:mm"'],
+            ["'Force [kN]'", '--columns "force=Force [kN]:kN, displacement=Displacement [mm]:mm" (columns=)'],
         ),
     ],
 )

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import Option, number_in, numbers
-from toolpath_stiff.units import Pose, pose_in_si
+from toolpath_stiff.poses import Pose, pose_in_si
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0

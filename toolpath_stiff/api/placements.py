@@ -36,10 +36,11 @@ from toolpath_stiff.placement.paths import work_path
 from toolpath_stiff.placement.placing import place_again, place_program
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.task import PlacementTask, Rewriting
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
+from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
 FARTHEST_TURN_DEG = 720.0
 MOST_FRONT_POINTS = 1000
@@ -176,7 +177,7 @@ def _rewriting(
 ) -> Rewriting | None:
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
     if write is not None:
-        return Rewriting(str(write), decimals, chord, part.read_as)
+        return Rewriting(str(write), decimals, chord, part.request.controller)
     if decimals is not None or chord is not None:
         raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     return None
@@ -311,4 +312,6 @@ def rewrite(
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
+    return rewrite_program(
+        part.moves(new), new, old, decimals=decimals, linearise=chord, control=part.request.controller
+    )

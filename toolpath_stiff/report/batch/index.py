@@ -13,14 +13,13 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.analysis_tables import ONLY_PLUNGES
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, good_and_failed, summary_csv
 from toolpath_stiff.report.batch.programs import RESERVED
 from toolpath_stiff.report.pages import markup, render
 from toolpath_stiff.report.words import counted, duration, plain, shortened
-from toolpath_stiff.units import number
 
 INDEX, SUMMARY = RESERVED
 TEXT = 40  # characters of a program's line that are shown
