@@ -177,7 +177,7 @@ def _rewriting(
 ) -> Rewriting | None:
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
     if write is not None:
-        return Rewriting(str(write), decimals, chord, part.read_as)
+        return Rewriting(str(write), decimals, chord, part.request.controller)
     if decimals is not None or chord is not None:
         raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     return None
@@ -312,4 +312,6 @@ def rewrite(
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
+    return rewrite_program(
+        part.moves(new), new, old, decimals=decimals, linearise=chord, control=part.request.controller
+    )

@@ -64,7 +64,7 @@ def recovered(
         others = f", and {len(far) - 1} more cuts turn as far" if far[1:] else ""
         advice = f"if the control takes the shorter way, set rollover = true for {letter} in the controller file"
         warnings.append(Remark(f"{letter} turns by {degrees:.0f} degrees within one cut{others}; {advice}", line))
-    lengths = {tool.number: tool.length for tool in program.tools}
+    lengths = {tool.number: m_from_mm(tool.length) for tool in program.tools}
     on_part, of_kept = recover_moves(kept, placed, lengths, name, held[known])
     of_move = np.flatnonzero(known)[of_kept]
     return replace(

@@ -3,11 +3,11 @@
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
 
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.paths import Read
@@ -26,7 +26,7 @@ class Rewriting:
     file: str
     decimals: int | None
     linearise: float | None
-    reading: Mapping[str, Any]
+    control: Controller
 
 
 @dataclass(frozen=True)

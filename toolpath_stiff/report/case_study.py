@@ -31,9 +31,8 @@ def text(study: CaseStudy) -> str:
         "| --- | --- | --- | --- |",
     ]
     for row in summary["regions"]:
-        place = f"{row['x_mm']:g}, {row['y_mm']:g}, {row['z_mm']:g}"
         lines.append(
-            f"| {row['region']} | {place} | {row['rotation_deg']:g} deg | "
+            f"| {row['region']} | {row['x_mm']:g}, {row['y_mm']:g}, {row['z_mm']:g} | {row['rotation_deg']:g} deg | "
             f"{number(row['mean_N_per_mm'])} ({number(row['range_N_per_mm'])}) |"
         )
     lines += ["", "## The paper's conclusions", ""]

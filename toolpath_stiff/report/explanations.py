@@ -223,5 +223,5 @@ def _next_readings(diagnosis: Diagnosis) -> list[str]:
         return []
     reasons = list(dict.fromkeys(reading["why"] for reading in diagnosis.next_measurements))
     more = [f"{len(reasons) - FEW_REASONS} more in the file"] if len(reasons) > FEW_REASONS else []
-    proposed = counted(len(diagnosis.next_measurements), "reading")
-    return [f"{proposed} proposed in diagnose.json: {'; '.join([*reasons[:FEW_REASONS], *more])}"]
+    listed = "; ".join([*reasons[:FEW_REASONS], *more])
+    return [f"{counted(len(diagnosis.next_measurements), 'reading')} proposed in diagnose.json: {listed}"]
