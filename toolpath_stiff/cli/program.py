@@ -82,9 +82,10 @@ def analyze(
         'toolpath-stiff[cluster]').
     """
     files, counts = find_programs(programs)
-    saving: dict[str, Any] = {"plots": not args.no_plots, "table": table, "show_plunges": show_plunges}
+    plots = not args.no_plots
     if counts or len(files) > 1 or cluster:
-        options = run.given(args, tps.analyze, tps.Program.read) | saving | {"jobs": jobs, "replace": args.replace}
+        options = run.given(args, tps.analyze, tps.Program.read)
+        options |= {"plots": plots, "table": table, "show_plunges": show_plunges, "jobs": jobs, "replace": args.replace}
         executor = _executor(cluster) if cluster else None
         with run.progress_line() as progress:
             analyses = tps.analyze_many(
@@ -97,7 +98,8 @@ def analyze(
     file = files[0].file
     folder, rules = run.destination(args, tps.Analysis, [file], other_samples(table))
     analysis = run.call(args, tps.analyze, program=tps.Program.read(file, **run.given(args, tps.Program.read)))
-    run.show(args, analysis, run.written_text(analysis.save(folder, rules=rules, **saving)))
+    written = analysis.save(folder, plots=plots, rules=rules, table=table, show_plunges=show_plunges)
+    run.show(args, analysis, run.written_text(written))
     if analysis.below_required:
         return BELOW_REQUIRED
     return 0 if analysis.complete else INCOMPLETE
