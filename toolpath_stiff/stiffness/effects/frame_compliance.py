@@ -37,8 +37,7 @@ class FrameCompliance(Effect):
                 carried = np.zeros((len(path), 2, 12))  # outward and upward pull of the two struts
                 carried[:, 0, pair] = path.struts.directions[:, pair] @ radial
                 carried[:, 1, pair] = path.struts.directions[:, pair, 2]
-                springs = np.array([p["radial"], p["vertical"]])
-                form += np.einsum("k,nki,nkj->nij", springs, carried, carried)
+                form += np.einsum("k,nki,nkj->nij", [p["radial"], p["vertical"]], carried, carried)
         return form
 
     def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:
