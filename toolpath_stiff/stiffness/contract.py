@@ -115,14 +115,6 @@ def compliance(name: str, largest: float, typical: tuple[float, float], source: 
     return Parameter(name, "nm/N", 1e-9, (0.0, largest), typical, source=source, meaning=meaning)
 
 
-def choice(
-    name: str, bounds: tuple[int, int], source: str, meaning: str, typical: tuple[int, ...] = (), neutral: float = 0.0
-) -> Parameter:
-    """The parameter that says on which part the effect acts, a whole number."""
-    low, *_, high = typical or bounds
-    return Parameter(name, "", 1.0, bounds, (low, high), source, neutral, meaning, kind="integer")
-
-
 @dataclass(frozen=True)
 class LoadPath(ArrayColumns):
     """What an effect sees of n poses under load. SI, base axes.
