@@ -11,9 +11,10 @@ from toolpath_stiff.analysis.poses import PoseStiffness, evaluate_poses
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
-from toolpath_stiff.units import Pose, mm_from_m, n_per_um_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -22,16 +22,9 @@ from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, Limits, StrutLaw
 from toolpath_stiff.machine.schema import MachineToml, Sections, read_sections
 from toolpath_stiff.machine.uncertainty import read_uncertainty
+from toolpath_stiff.poses import Pose, pose_in_si
 from toolpath_stiff.toml_reader import LARGEST_BYTES, shortened
-from toolpath_stiff.units import (
-    Pose,
-    m_from_mm,
-    m_per_s_from_mm_per_min,
-    mm_from_m,
-    n_per_m_from_n_per_um,
-    pose_in_si,
-    rad_from_deg,
-)
+from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
 CLOSEST_LENGTHS = 1e-6  # m, of a strut law: nobody measures closer, and the slope between them stays a number
 # Smallest singular value of the six strut screws (arms in units of the platform's size) that is no singularity.

@@ -16,8 +16,8 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.interpreter import execute
-from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.nc.state import CurrentBlock, Segment, State
+from toolpath_stiff.nc.moves import RAPID, Move
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
 from toolpath_stiff.rewriting.turn import Turn, differences
 from toolpath_stiff.units import MM_PER_INCH
@@ -139,7 +139,7 @@ class Controls:
         self.edit = LineEdit("", Block(0, ()))
         self.current: CurrentBlock | None = None
         self.axes: list[str] = []
-        self.trace: list[Segment] = []
+        self.trace: list[Move] = []
         source.trace = self.trace
 
     def refusal(self, problem: str, hint: str = "") -> InputError:
@@ -246,6 +246,6 @@ class Controls:
         repeats = next((word.value for word in self.edit.block.words if word.letter == "L"), 1.0)
         difference = differences(self.turn, wanted, written, self.unit * max(repeats, 1.0))
         unknown = ", ".join(letter for letter in "XYZ" if letter not in self.known)
-        hint = "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
-        hint = f"position {unknown} in rapid before the first cutting move" if unknown else hint
+        place = f"position {unknown} in rapid before the first cutting move"
+        hint = place if unknown else "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
         self.refuse_if(difference, f"the block cannot be rewritten: its cutting move {difference}", hint)

@@ -17,8 +17,8 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.courses import frame_of, point_on_arc
 from toolpath_stiff.nc.moves import Arc, Move
+from toolpath_stiff.poses import ShopPose
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.units import ShopPose
 
 NOISE = 1e-12  # of a direction cosine: what is left of 0 or 1 after cosines and products
 UPRIGHT = 1e-9  # degrees; smaller tilts are rounding

@@ -34,7 +34,7 @@ def not_for(request: Request) -> list[Remark]:
         "a dialect": controller.dialect.name != "generic",
         "work offsets": any(offset.given for offset in request.work_offsets.table),
         "posted kinematics": controller.kinematics is not None,
-        "block-delete switches": bool(request.switches),
+        "block-delete switches": bool(request.controller.switches),
     }
     return [Remark(f"{what} mean nothing to a cutter-location file") for what in given if given[what]]
 

@@ -24,7 +24,6 @@ DASSAULT, POSTS = "Dassault, CATIA's help on APT import", "Autodesk's APT posts"
 VERICUT, MANUALS = 'Vericut, "Supported APT-CLS NC Program Records"', "manuals of post processors"
 # An unknown word that begins like one of a motion or a feed, or that carries a point, is not passed over.
 LIKE_MOTION = ("GO", "RAP", "FED", "CIR", "ARC", "MOV", "HEL", "CYC", "TLA", "TLO", "TLL", "TLR", "UNI", "MUL", "FRO")
-NUMBERS_OF_A_POINT = 3
 LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
 GEOMETRY = "points, tool axes and feeds alone"
 UNKNOWN, NO_CHANGE = "is not known", "changes nothing"
@@ -187,9 +186,8 @@ def look_up(name: str) -> MajorWord | None:
 def meaning_of(name: str) -> str:
     """The meaning of a word, for a list of the words used."""
     word = look_up(name)
-    if word is None:
-        return UNKNOWN
-    return f"{word.meaning}, not supported" if word.kind == REFUSED else word.meaning
+    meaning = word.meaning if word is not None else UNKNOWN
+    return f"{meaning}, not supported" if word is not None and word.kind == REFUSED else meaning
 
 
 def execute(state: CutterLocationState, statement: MajorStatement) -> None:
@@ -205,7 +203,7 @@ def execute(state: CutterLocationState, statement: MajorStatement) -> None:
         return
     other = LIKE_G_CODE.match(name) or (not count and " " in name)
     state.refuse_if(other, f"{statement.shown!r} is not a statement of a cutter-location file", "a word of APT's")
-    carries_point = count >= NUMBERS_OF_A_POINT and all(map(is_number, statement.words))
+    carries_point = count >= 3 and all(map(is_number, statement.words))
     moves = f"{statement.shown}: {name} {UNKNOWN}, and may move the tool"
     state.refuse_if(name.startswith(LIKE_MOTION) or carries_point, moves, GEOMETRY, "take the line out if it does not")
     state.note(f"{name} {UNKNOWN}, and not acted upon", doubtful=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.nc.codes.motion import know_height
-from toolpath_stiff.nc.codes.unsettled import know_place
+from toolpath_stiff.nc.codes.points import know_place
 from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -204,12 +204,6 @@ def _axis(axis: int) -> Callable[[Variables], float]:
     return lambda variables: variables.position(axis, shown, Place(variables.state.name, variables.line, 1))
 
 
-def _motion_mode(variables: Variables) -> float:
-    """LinuxCNC's G codes times ten; -10 without a motion mode."""
-    motion = variables.state.motion
-    return -10.0 if motion is None else round(10.0 * float(motion[1:]))
-
-
 def _plain(read: Callable[[State], float]) -> Callable[[Variables], float]:
     return lambda variables: float(read(variables.state))
 
@@ -221,7 +215,7 @@ PREDEFINED: dict[str, Callable[[Variables], float]] = {
     "_LINE": lambda variables: float(variables.line),
     "_CALL_LEVEL": lambda variables: float(len(variables.levels) - 1),
     "_REMAP_LEVEL": lambda variables: 0.0,
-    "_MOTION_MODE": _motion_mode,
+    "_MOTION_MODE": _plain(lambda state: round(10.0 * float((state.motion or "G-1")[1:]))),  # -10: none
     "_PLANE": _plain(lambda state: 10.0 * float(state.plane[1:])),
     "_METRIC": _plain(lambda state: not state.inch),
     "_IMPERIAL": _plain(lambda state: state.inch),

@@ -8,9 +8,10 @@ from toolpath_stiff.analysis.machine_check import MachineCheck
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.report.colours import BLUE
 from toolpath_stiff.report.pictures.style import Look, new_figure, panel
-from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m, pose_in_mm
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
 LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
