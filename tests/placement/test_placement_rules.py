@@ -274,12 +274,12 @@ def test_a_long_path_is_climbed_on_what_decides(monkeypatch):
 
 def test_a_search_asks_no_compiled_kernel(monkeypatch):
     """It amplifies the last digit: with and without numba it has to be the same kernel."""
-    from toolpath_stiff.stiffness import compiled
+    from toolpath_stiff.stiffness import core
 
     def never(*_, **__):
         raise AssertionError("compiled")
 
-    monkeypatch.setattr(compiled, "compliance_along_columns", never)
+    monkeypatch.setattr(core, "compiled_columns", never)
     monkeypatch.setattr("toolpath_stiff.stiffness.core.COMPILED_FROM", 200)
     here = np.array(PRESENT)
     searched(program_of("inch_bracket"), Bounds(here, here + 0.1 * np.eye(6)[2]))
