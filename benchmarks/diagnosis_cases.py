@@ -21,8 +21,8 @@ from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
+from toolpath_stiff.planning.result import plan_csv, plan_rows
 from toolpath_stiff.planning.rivals import rivals_of
-from toolpath_stiff.planning.rows import plan_csv, plan_rows
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
 from toolpath_stiff.rig import exercise

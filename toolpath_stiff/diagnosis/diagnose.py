@@ -31,8 +31,8 @@ from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import plan_measurements
+from toolpath_stiff.planning.result import plan_rows
 from toolpath_stiff.planning.rivals import rivals_of
-from toolpath_stiff.planning.rows import plan_rows
 from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
 from toolpath_stiff.readings.measurements import Readings
