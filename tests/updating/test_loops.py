@@ -7,7 +7,7 @@ import pytest
 
 from tests.stiffness.cases import nist
 from toolpath_stiff.comparison.compare import compare
-from toolpath_stiff.correction.document import residuals_csv
+from toolpath_stiff.correction.result import residuals_csv
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import diagnose

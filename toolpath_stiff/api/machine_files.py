@@ -121,4 +121,4 @@ def recover_geometry(
     1
     """
     recovery = recover(starts=starts, seed=seed)
-    return TextResult(recovery_text(recovery), recovery, f"the NIST geometry from {starts} starts")
+    return TextResult(recovery_text(recovery), dict(recovery), f"the NIST geometry from {starts} starts")

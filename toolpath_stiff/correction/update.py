@@ -9,7 +9,6 @@ from toolpath_stiff.correction.machines import data_hash
 from toolpath_stiff.correction.result import Update
 from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.correction.strut_law import (
-    BarCurve,
     bar_curve,
     leave_points_out,
     minimise_mean_error,
@@ -19,12 +18,10 @@ from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
-from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.fits import baseline
 from toolpath_stiff.inference.left_out import HeldOut
-from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.model import build_model, setup_of
 
 
@@ -54,8 +51,7 @@ def update(task: UpdateTask) -> Update:
                 "--objective mean-error is the paper's own estimation, of the strut law alone",
                 expected="--strut-law, without --add and --auto",
             )
-        task = replace(task, data=task.data.of_tip)
-        result = replace(update_by_mean_error(task), bars=_bars(task))
+        result = update_by_mean_error(replace(task, data=task.data.of_tip))
     else:
         result = build_ladder(task)
     # Where its results go does not matter to the command that repeats the fit.
@@ -64,7 +60,30 @@ def update(task: UpdateTask) -> Update:
         force=task.force, objective=task.objective if task.objective == MEAN_ERROR else None, seed=task.seed or None,
     )  # fmt: skip
     result = replace(result, provenance=_provenance(result, request.command("update", *words)))
-    return result if result.corrected is None else replace(result, next=_next(result.corrected, task, request))
+    if result.corrected is None:
+        return result
+    # An effect that belongs to a set-up acts only where that is named.
+    setups = filter(None, map(setup_of, build_model(result.corrected, task.effect_files).effects))
+    shown = options(machine=task.machine_file, effects=list(task.effect_files), setup=next(setups, None))
+    compare = hint("what is left", request.command("compare", machine=task.machine_file))
+    also = "the stiffness over the workspace (analyze, place and pose take the same options)"
+    return replace(result, next=[compare, hint(also, command_line("map", *shown))])
+
+
+def _provenance(update: Update, command: str) -> Document:
+    """Where the fitted values come from. No date: the same data and command give the same bytes."""
+    last = update.last
+    return {
+        **({} if update.described is None else {"described": f"not confirmed: {update.described.reason}"}),
+        "data": list(update.task.files),
+        "data_sha256": data_hash(update.task.files),
+        "readings": len(update.task.data),
+        "command": command,
+        "noise": update.noise.origin,
+        "mean_error_before_percent": round(100.0 * update.steps[0].error, 3),
+        "mean_error_after_percent": round(100.0 * last.error, 3),
+        "left_out_error_after_percent": round(100.0 * last.held.mean_error, 3),
+    }
 
 
 def update_by_mean_error(task: UpdateTask) -> Update:
@@ -72,54 +91,20 @@ def update_by_mean_error(task: UpdateTask) -> Update:
 
     Noise is for the noise floor only: the objective does not know of it. Raises `InputError` as `minimise_mean_error`.
     """
-    noise, problem = task.problem()
-    predictor, say, data = problem.predictor, task.progress, task.data
+    predictor, say, data = task.problem.predictor, task.progress, task.data
     say("searching from several starts")
     search = minimise_mean_error(predictor, task.seed)
-    (as_given, law_refitted), law = baseline(problem), search.law
+    (as_given, law_refitted), law = baseline(task.problem), search.law
     say("leaving points out, drawing points anew")
     modelled = predictor.log_stiffness(law)
     last = Fit(
-        (), (), (), law, problem.observed - modelled, predictor.law_columns(modelled, law),
-        resampled_covariance(predictor, law, task.seed), problem.scatter,
+        (), (), (), law, task.problem.observed - modelled, predictor.law_columns(modelled, law),
+        resampled_covariance(predictor, law, task.seed), task.problem.scatter,
     )  # fmt: skip
     left_out = HeldOut(leave_points_out(predictor, law), np.zeros((0, 2)), data.point)
     steps = LadderStep.of(AS_GIVEN, as_given, data), LadderStep.of("strut law by mean error", last, data, left_out)
-    refitted = LadderStep.of(LAW_REFITTED, law_refitted, data)
-    return Update(task, noise, problem, steps, refitted, question=question(predictor), search=search)
-
-
-def _provenance(update: Update, command: str) -> Document:
-    """Where the fitted values come from. No date: the same data and command give the same bytes."""
-    described = {} if update.described is None else {"described": f"not confirmed: {update.described.reason}"}
-    return {
-        **described,
-        "data": list(update.task.files),
-        "data_sha256": data_hash(update.task.files),
-        "readings": len(update.task.data),
-        "command": command,
-        "noise": update.noise.origin,
-        "mean_error_before_percent": round(100.0 * update.steps[0].error, 3),
-        "mean_error_after_percent": round(100.0 * update.last.error, 3),
-        "left_out_error_after_percent": round(100.0 * update.last.held.mean_error, 3),
-    }
-
-
-def _next(updated: Hexapod, task: UpdateTask, request: Asked) -> list[str]:
-    """Commands that use the new machine; an effect that belongs to a set-up acts only where that is named."""
-    model, file = build_model(updated, task.effect_files), task.machine_file
-    setups = [name for active in model.effects if (name := setup_of(active))]
-    shown = options(machine=file, effects=list(task.effect_files), setup=setups[0] if setups else None)
-    also = " (analyze, place and pose take the same options)"
-    return [
-        hint("what is left", request.command("compare", machine=file)),
-        hint(f"the stiffness over the workspace{also}", command_line("map", *shown)),
-    ]
-
-
-def _bars(task: UpdateTask) -> BarCurve | None:
-    """The paper's Figure 3; None where the machine carries bars as an effect."""
-    if any(entry.name == "platform_flexibility" for entry in task.machine.effects):
-        return None
-    task.progress("the platform's bars, soft to rigid")
-    return bar_curve(task.machine, task.data, seed=task.seed, starts=1)
+    bars = None
+    if not any(entry.name == "platform_flexibility" for entry in task.machine.effects):
+        say("the platform's bars, soft to rigid")
+        bars = bar_curve(task.machine, data, seed=task.seed, starts=1)
+    return Update(task, steps, LadderStep.of(LAW_REFITTED, law_refitted, data), search=search, bars=bars)

@@ -47,6 +47,16 @@ if TYPE_CHECKING:
 FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect and a few to spare
 
 
+def check_measured(data: Readings, purpose: str, fewest: int = FEWEST) -> None:
+    """Raise `InputError` where readings are too few, or some have no stiffness."""
+    lacking = int(np.isnan(data.stiffness).sum())
+    if len(data) < fewest or lacking:
+        raise InputError(
+            f"{len(data)} readings, {lacking} without a stiffness",
+            expected=f"at least {fewest} measured stiffnesses {purpose}",
+        )
+
+
 def diagnose(
     machine: Hexapod,
     data: Readings,
@@ -88,11 +98,7 @@ def diagnose(
     >>> found.verdict
     'ambiguous'
     """
-    if len(data.of_tip) < FEWEST or np.isnan(data.stiffness).any():
-        raise InputError(
-            f"{len(data.of_tip)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
-            expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
-        )
+    check_measured(data.of_tip, "to diagnose from")
 
     def judged(data: Readings) -> Judged:
         predictor, judgements = Predictor(machine, data, effect_files), {}

@@ -180,17 +180,16 @@ def odds_words(probability: float, best: float) -> str:
     return next((words for limit, words in limits if twice < limit or twice <= 0.0), "strongly disfavoured")
 
 
-def fitted_sizes(fit: Fit, family: Family | None = None) -> dict[str, dict[str, FittedSize]]:
-    """Effect -> key -> value, unit, 95 % interval of all effects of a fit."""
+def fitted_sizes(fit: Fit, family: Family | None = None, widening: float = 1.0) -> dict[str, dict[str, FittedSize]]:
+    """Effect -> key -> value, unit, 95 % interval of all effects of a fit, with standard deviations so much wider."""
     sizes: dict[str, dict[str, FittedSize]] = {}
     index = 0
     for candidate, values in zip(fit.candidates, fit.sizes, strict=True):
         entries = sizes.setdefault(candidate.name, {})
         for component, size in zip(candidate.components, values.tolist(), strict=True):
             parameter = component.parameter
-            low, high = sorted(
-                component.value(end) / parameter.si for end in interval(fit, index, component, size, family)
-            )
+            ends = interval(fit, index, component, size, family, widening)
+            low, high = sorted(component.value(end) / parameter.si for end in ends)
             value = json_number(component.value(size) / parameter.si)
             entries[parameter.key] = FittedSize(value, parameter.unit, (json_number(low), json_number(high)))
             index += 1
@@ -198,7 +197,7 @@ def fitted_sizes(fit: Fit, family: Family | None = None) -> dict[str, dict[str, 
 
 
 def interval(
-    fit: Fit, index: int, component: Component, size: float, family: Family | None = None
+    fit: Fit, index: int, component: Component, size: float, family: Family | None, widening: float
 ) -> tuple[float, float]:
     """95 % interval of a size, within the bounds.
 
@@ -216,7 +215,7 @@ def interval(
         return low, high
     averaged = None if family is None else averaged_interval(family, index)
     if index in fit.free:
-        reach = NORMAL_95 * fit.deviation(index)
+        reach = NORMAL_95 * widening * fit.deviation(index)
         low, high = (-reach, reach) if averaged is None or best is None else averaged - float(best.sizes[0][index])
         low, high = size + min(float(low), 0.0), size + max(float(high), 0.0)
         near = TOUCHES * (high - low)
