@@ -19,10 +19,10 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import VERDICTS as CASES
 from tests.updating.cases import campaign, diagnosed, examined, table_1
 from toolpath_stiff.comparison.compare import Comparison, compare
-from toolpath_stiff.correction import ladder
-from toolpath_stiff.correction.ladder import build_ladder
+from toolpath_stiff.correction import update as ladder
 from toolpath_stiff.correction.result import Update, residuals_csv
 from toolpath_stiff.correction.task import UpdateTask
+from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.diagnosis import words as verdict_words
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.rows import odds_words

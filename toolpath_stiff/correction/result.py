@@ -28,7 +28,7 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.sizes import joined
-from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -261,14 +261,8 @@ class Update(FolderResult):
         }
         if (search := self.search) is None:
             return document
-        given = n_per_um_from_n_per_m(np.array([law.stiffness_1, law.stiffness_2]))
-        figures = {
-            "starts_N_per_um": np.round(given * np.exp(search.starts), 3).tolist(),
-            "ends_N_per_um": np.round(given * np.exp(search.ends), 3).tolist(),
-            "end_errors_percent": np.round(100.0 * search.end_errors, 4).tolist(),
-            "agreeing": search.agreeing,
-        }
-        return {**document, "search": figures}
+        errors = np.round(100.0 * search.end_errors, 4).tolist()
+        return {**document, "search": {"end_errors_percent": errors, "agreeing": search.agreeing}}
 
     @property
     def text(self) -> str:

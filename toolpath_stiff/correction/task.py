@@ -72,8 +72,3 @@ class UpdateTask:
     def problem(self) -> Problem:
         """Model and scatter."""
         return Problem.of(Predictor(self.machine, self.data, self.effect_files), self.noise_model)
-
-    @property
-    def law_free(self) -> bool:
-        """True where the strut law is fitted along."""
-        return not self.keep_strut_law
