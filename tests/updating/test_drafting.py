@@ -121,7 +121,7 @@ def test_every_kind_of_term_that_a_portrait_may_choose_can_be_written(some_path,
     dictionary = dictionary_of(Ground(predictor, np.exp(-predictor.log_stiffness()), np.zeros(2)))
     kinds = {
         (t.action, t.variable, t.shape, bool(t.where), t.column, t.direction, *(name for name, _ in t.at)): t
-        for t in (entry.term for entry in dictionary.entries)
+        for t in dictionary.terms
         if t.acts
     }
     assert len(kinds) > 30

@@ -23,11 +23,7 @@ from toolpath_stiff.stiffness.terms import Term
 # Odds beyond which what fits worse is not the same (strong evidence: Kass and Raftery 1995). A term that is one of many
 # constants or places must fit better than the plainest ones by as much as its prior weight is smaller.
 AS_WELL = float(np.log(20.0))
-
-
 ITSELF = 0.99  # correlation from which a term of the same link is the named effect itself
-
-
 MOST_TOLD, TOLD = 6, 0.03  # terms that are told, and the least share of one
 
 
@@ -63,19 +59,18 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
     if len(named.candidates) != 1:  # no single term stands for two effects
         return None
     selection = Selection(problem, base, noise, seed)
-    if not len(selection.dictionary):
+    if not selection.dictionary.terms:
         return None
     # Both under the scatter of the named fit, so that wild readings count alike.
     start = selection.start
     start = replace(start, fit=replace(start.fit, scatter=named.scatter))
-    entries = selection.finalists(selection.scores(start))
-    if not entries:
+    priors = selection.finalists(start)
+    if not priors:
         return None
-    terms = [entry.term for entry in entries]
+    terms, prior = list(priors), np.array(list(priors.values()))
     sizes = selection.together(start, terms)
     squares = float(start.fit.scatter.precision.squares(named.residual))
     reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2) - _freedom(problem, named)
-    prior = np.array([entry.log_prior for entry in entries])
     plainest = float(selection.dictionary.log_prior.max())
     same = (sizes.posterior + prior - plainest >= reached - AS_WELL) & (np.abs(sizes.size[:, -1]) > 0.0)
     change = np.exp(named.residual - problem.observed) - problem.predictor.strut_part(named.law) - problem.rest

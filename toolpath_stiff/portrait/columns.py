@@ -139,7 +139,7 @@ def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
         moves["crest"] = constants["crest"] + finer * constants["period"] / (2 * PHASES) * about
     begins = "from" if "from" in constants else "start"
     if "end" in constants:  # where it begins; its end is a matter of scale
-        if begins == "start" and len(term.signs) > 1:
+        if begins == "start" and term.signed:
             return []
         moves = {begins: np.clip(moves[begins], low - step, high + step)}
     near = []
@@ -277,7 +277,7 @@ class Ground:
     def shape(self, term: Term) -> FloatArray:
         """(n,) or (n, 6) of what a term depends on."""
         values = self.values(term.variable, term.column)
-        first = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
+        first = shape_values(term.shape, values, term.constants, term.signed)
         if term.times is None:
             return first
         return multiplied(first, factor_values(term.times, self.values(term.times.variable, term.times.column)))

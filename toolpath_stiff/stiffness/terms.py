@@ -236,9 +236,9 @@ class Term:
         return ACTIONS[self.action].bounds
 
     @property
-    def signs(self) -> tuple[float, ...]:
-        """To which sides the size may go."""
-        return (1.0,) if self.bounds[0] >= 0.0 else (-1.0, 1.0)
+    def signed(self) -> bool:
+        """Whether the size may go to both sides."""
+        return self.bounds[0] < 0.0
 
     @property
     def acts(self) -> bool:
@@ -304,7 +304,7 @@ def shaped(term: Term, path: LoadPath) -> FloatArray:
     What varies from strut to strut belongs to a single strut where the term has one.
     """
     values = variable_values(term.variable, path, term.column)
-    first = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
+    first = shape_values(term.shape, values, term.constants, term.signed)
     if term.times is None:
         return first
     return multiplied(first, factor_values(term.times, variable_values(term.times.variable, path, term.times.column)))
@@ -326,7 +326,7 @@ def multiplied(first: FloatArray, second: FloatArray) -> FloatArray:
 def formula(term: Term, size: str) -> str:
     """What a term adds, its size and its constants by name."""
     along = f" along {term.direction}" if term.link == "instrument" and term.direction in AXES else ""
-    return f"{ACTIONS[term.action].equation.format(size)}{along}, s = {_share_formula(term, len(term.signs) > 1)}"
+    return f"{ACTIONS[term.action].equation.format(size)}{along}, s = {_share_formula(term, term.signed)}"
 
 
 def _share_formula(term: Term, signed: bool) -> str:
