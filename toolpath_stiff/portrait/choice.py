@@ -141,17 +141,13 @@ def _leading_first(selection: Selection, description: Description) -> Descriptio
     return selection.refitted(description, [description.terms[k] for k in order])
 
 
-def temper(selection: Selection, description: Description, gain: float) -> float:
-    """By how much less a likelihood is to be trusted where shapes are rough, for a gain in log likelihood."""
-    squares = float(description.fit.scatter.precision.squares(description.fit.residual))
-    left = squares / max(len(selection.compliance) - 2 - len(description.terms), 1)
-    return ROUGH * max(left, 1.0) + SHAPE * max(gain, 0.0)
-
-
 def weigh(selection: Selection, descriptions: Sequence[Description], threshold: float) -> list[Leading]:
     """What may be the leading term, over descriptions, the chosen one first; with posterior probabilities."""
     costs = [_costs(selection, description) for description in descriptions]
-    flat = temper(selection, descriptions[0], float(costs[0].max()))
+    # By how much less a likelihood is to be trusted where shapes are rough, for a gain in log likelihood.
+    fit, free = descriptions[0].fit, len(selection.compliance) - 2 - len(descriptions[0].terms)
+    left = float(fit.scatter.precision.squares(fit.residual)) / max(free, 1)
+    flat = ROUGH * max(left, 1.0) + SHAPE * max(float(costs[0].max()), 0.0)
     worths = np.array([whole.posterior / flat - 0.5 * threshold * _searched(whole) for whole in descriptions])
     leading: list[tuple[Term, float, bool]] = []
     for number, (description, cost) in enumerate(zip(descriptions, costs, strict=True)):

@@ -61,8 +61,7 @@ class Local:
 
 def locals_of(extra: Iterable[str]) -> list[Local]:
     """Every link with its places and directions; `extra`: names of further columns, which instruments may feel."""
-    further = tuple(extra)
-    whole = (*WHOLE, *further)
+    whole = (*WHOLE, *extra)
     base, turning = ("X", "Y", "Z", "horizontal", "all"), ("X", "Y", "all", "tangential")
     return [
         Local("instrument", "reading factor", "reading", None, (*PLACE, *whole[1:], "tilt")),
@@ -87,47 +86,46 @@ def locals_of(extra: Iterable[str]) -> list[Local]:
     ]
 
 
-def _of_head(link: str, whole: tuple[str, ...]) -> Iterator[Local]:
+def _of_head(link: str, whole: tuple[str, ...]) -> list[Local]:
     """Tool or platform: gives across and along its axis, and tips about the middle of the joints."""
-    for direction in ("radial", "axial", "X", "Y", "all"):
-        yield Local(link, "give", direction, None, (*whole, "tilt"))
-    for direction in ("radial", "X", "Y"):
-        yield Local(link, "tilting", direction, None, ("constant", "load", "tilt"))
+    return [
+        *(Local(link, "give", direction, None, (*whole, "tilt")) for direction in ("radial", "axial", "X", "Y", "all")),
+        *(Local(link, "tilting", direction, None, ("constant", "load", "tilt")) for direction in ("radial", "X", "Y")),
+    ]
 
 
 def _of_vertices(link: str, directions: Iterable[str], variables: tuple[str, ...]) -> Iterator[Local]:
     """The vertices of frame or platform, all together or one alone."""
-    for direction in directions:
-        for where in ALL_VERTICES:
-            variables_here = ("constant", "load") if where else variables
-            yield Local(link, "vertex", direction, where, variables_here, crossed=variables if where else ())
+    for direction, where in product(directions, ALL_VERTICES):
+        if where is None:
+            yield Local(link, "vertex", direction, where, variables)
+        else:
+            yield Local(link, "vertex", direction, where, ("constant", "load"), crossed=variables)
 
 
 def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
     """Joints: they give along their strut or along a pin of their cross, resist turning, or stand off their place."""
+    forces = ("strut force", "force sign")
     for where in ALL_STRUTS:
-        forces = ("strut force", "force sign")
         variables = ("constant", "load", "temperature", *forces) if where else (*whole, *forces, "tilt")
         yield Local("joints", "strut", "along the struts", where, variables, crossed=(*whole, *forces, "tilt"))
         turning = ("constant",) if where else ("constant", "load", "tilt")
         yield Local("joints", "turning", "all", where, turning, crossed=(*whole, "tilt"))
         for action, direction in product(PINS, ("radial", "tangential")):
             yield Local("joints", action, direction, where, ("constant",), crossed=variables)
-    for axis in "XYZ":
-        for where in ALL_STRUTS[1:]:
-            for end in ("frame", "platform"):
-                yield Local("joints", "joint offset", axis, where, ("constant",), column=end)
+    for axis, where, end in product("XYZ", ALL_STRUTS[1:], ("frame", "platform")):
+        yield Local("joints", "joint offset", axis, where, ("constant",), column=end)
 
 
-def _of_struts(whole: tuple[str, ...]) -> Iterator[Local]:
+def _of_struts(whole: tuple[str, ...]) -> list[Local]:
     """Struts: their own share of the strut law, all together or one alone, and what couples two of them."""
-    variables = (*whole[1:], "strut length", "strut force", "force sign", *PLACE)
-    yield Local("struts", "strut factor", "along the struts", None, (*variables, "tilt"))
-    for first, second in combinations(range(1, 7), 2):
-        constants = (("first", float(first)), ("second", float(second)))
-        yield Local("struts", "coupling", "along the struts", None, ("constant",), constants=constants)
-    for where in ALL_STRUTS[1:]:
-        yield Local("one strut", "strut factor", "along the struts", where, ("constant", *variables))
+    variables, along = (*whole[1:], "strut length", "strut force", "force sign", *PLACE), "along the struts"
+    pairs = [(("first", float(first)), ("second", float(second))) for first, second in combinations(range(1, 7), 2)]
+    return [
+        Local("struts", "strut factor", along, None, (*variables, "tilt")),
+        *(Local("struts", "coupling", along, None, ("constant",), constants=pair) for pair in pairs),
+        *(Local("one strut", "strut factor", along, where, ("constant", *variables)) for where in ALL_STRUTS[1:]),
+    ]
 
 
 @dataclass(frozen=True)
@@ -238,9 +236,9 @@ def products(term: Term, ground: Ground) -> list[Term]:
         if variable in (*ONCE, term.variable):
             continue
         for column in columns_of(variable, ground, local.link == "joints"):
-            named = ground.shapes(variable, column, False, local.where)[0]
-            factors = (Factor(variable, shape, constants, column) for shape, constants in named if shape != "periodic")
-            terms += [replace(term, times=factor) for factor in factors]
+            for shape, constants in ground.shapes(variable, column, False, local.where)[0]:
+                if shape != "periodic":
+                    terms.append(replace(term, times=Factor(variable, shape, constants, column)))
     return terms
 
 

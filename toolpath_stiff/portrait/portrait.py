@@ -100,12 +100,12 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portr
             held_out_rms=held_out(start.fit, points).rms, noise_floor=noise_floor(selection, start),
             before=base.residual, after=start.fit.residual,
         )  # fmt: skip
-    leading = description.terms[0]
+    leading, links = description.terms[0], fewest(summed(leads, lambda term: term.link))
     values = selection.ground.values(leading.variable, leading.column)
     return Portrait(
         terms=tuple(_sized(selection.ground, description, k) for k in range(len(description.terms))),
-        links=_honest(summed(leads, lambda term: term.link), MOST_LINKS),
-        variables=_honest(summed(leads, lambda term: term.variable), MOST_VARIABLES, cut=True),
+        links=links if len(links) <= MOST_LINKS else (),
+        variables=fewest(summed(leads, lambda term: term.variable))[:MOST_VARIABLES],
         alike=_alike(selection, description, leads),
         explained=_explained(selection, start, description),
         error=float(description.fit.errors.mean()),
@@ -125,12 +125,6 @@ def _sized(ground: Ground, description: Description, k: int, probability: float 
     reach = defaults.NORMAL_95 * float(np.sqrt(max(description.fit.covariance[2 + k, 2 + k], 0.0))) / scale
     interval = max(term.size - reach, low), min(term.size + reach, high)
     return Sized(term, interval, abs(term.size) * scale, probability)
-
-
-def _honest(summed: Sequence[tuple[str, float]], most: int, cut: bool = False) -> tuple[tuple[str, float], ...]:
-    """The fewest that hold most of the probability; where these are more than `most`, none, or the first if `cut`."""
-    names = fewest(summed)
-    return names[:most] if cut or len(names) <= most else ()
 
 
 def _alike(selection: Selection, description: Description, leads: Sequence[Leading]) -> tuple[Sized, ...]:
@@ -169,9 +163,10 @@ def noise_floor(selection: Selection, description: Description) -> float:
     weighted = precision.times(jacobian.T)
     inverse = np.linalg.pinv(weighted @ jacobian + law_prior(len(weighted)), hermitian=True)
     points = selection.problem.predictor.data.point
-    squares = []
-    for draw in draws:
+
+    def left_out(draw: FloatArray) -> FloatArray:
         moved = inverse @ (weighted @ draw)
         fit = replace(description.fit, residual=draw - jacobian @ moved, law=moved[:2])
-        squares.append(float(np.mean(held_out(fit, points).residual ** 2)))
-    return float(np.sqrt(np.mean(squares)))
+        return held_out(fit, points).residual
+
+    return float(np.sqrt(np.mean([np.mean(left_out(draw) ** 2) for draw in draws])))

@@ -18,7 +18,7 @@ from toolpath_stiff.inference.gates import set_wild_aside, simulate
 from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.noise import Noise, Scatter
 from toolpath_stiff.portrait.columns import Ground, shapes_near
-from toolpath_stiff.portrait.dictionary import Dictionary, crossed, dictionary_of, products
+from toolpath_stiff.portrait.dictionary import crossed, dictionary_of, products
 from toolpath_stiff.stiffness.terms import Factor, Term
 
 DRAWS = 200  # simulated campaigns
@@ -86,8 +86,8 @@ class Selection:
     ----------
     compliance, rest
         (n,) m/N of the base fit; what of it the struts do not contribute.
-    ground
-        What columns are made from.
+    ground, dictionary
+        What columns are made from; all terms.
     """
 
     def __init__(self, problem: Problem, base: Fit, noise: Noise, seed: int) -> None:
@@ -95,11 +95,7 @@ class Selection:
         self.compliance = np.exp(base.residual - problem.observed)
         self.rest = self.compliance - problem.predictor.strut_part(base.law)
         self.ground = Ground(problem.predictor, self.compliance, base.law)
-
-    @cached_property
-    def dictionary(self) -> Dictionary:
-        """All terms."""
-        return dictionary_of(self.ground)
+        self.dictionary = dictionary_of(self.ground)
 
     @property
     def start(self) -> Description:
