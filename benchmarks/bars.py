@@ -1,7 +1,5 @@
 """Figures on blind cases: shares with Wilson intervals, means, medians, each against its bar."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,19 +32,7 @@ def wilson(count: int, of: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Figure:
-    """One line of the table of bars.
-
-    Attributes
-    ----------
-    layout, what
-        Of which cases, and what was counted.
-    value, interval
-        As text.
-    bar
-        As text; "" where the issue sets none.
-    cleared
-        None where there is no bar.
-    """
+    """One line of the table of bars, as text: of which cases, what was counted; `bar` "" and `cleared` None if none."""
 
     layout: str
     what: str

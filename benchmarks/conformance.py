@@ -9,11 +9,10 @@ refuse with file and line; never another path. Both take the program for LinuxCN
 if one differs.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -22,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from benchmarks.pages import write_page
+from benchmarks.pages import table, write_page
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
@@ -49,11 +48,6 @@ class Row:
     verdict: str
     linuxcnc: str
     builtin: str
-
-    @property
-    def runs(self) -> bool:
-        """Whether LinuxCNC's interpreter ran it to the end."""
-        return self.linuxcnc in ("read", NONE)
 
 
 def installed_programs() -> list[Path]:
@@ -147,28 +141,24 @@ def difference(one: ReadProgram, two: ReadProgram) -> float:
 
 def held_against(file: Path, control: Controller, rs274: str | None = None) -> Row:
     """Read one program by both."""
-    name = f"{file.parent.name}/{file.name}"
-    theirs, said = read(file, control, "linuxcnc", rs274)
+    theirs, heard = read(file, control, "linuxcnc", rs274)
     ours, answer = read(file, control, "builtin", rs274)
-    verdict = _without_a_path(file, theirs, said, ours, answer)
-    if verdict or ours is None or theirs is None:
-        return Row(name, verdict, said.removeprefix(f"{file.name}:"), answer.removeprefix(f"{file.name}:"))
-    apart = difference(ours, theirs)
-    cuts = len(feed_path(ours))
-    detail = f"{cuts} moves, {apart:.4f} apart" if np.isfinite(apart) else f"{cuts} moves, another path"
-    return Row(name, SAME if apart <= TOLERANCE else OTHER, said, detail)
+    verdict, detail = judged(file.name, theirs, heard, ours, answer)
+    name = f"{file.parent.name}/{file.name}"
+    return Row(name, verdict, *(words.removeprefix(f"{file.name}:") for words in (heard, detail)))
 
 
-def _without_a_path(file: Path, theirs: ReadProgram | None, said: str, ours: ReadProgram | None, answer: str) -> str:
-    """The verdict where one of them has no path to compare; "" if both have."""
+def judged(name: str, theirs: ReadProgram | None, heard: str, ours: ReadProgram | None, answer: str) -> tuple[str, str]:
+    """The verdict on a file, and what is to be said of the built-in reader."""
     if ours is not None and theirs is not None:
-        return ""
+        apart = difference(ours, theirs)
+        return SAME if apart <= TOLERANCE else OTHER, f"{len(feed_path(ours))} moves, {apart:.4f} apart"
     if ours is None and answer != NONE:
-        return REFUSED if answer.startswith(f"{file.name}:") else OTHER
-    if ours is None and said == NONE:
-        return NONE
+        return REFUSED if answer.startswith(f"{name}:") else OTHER, answer
+    if ours is None and heard == NONE:
+        return NONE, answer
     # One has a path; without one the other must have refused, not run to the end.
-    return OTHER if theirs is not None or said == NONE else UNCHECKED
+    return OTHER if theirs is not None or heard == NONE else UNCHECKED, answer
 
 
 def read(file: Path, control: Controller, interpreter: str, rs274: str | None) -> tuple[ReadProgram | None, str]:
@@ -182,27 +172,21 @@ def read(file: Path, control: Controller, interpreter: str, rs274: str | None) -
         return None, str(error)
 
 
-def table(rows: list[Row]) -> str:
+def page(rows: list[Row]) -> str:
     """The document."""
-    ran = [row for row in rows if row.runs]
+    ran = [row for row in rows if row.linuxcnc in ("read", NONE)]
     counts = Counter(row.verdict for row in ran)
-    lines = [
-        "# Conformance with LinuxCNC's interpreter",
-        "",
+    cells = ((row.name, row.verdict, cell(row.linuxcnc), cell(row.builtin)) for row in rows)
+    return "\n".join([
+        "# Conformance with LinuxCNC's interpreter", "",
         f"{len(rows)} programs, of which `rs274` runs {len(ran)} to the end: "
         f"{counts[SAME]} same feed path, {counts[NONE]} without a feed path for both, {counts[REFUSED]} refused by the "
         f"built-in reader, {counts[OTHER]} with another path. Within {TOLERANCE} mm and degrees, in both directions.",
-        "",
-        "| program | verdict | LinuxCNC's interpreter | built-in reader |",
-        "| --- | --- | --- | --- |",
-        *(f"| {row.name} | {row.verdict} | {cell(row.linuxcnc)} | {cell(row.builtin)} |" for row in rows),
-        "",
+        "", *table("program | verdict | LinuxCNC's interpreter | built-in reader", cells), "",
         "Made by `python -m benchmarks.conformance linuxcnc-*/ --out benchmarks/conformance.md` after `apt-get source "
         "linuxcnc` (Debian 12: 2.9.0~pre1): every program of LinuxCNC's repository. *Not checked*: LinuxCNC's "
-        "interpreter refuses what the built-in reader takes (user M codes, which that lists with a warning).",
-        "",
-    ]
-    return "\n".join(lines)
+        "interpreter refuses what the built-in reader takes (user M codes, which that lists with a warning).", "",
+    ])  # fmt: skip
 
 
 def cell(text: str) -> str:
@@ -221,8 +205,6 @@ def measure(files: Iterable[Path], folder: Path, rs274: str | None = None) -> li
 
 def main() -> int:
     """Print the table; the exit code is 1 if a path differs."""
-    import tempfile
-
     parser = argparse.ArgumentParser(prog="python -m benchmarks.conformance", description=__doc__)
     parser.add_argument("programs", nargs="*", metavar="FILE|FOLDER", help="default: those of Debian's linuxcnc-uspace")
     parser.add_argument("--rs274", metavar="PATH", help="LinuxCNC's interpreter, if it is not on PATH")
@@ -233,7 +215,7 @@ def main() -> int:
         parser.error(f"no programs; install {PACKAGE}, or name files")
     with tempfile.TemporaryDirectory() as folder:
         rows = measure(files, Path(folder), args.rs274)
-    text = table(rows)
+    text = page(rows)
     print(text)
     if args.out:
         write_page(args.out, text)

@@ -6,8 +6,6 @@ without what the draft was read off, so that it says nothing true of them. `nois
 noise is stated half as large as it is, so that the draft is read off scatter.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence
@@ -18,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bars import Figure, Record, share
-from benchmarks.case_loop import document, record_of, run_benchmark, run_cases, sound
+from benchmarks.case_loop import document, record_of, run_benchmark, sound
 from benchmarks.diagnosis_cases import machine
 from benchmarks.pages import table
 from toolpath_stiff.correction.draft import draft
@@ -152,10 +150,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--noise-cases", type=int, default=8, help="drafts of noise (default: 8)")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
 
-    def make_records(args: argparse.Namespace) -> list[Record]:
-        return run_cases(args, "drafted", run, make_jobs(args.first_seed, args.cases, args.noise_cases))
-
-    return run_benchmark(parser, arguments, make_records, report, records=RECORDS, out=OUT)
+    return run_benchmark(
+        parser, arguments, lambda args: make_jobs(args.first_seed, args.cases, args.noise_cases), run, report,
+        records=RECORDS, out=OUT,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

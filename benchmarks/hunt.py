@@ -5,8 +5,6 @@ The feed path must be the same (0.01 mm and degrees, move by move). Prints how m
 both read differently; exit code 1 if there is one.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import re
@@ -21,7 +19,7 @@ import numpy as np
 
 from benchmarks.hunt_compensation import Beside, Tolerances
 from benchmarks.hunt_programs import Cam, Harsh, Parametric, Zeros
-from benchmarks.pages import write_page
+from benchmarks.pages import table, write_page
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc.codes.code import code_name
@@ -177,7 +175,7 @@ def main() -> int:
             counts[outcome.verdict if outcome else WITHHELD] += 1
             if outcome and outcome.verdict == OTHER:
                 print(f"seed {seed}: {outcome.detail}\n{outcome.text}\n")
-    text = table(counts, args.programs, args.seed)
+    text = page(counts, args.programs, args.seed)
     print(text)
     if args.out:
         write_page(args.out, text)
@@ -191,27 +189,18 @@ def codes_of(text: str) -> set[str]:
     return codes | {letter for letter in "FST" if letter in bare}
 
 
-def table(counts: Counter[str], programs: int, seed: int) -> str:
+def page(counts: Counter[str], programs: int, seed: int) -> str:
     """The document."""
-    rows = [f"| {verdict} | {counts[verdict]} |" for verdict in VERDICTS if counts[verdict] or verdict == OTHER]
-    command = f"python -m benchmarks.hunt --programs {programs} --seed {seed} --out benchmarks/hunt.md"
-    return "\n".join(
-        [
-            "# Random programs through both readers",
-            "",
-            f"{programs} random programs, of the seeds {seed} to {seed + programs - 1}: of lines at odds with each "
-            "other, as CAM writes them, with variables and flow, contours under cutter compensation, arcs at the "
-            "tolerance. A line that one of the readers refuses is left out; the feed paths must agree within "
-            f"{TOLERANCE} mm and degrees, move by move.",
-            "",
-            "| what became of it | programs |",
-            "| --- | --- |",
-            *rows,
-            "",
-            f"Made by `{command}`.",
-            "",
-        ]
+    what = (
+        f"{programs} random programs, of the seeds {seed} to {seed + programs - 1}: of lines at odds with each other, "
+        "as CAM writes them, with variables and flow, contours under cutter compensation, arcs at the tolerance. A "
+        "line that one of the readers refuses is left out; the feed paths must agree within "
+        f"{TOLERANCE} mm and degrees, move by move."
     )
+    rows = [(verdict, counts[verdict]) for verdict in VERDICTS if counts[verdict] or verdict == OTHER]
+    made = f"Made by `python -m benchmarks.hunt --programs {programs} --seed {seed} --out benchmarks/hunt.md`."
+    head = ["# Random programs through both readers", "", what, ""]
+    return "\n".join([*head, *table("what became of it | programs", rows), "", made, ""])
 
 
 KINDS = (Harsh, Zeros, Harsh, Cam, Parametric, Beside, Tolerances)

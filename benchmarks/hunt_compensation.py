@@ -1,7 +1,5 @@
 """Random contours under cutter compensation, and arcs whose radii differ by about LinuxCNC's tolerance, for `hunt`."""
 
-from __future__ import annotations
-
 import math
 
 from benchmarks.hunt_programs import Harsh

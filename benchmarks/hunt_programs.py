@@ -2,8 +2,6 @@
 
 # ruff: noqa: SIM905 (long lists of words are easier to read as one text)
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 
@@ -46,6 +44,7 @@ ODDITIES = (
     "G20 F20|S5 M3 G1 X1 F9|M9 X3 M5|G1 M8 X2 M3 Y4|:100|:5 X1|O5 X1|O<a>|o1 call|M01 X5|m02|G28 X0|G28 Z5 X1|G30 A5|"
     "G28.1 X1|!|~|?|X1 'a'|&|{1}|X1;Y2|X1%|% X1|%%|%foo|% (c)|%;c| %|X1 y2 ;%"
 ).split("|")
+OPERATORS = " + |-|*| * |/| MOD |**| EQ | NE | GT |GE| LT |LE| AND | OR | XOR ".split("|")
 POINTS = ((5, 0), (0, 5), (3, 4), (-4, 3), (0, -5), (-5, 0), (4, -3), (-3, -4))  # on a circle of 5
 PLANES = (("G17", "X", "Y", "Z"), ("G18", "Z", "X", "Y"), ("G19", "Y", "Z", "X"))
 CENTER = {"X": "I", "Y": "J", "Z": "K"}
@@ -394,26 +393,7 @@ class Parametric(Harsh):
         count = self.random.choice([1, 2, 2, 3, 4])
         text = self.value(inner)
         for _ in range(count - 1):
-            text += self.one(
-                *[
-                    " + ",
-                    "-",
-                    "*",
-                    " * ",
-                    "/",
-                    " MOD ",
-                    "**",
-                    " EQ ",
-                    " NE ",
-                    " GT ",
-                    "GE",
-                    " LT ",
-                    "LE",
-                    " AND ",
-                    " OR ",
-                ],
-                *[" XOR "],
-            ) + self.value(inner)
+            text += self.one(*OPERATORS) + self.value(inner)
         return text
 
     def bounded(self) -> str:

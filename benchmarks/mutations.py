@@ -6,8 +6,6 @@ controller files, tool tables, offsets, files of HAL pins, measurements, raw rec
 with effects, the manifest of a folder of results, the words of the command line. Seeded.
 """
 
-from __future__ import annotations
-
 import argparse
 import io
 import os
@@ -26,7 +24,7 @@ from importlib import resources
 from pathlib import Path
 from types import FrameType
 
-from benchmarks.pages import write_page
+from benchmarks.pages import table, write_page
 from toolpath_stiff.api.effects import effect_template
 from toolpath_stiff.api.machine_files import machine_from_linuxcnc, machine_template
 from toolpath_stiff.api.poses import read_poses
@@ -71,19 +69,7 @@ def _alarm(number: int, frame: FrameType | None) -> None:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of input: what is mutated, and what reads it.
-
-    Attributes
-    ----------
-    name
-        In words.
-    originals
-        What is mutated.
-    read
-        Takes the mutated bytes and their number, raises `InputError` or its like.
-    lines
-        Whether a refusal must name its line.
-    """
+    """A kind of input: what is mutated, what reads it (bytes and their number), whether a refusal names its line."""
 
     name: str
     originals: tuple[bytes, ...]
@@ -328,7 +314,7 @@ def main() -> int:
             if sys.stderr.isatty() and number % 100 == 0:
                 sys.stderr.write(f"\r{number} of {args.n}")
     growth = megabytes() - settled
-    text = table(args, {kind.name: counts[kind.name] for kind in chosen}, growth, slowest)
+    text = page(args, {kind.name: counts[kind.name] for kind in chosen}, growth, slowest)
     print("\n".join([text, *wrong[:40]]))
     if out:
         command = f"python -m benchmarks.mutations --n {args.n} --seed {args.seed}"
@@ -336,21 +322,19 @@ def main() -> int:
     return int(bool(wrong) or growth > GROWTH_BAR)
 
 
-def table(args: argparse.Namespace, counts: dict[str, Counter[str]], growth: float, slowest: float) -> str:
-    """The page."""
-    rows = [
-        f"| {name} | {found.total()} | {found['read']} | {found['refused']} | "
-        f"{' | '.join(str(found[kind]) for kind in WRONG)} | {_verdict(not any(found[kind] for kind in WRONG))} |"
-        for name, found in counts.items()
+def page(args: argparse.Namespace, counts: dict[str, Counter[str]], growth: float, slowest: float) -> str:
+    """The document."""
+    rows = []
+    for name, of in counts.items():
+        wrong = [of[kind] for kind in WRONG]
+        rows.append((name, of.total(), of["read"], of["refused"], *wrong, _verdict(not any(wrong))))
+    cost = [
+        ("memory grown by", f"{growth:.1f} MB", f"{GROWTH_BAR:g} MB", _verdict(growth <= GROWTH_BAR)),
+        ("slowest input", f"{slowest:.1f} s of CPU", f"{PATIENCE} s", _verdict(slowest <= PATIENCE)),
     ]
-    return "\n".join([
-        "# Mutated inputs", "",
-        f"{args.n} inputs, seed {args.seed}: each is read, or refused with its line.", "",
-        f"| kind | inputs | read | refused | {' | '.join(WRONG)} | |", "| --- |" + " ---: |" * 6 + " --- |", *rows, "",
-        "| | found | bar | |", "| --- | ---: | ---: | --- |",
-        f"| memory grown by | {growth:.1f} MB | {GROWTH_BAR:g} MB | {_verdict(growth <= GROWTH_BAR)} |",
-        f"| slowest input | {slowest:.1f} s of CPU | {PATIENCE} s | {_verdict(slowest <= PATIENCE)} |", "",
-    ])  # fmt: skip
+    heading = f"kind | inputs: | read: | refused: | {' | '.join(f'{kind}:' for kind in WRONG)} | "
+    head = ["# Mutated inputs", "", f"{args.n} inputs, seed {args.seed}: each is read, or refused with its line.", ""]
+    return "\n".join([*head, *table(heading, rows), "", *table(" | found: | bar: | ", cost), ""])
 
 
 def _verdict(passed: bool) -> str:

@@ -1,7 +1,5 @@
 """The pages that benchmarks write: what they found, the day and the commit."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime

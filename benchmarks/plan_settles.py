@@ -8,8 +8,6 @@ case is the truth. Bars: 90 % settled, half of random's minutes, forecast within
 80 %.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence
@@ -19,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.bars import Figure, Record, share
-from benchmarks.case_loop import document, record_of, run_benchmark, run_cases, sound
+from benchmarks.case_loop import document, record_of, run_benchmark, sound
 from benchmarks.pages import table
 from benchmarks.random_visits import random_visits
 from toolpath_stiff.diagnosis.diagnose import diagnose
@@ -158,11 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.plan_settles", description=__doc__)
     parser.add_argument("--cases", type=int, default=60, metavar="N", help="ambiguous cases (default: 60)")
     parser.add_argument("--seed", type=int, default=FIRST_SEED, metavar="N", help="of the first case")
-
-    def make_records(args: argparse.Namespace) -> list[Record]:
-        return run_cases(args, "planned", run, make_jobs(args.cases, args.seed))
-
-    return run_benchmark(parser, arguments, make_records, report, records=RECORDS, out=None)
+    return run_benchmark(parser, arguments, lambda args: make_jobs(args.cases, args.seed), run, report, records=RECORDS)
 
 
 if __name__ == "__main__":

@@ -3,8 +3,6 @@
 Blind cases of the rig: each kind of unknown, 4 to 15 % rms, and sound machines; 2 % repeat noise and 1 % clamping.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections import Counter
@@ -12,47 +10,38 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.bars import Record
-from benchmarks.case_loop import document, run_benchmark, run_cases, sound
+from benchmarks.case_loop import document, run_benchmark, sound
 from benchmarks.portrait_bars import calibration_table, failures_table, figures, kinds_table
-from benchmarks.portrait_cases import LAYOUTS, make_jobs, run
+from benchmarks.portrait_cases import LAYOUTS, Job, make_jobs, run
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 FIRST_SEED = 63_000_000  # chosen once, before the first run
 RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_portrait.jsonl"
 OUT = Path(__file__).parent / "portrait.md"
 CASES, SOUND = 6, 100
-
-
-def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
-    """The document, and whether all bars are cleared."""
-    order = list(UNKNOWNS)
-    good = sound(
-        records,
-        lambda r: (r["layout"] != "tilted", order.index(r["hidden"]) if r["hidden"] in order else -1, r["seed"]),
-    )
-    counts = Counter((r["layout"], "sound" if r["hidden"] == "none" else "unknown", r["verdict"]) for r in good)
-    parts = [
-        (
-            "Verdicts",
-            [f"- {layout}, {what}, `{verdict}`: {n}" for (layout, what, verdict), n in sorted(counts.items())],
-        ),
-        ("Each unknown, tilted layout", kinds_table(good, "tilted")),
-        ("Each unknown, the paper's layout", kinds_table(good, "paper")),
-        ("Probabilities", [_PROBABILITIES, "", *calibration_table(good)]),
-        ("Cases that count against a bar", failures_table(good)),
-    ]
-    return document("Descriptions of what is in no catalogue", _WHAT, figures(good), parts, records, command)
-
-
-_WHAT = (
+WHAT = (
     "Each case is a machine of [the rig](../docs/rig.md) with one of its unknowns, or sound: 2 % repeat noise, 1 % "
     "clamping, 1 % strut spread, joints off by 0.5 mm, 2 % wild readings. Which links and variables are right is "
     "settled by the physics of each kind. A set is right if it holds one of them and is short: four links, three "
     "variables at most. Intervals of shares are Wilson's; a bar is cleared by the figure."
 )
-_PROBABILITIES = (
+PROBABILITIES = (
     "Tilted layout. Several words may be right for one unknown, so that honest probabilities may lie below the share."
 )
+
+
+def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
+    """The document, and whether all bars are cleared."""
+    order = ["none", *UNKNOWNS]
+    good = sound(records, lambda r: (r["layout"] != "tilted", order.index(r["hidden"]), r["seed"]))
+    counts = Counter((r["layout"], "sound" if r["hidden"] == "none" else "unknown", r["verdict"]) for r in good)
+    parts = [
+        ("Verdicts", [f"- {layout}, {of}, `{verdict}`: {n}" for (layout, of, verdict), n in sorted(counts.items())]),
+        *((f"Each unknown, {layout} layout", kinds_table(good, layout)) for layout in LAYOUTS),
+        ("Probabilities", [PROBABILITIES, "", *calibration_table(good)]),
+        ("Cases that count against a bar", failures_table(good)),
+    ]
+    return document("Descriptions of what is in no catalogue", WHAT, figures(good), parts, records, command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -66,11 +55,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--only", nargs="+", choices=list(UNKNOWNS), default=(), metavar="KIND", help="kinds of unknown"
     )
 
-    def make_records(args: argparse.Namespace) -> list[Record]:
-        jobs = make_jobs(args.first_seed, args.cases, args.sound, args.layouts, args.only)
-        return run_cases(args, "diagnosed", run, jobs)
+    def make(args: argparse.Namespace) -> list[Job]:
+        return make_jobs(args.first_seed, args.cases, args.sound, args.layouts, args.only)
 
-    return run_benchmark(parser, arguments, make_records, report, records=RECORDS, out=OUT)
+    return run_benchmark(parser, arguments, make, run, report, records=RECORDS, out=OUT)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,5 @@
 """Figures of `benchmarks.portrait`, each against its bar."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from statistics import fmean, median
@@ -48,68 +46,50 @@ def told_beside(record: Record, name: str) -> bool:
 
 def figures(records: Sequence[Record]) -> list[Figure]:
     """Every figure, by layout."""
-    found: list[Figure] = []
+    made: list[Figure] = []
     for layout in ("tilted", "paper"):
-        unknown = [r for r in records if r["layout"] == layout and r["hidden"] != "none"]
-        sound = [r for r in records if r["layout"] == layout and r["hidden"] == "none"]
-        found += _of_unknowns(layout, unknown) if unknown else []
-        found += _of_sound(layout, sound) if sound else []
-    return found
+        unknown, sound = (
+            [r for r in records if r["layout"] == layout and (r["hidden"] == "none") == none] for none in (False, True)
+        )
+        made += _of_unknowns(layout, unknown) if unknown else []
+        made += _of_sound(layout, sound) if sound else []
+    return made
 
 
 def _of_unknowns(layout: str, records: Sequence[Record]) -> list[Figure]:
     barred = layout == "tilted"
     drawn = [r for r in records if r["portrait"]]
-    found = [
-        share(layout, "unknown: `unexplained` or `described`", [r["verdict"] in SEEN for r in records],
-              at_least=0.92 if barred else 0.70),
-        share(layout, "the same, or a portrait of what a name of the catalogue leaves",
-              [r["verdict"] in SEEN or bool(r["portrait"]) for r in records]),
-        share(layout, "unknown: `identified`, a name of the catalogue", [named_by_catalogue(r) for r in records]),
-        *_beside_names(layout, [r for r in records if named_by_catalogue(r)]),
-        share(layout, "unknown: has a portrait", [bool(r["portrait"]) for r in records]),
-    ]  # fmt: skip
-    found += [figure for name in LARGEST_SET for figure in _of_set(layout, name, records, drawn, barred)]
+    named = [r for r in records if named_by_catalogue(r)]
     ratios = [ratio(r) for r in drawn]
-    found += [
-        share(layout, f"portrait: held-out error at most {most:g} of the noise floor", [r <= most for r in ratios],
-              at_least=at_least if barred else None)
-        for most, at_least in RATIOS
+
+    def of(what: str, hits: Sequence[bool], at_least: float | None = None) -> Figure:
+        return share(layout, what, hits, at_least=at_least)
+
+    made = [
+        of("unknown: `unexplained` or `described`", [r["verdict"] in SEEN for r in records], 0.92 if barred else 0.70),
+        of("the same, or a portrait of what a name of the catalogue leaves",
+           [r["verdict"] in SEEN or bool(r["portrait"]) for r in records]),
+        of("unknown: `identified`, a name of the catalogue", [named_by_catalogue(r) for r in records]),
+        of("`identified`: something is said to look the same", [bool(r.get("same")) for r in named]),
+        *(of(f"`identified`: {name}, what looks the same holds the truth", [told_beside(r, name) for r in named])
+          for name in LARGEST_SET),
+        of("unknown: has a portrait", [bool(r["portrait"]) for r in records]),
     ]  # fmt: skip
-    finite = [r for r in ratios if math.isfinite(r)]
-    if finite:
-        found.append(middle_of(layout, "portrait: held-out error over the noise floor, median", finite))
-    found.append(
-        middle_of(layout, "CPU of `diagnose` with the portrait, median", [r["cpu"] for r in records], None, " s")
-    )
-    return found
-
-
-def _beside_names(layout: str, named: Sequence[Record]) -> list[Figure]:
-    """What is said to look the same as the name that an unknown was given."""
-    if not named:
-        return []
-    return [
-        share(layout, "`identified`: something is said to look the same", [bool(r.get("same")) for r in named]),
-        *(
-            share(layout, f"`identified`: {name}, what looks the same holds the truth",
-                  [told_beside(r, name) for r in named])
-            for name in LARGEST_SET
-        ),
-    ]  # fmt: skip
-
-
-def _of_set(layout: str, name: str, records: Sequence[Record], drawn: Sequence[Record], barred: bool) -> list[Figure]:
-    """How often the set of links, or of variables, holds the truth."""
-    bar = 0.85 if barred else None
-    return [
-        share(layout, f"portrait: {name}, the set holds the truth", [right_set(r, name) for r in drawn],
-              at_least=bar),
-        share(layout, f"portrait: {name}, the likeliest is right", [first_right(r, name) for r in drawn]),
-        mean(layout, f"portrait: {name}, mean size of the set", [float(len(r["portrait"][name])) for r in drawn]),
-        share(layout, f"unknown: {name} right, cases without a portrait counted as wrong",
-              [right_set(r, name) for r in records]),
-    ]  # fmt: skip
+    for name in LARGEST_SET:
+        truth = f"portrait: {name}, the set holds the truth"
+        made += [
+            of(truth, [right_set(r, name) for r in drawn], 0.85 if barred else None),
+            of(f"portrait: {name}, the likeliest is right", [first_right(r, name) for r in drawn]),
+            mean(layout, f"portrait: {name}, mean size of the set", [float(len(r["portrait"][name])) for r in drawn]),
+            of(f"unknown: {name} right, cases without a portrait counted as wrong",
+               [right_set(r, name) for r in records]),
+        ]  # fmt: skip
+    for most, at_least in RATIOS:
+        what = f"portrait: held-out error at most {most:g} of the noise floor"
+        made.append(of(what, [r <= most for r in ratios], at_least if barred else None))
+    finite, times = [r for r in ratios if math.isfinite(r)], [r["cpu"] for r in records]
+    made.append(middle_of(layout, "portrait: held-out error over the noise floor, median", finite))
+    return [*made, middle_of(layout, "CPU of `diagnose` with the portrait, median", times, None, " s")]
 
 
 def _of_sound(layout: str, records: Sequence[Record]) -> list[Figure]:

@@ -1,7 +1,5 @@
 """Blind cases of `benchmarks.portrait`: machines with an unknown that is in no catalogue, or sound."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

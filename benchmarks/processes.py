@@ -1,7 +1,5 @@
 """Whole processes and what they cost; the machine that they ran on."""
 
-from __future__ import annotations
-
 import platform
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Visits drawn blindly: what planning is compared with."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from toolpath_stiff.planning.plan import RivalPlan

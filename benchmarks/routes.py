@@ -1,29 +1,24 @@
 """The stiffness routes against the per-pose 24 x 24 assembly and solve, and that against OpenSees."""
 
-from __future__ import annotations
-
-import importlib
 import statistics
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
-from tests.stiffness import reference
+from benchmarks.pages import bar, table
+from tests.stiffness import opensees, reference
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.stiffness.truss import TIP, platform_bars, platform_nodes
 
 BAR_STIFFNESS = 1e12  # N/m: rigid to 5e-5, the stiffest bars that direct stiffness solves well
 PLAIN_POSES, FAST_POSES = 300, 100_000
-NUMPY_BAR, COMPILED_BAR, FAIRNESS_BAR = 300.0, 5000.0, 3.0
-EVALUATE = "evaluate(): stiffness, margins, limits (numpy)"
-EVALUATE_BAR = 100.0  # three times the closed form's bar: reach takes no more than the kernel
+# Times the assembly and solve; of evaluate() three times the closed form's bar: reach takes no more than the kernel.
+AT_LEAST = {"evaluate()": 100.0, "closed form": 300.0, "compiled": 5000.0}
+FAIRNESS_BAR = 3.0
 
 Method = tuple[str, int, Callable[[], object]]
 
@@ -33,46 +28,6 @@ def poses(n: int, tilted: bool) -> tuple[np.ndarray, np.ndarray | None]:
     rng = np.random.default_rng(1)
     position = np.column_stack([rng.uniform(-0.4, 0.4, (n, 2)), rng.uniform(0.3, 1.3, n)])
     return position, rotation_matrices(np.deg2rad(rng.uniform(-20, 20, (n, 3)))) if tilted else None
-
-
-def opensees_compliance(machine: Hexapod, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """The same 25-bar truss built and solved in OpenSees, three load cases."""
-    ops: Any = importlib.import_module("openseespy.opensees")  # its functions are unknown to a type checker
-    nodes = position + platform_nodes(machine.platform_joints) @ rotation.T
-    ops.wipe()
-    ops.model("basic", "-ndm", 3, "-ndf", 3)
-    for i, node in enumerate(nodes):
-        ops.node(i + 1, *node.tolist())
-    for i, joint in enumerate(machine.frame_joints):
-        ops.node(11 + i, *joint.tolist())
-        ops.fix(11 + i, 1, 1, 1)
-    ops.uniaxialMaterial("Elastic", 1, 1.0)
-    element = 0
-    for i, j in platform_bars(machine.platform_joints):
-        element += 1
-        length = float(np.linalg.norm(nodes[j] - nodes[i]))
-        ops.element("Truss", element, i + 1, j + 1, machine.platform_bar_stiffness * length, 1)
-    for i in range(6):
-        element += 1
-        length = float(np.linalg.norm(nodes[i] - machine.frame_joints[i]))
-        area = float(machine.strut_law.stiffness(np.array(length))) * length
-        ops.element("Truss", element, 11 + i, i + 1, area, 1)
-    ops.constraints("Plain")
-    ops.numberer("Plain")
-    ops.system("FullGeneral")
-    ops.algorithm("Linear")
-    ops.integrator("LoadControl", 1.0)
-    compliance = np.empty((3, 3))
-    for axis in range(3):
-        ops.timeSeries("Constant", axis + 1)
-        ops.pattern("Plain", axis + 1, axis + 1)
-        ops.load(TIP + 1, *np.eye(3)[axis].tolist())
-        if axis == 0:
-            ops.analysis("Static")
-        ops.analyze(1)
-        compliance[axis] = ops.nodeDisp(TIP + 1)
-        ops.remove("loadPattern", axis + 1)
-    return compliance
 
 
 def methods(tilted: bool) -> list[Method]:
@@ -95,30 +50,25 @@ def methods(tilted: bool) -> list[Method]:
         for p, r in zip(position[few], plain_rotation[few], strict=True):
             reference.tip_compliance(bars, p, r)
 
-    def opensees() -> None:
+    def rebuilt() -> None:
         for p, r in zip(position[few], plain_rotation[few], strict=True):
-            opensees_compliance(bars, p, r)
+            opensees.compliance(bars, p, r, BAR_STIFFNESS)
 
     def route(name: str) -> Callable[[], object]:
         return lambda: core.tip_compliance(model, position, rotation, route=name)
 
-    return [
-        ("24 x 24 assembly and solve, pose by pose (numpy)", PLAIN_POSES, plain),
-        ("OpenSees, model rebuilt, pose by pose", PLAIN_POSES, opensees),
-        ("exact route (batched LAPACK)", FAST_POSES, route("exact")),
-        ("closed form (numpy), whole call", FAST_POSES, route("closed_form")),
-        (EVALUATE, FAST_POSES, lambda: evaluate(model, position, abc, direction)),
-        (
-            "closed form (numpy), one direction and lengths",
-            FAST_POSES,
-            lambda: closed_form.compliance_along_columns(kernel, columns, loads, turned),
-        ),
-        (
-            "compiled (numba), one direction and lengths, poses last",
-            FAST_POSES,
-            lambda: compiled.compliance_along_columns(kernel, columns, loads, turned),
-        ),
-    ]
+    one_way = (kernel, columns, loads, turned)
+    calls: dict[str, Callable[[], object]] = {
+        "24 x 24 assembly and solve, pose by pose (numpy)": plain,
+        "OpenSees, model rebuilt, pose by pose": rebuilt,
+        "exact route (batched LAPACK)": route("exact"),
+        "closed form (numpy), whole call": route("closed_form"),
+        "evaluate(): stiffness, margins, limits (numpy)": lambda: evaluate(model, position, abc, direction),
+        "closed form (numpy), one direction and lengths": lambda: closed_form.compliance_along_columns(*one_way),
+        "compiled (numba), the same, poses last": lambda: compiled.compliance_along_columns(*one_way),
+    }
+    slow = (plain, rebuilt)
+    return [(name, PLAIN_POSES if call in slow else FAST_POSES, call) for name, call in calls.items()]
 
 
 def check_agreement(tilted: bool) -> None:
@@ -130,48 +80,33 @@ def check_agreement(tilted: bool) -> None:
     fast = [core.tip_compliance(build_model(machine), position, rotation, route=r) for r in ("exact", "closed_form")]
     for i, (p, r) in enumerate(zip(position, turns, strict=True)):
         plain = reference.tip_compliance(bars, p, r)
-        np.testing.assert_allclose(opensees_compliance(bars, p, r), plain, rtol=1e-6, atol=1e-14)
+        np.testing.assert_allclose(opensees.compliance(bars, p, r, BAR_STIFFNESS), plain, rtol=1e-6, atol=1e-14)
         for other in fast:
             np.testing.assert_allclose(other[i], plain, rtol=1e-3, atol=1e-12)  # bars of 1e12 against rigid ones
 
 
 def measure_routes(rounds: int) -> tuple[list[str], bool]:
     """Lines of the table, and whether every bar is cleared."""
-    lines = ["| method | poses | us a pose | poses a second | times the assembly and solve | bar |"]
-    lines.append("| --- | --- | ---: | ---: | ---: | --- |")
-    passed = True
-    for tilted in (False, True):
-        check_agreement(tilted)
-        table = methods(tilted)
-        seconds: list[list[float]] = [[] for _ in table]
-        for _, _, call in table[2:]:
+    rows, passed = [], True
+    for kind in ("vertical", "tilted"):
+        check_agreement(kind == "tilted")
+        timed = methods(kind == "tilted")
+        seconds: list[list[float]] = [[] for _ in timed]
+        for _, _, call in timed[2:]:
             call()  # compile, fill caches
         for _ in range(rounds):
-            for times, (_, n, call) in zip(seconds, table, strict=True):
+            for times, (_, n, call) in zip(seconds, timed, strict=True):
                 start = time.perf_counter()
                 call()
                 times.append((time.perf_counter() - start) / n)
-        for times, (name, _, _) in zip(seconds, table, strict=True):
+        for times, (name, _, _) in zip(seconds, timed, strict=True):
             ratio = statistics.median(a / b for a, b in zip(seconds[0], times, strict=True))
-            bar, clears = _bar(name, ratio)
+            least = next((most for start, most in AT_LEAST.items() if name.startswith(start)), 0.0)
+            clears, words = ratio >= least, f"at least {least:g}" if least else ""
+            if name.startswith("OpenSees"):
+                clears, words = ratio <= FAIRNESS_BAR, f"at most {FAIRNESS_BAR:g} (a fair measure)"
             passed &= clears
-            median = statistics.median(times)
-            kind = "tilted" if tilted else "vertical"
-            lines.append(f"| {name} | {kind} | {1e6 * median:.4g} | {1 / median:,.0f} | {ratio:,.3g} | {bar} |")
-    return lines, passed
-
-
-def _bar(name: str, ratio: float) -> tuple[str, bool]:
-    if name.startswith("OpenSees"):
-        return _verdict(ratio <= FAIRNESS_BAR, f"at most {FAIRNESS_BAR:g} (a fair measure)")
-    if name == EVALUATE:
-        return _verdict(ratio >= EVALUATE_BAR, f"at least {EVALUATE_BAR:g}")
-    if name.startswith("closed form"):
-        return _verdict(ratio >= NUMPY_BAR, f"at least {NUMPY_BAR:g}")
-    if name.startswith("compiled"):
-        return _verdict(ratio >= COMPILED_BAR, f"at least {COMPILED_BAR:g}")
-    return "", True
-
-
-def _verdict(clears: bool, text: str) -> tuple[str, bool]:
-    return (text if clears else f"{text}: NOT CLEARED"), clears
+            us = 1e6 * statistics.median(times)
+            rows.append((name, kind, f"{us:.4g}", f"{1e6 / us:,.0f}", f"{ratio:,.3g}", bar(clears, words)))
+    heading = "method | poses | us a pose: | poses a second: | times the assembly and solve: | bar"
+    return table(heading, rows), passed

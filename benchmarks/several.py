@@ -4,8 +4,6 @@ Blind cases of the rig with 2 % repeat noise and 1 % clamping. Pairs change the 
 effects by 10, 7 and 5 %.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections import Counter
@@ -13,10 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.bars import JUST_SEEN, Record, holds_truth
-from benchmarks.case_loop import document, run_benchmark, run_cases, sound
+from benchmarks.case_loop import document, run_benchmark, sound
 from benchmarks.pages import table
 from benchmarks.several_bars import false_name, figures, named_rows, slip_found, slip_visible, strongest_right
-from benchmarks.several_cases import GROUPS, make_jobs, run
+from benchmarks.several_cases import GROUPS, Job, make_jobs, run
 
 FIRST_SEED = 52_000_000  # chosen once, before the first run
 RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_several.jsonl"
@@ -69,10 +67,10 @@ def failures_table(records: Sequence[Record]) -> list[str]:
 
 
 def _missed(record: Record) -> str:
-    """Each effect that is not in `plausible`, and how far it shows beside the others."""
+    """Each effect that is not in `plausible`, and how far it shows alone."""
     missed = [e for e in record["effects"] if e["effect"] not in record["plausible"]]
     told = {e["effect"]: " (not excluded)" if e["effect"] in record["not_excluded"] else "" for e in missed}
-    return ", ".join(f"{e['effect']} shows with {e['beside']:.1f}{told[e['effect']]}" for e in missed)
+    return ", ".join(f"{e['effect']} shows with {e['detectability']:.1f}{told[e['effect']]}" for e in missed)
 
 
 def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
@@ -86,16 +84,16 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
         ("Cases that count against a bar", failures_table(good)),
     ]
     title = "Several effects, wild readings, wrong noise, mistyped rows"
-    return document(title, _WHAT, figures(good), parts, records, command)
+    return document(title, WHAT, figures(good), parts, records, command)
 
 
-_WHAT = (
+WHAT = (
     "Each case is a machine of [the rig](../docs/rig.md) with 2 % repeat noise, 1 % clamping, 1 % strut spread, joints "
     "off by 0.5 mm and 2 % wild readings unless more is said. Pairs change the stiffness by 10 and 5 % rms, three "
     "effects by 10, 7 and 5 %, less where a bound is nearer. An effect that does not show alone (detectability below "
-    "3.9) cannot be found beside others either; one that does may still be taken up by the sizes of the others: how "
-    "far it shows beside them is given with each miss, and whether the diagnosis says that it is not excluded "
-    "(`not_excluded`: that is no part of `plausible`, and of no bar). Intervals of shares are "
+    "3.9) cannot be found beside others either; one that does may still be taken up by the sizes of the others: each "
+    "miss says how far it shows alone, and whether the diagnosis says that it is not excluded (`not_excluded`: that is "
+    "no part of `plausible`, and of no bar). Intervals of shares are "
     "Wilson's; a bar is cleared by the figure."
 )
 
@@ -111,10 +109,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS, metavar="GROUP", help=", ".join(GROUPS))
 
-    def make_records(args: argparse.Namespace) -> list[Record]:
-        return run_cases(args, "diagnosed", run, make_jobs(args.first_seed, args.cases, args.only))
+    def make(args: argparse.Namespace) -> list[Job]:
+        return make_jobs(args.first_seed, args.cases, args.only)
 
-    return run_benchmark(parser, arguments, make_records, report, records=RECORDS, out=OUT)
+    return run_benchmark(parser, arguments, make, run, report, records=RECORDS, out=OUT)
 
 
 if __name__ == "__main__":

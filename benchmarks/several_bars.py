@@ -1,8 +1,7 @@
 """Figures of `benchmarks.several`, each against its bar."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from benchmarks.bars import JUST_SEEN, Figure, Record, holds_truth, mean, named, share
@@ -10,6 +9,7 @@ from benchmarks.several_cases import FACTORS, MANY_OUTLIERS, WAYS
 from toolpath_stiff.rig.slips import VISIBLE
 
 COST_OF_OUTLIERS = 3.0  # percentage points
+Test = Callable[[Record], bool]
 
 
 def false_name(record: Record) -> bool:
@@ -17,14 +17,19 @@ def false_name(record: Record) -> bool:
     return record["verdict"] == "identified" and not set(record["plausible"]) <= set(record["truth"])
 
 
-def all_seen(record: Record) -> bool:
+def told(verdict: str) -> Test:
+    """Whether a record has that verdict."""
+    return lambda record: bool(record["verdict"] == verdict)
+
+
+def all_show(record: Record) -> bool:
     """Whether each hidden effect, alone, shows beside strut law and nuisances."""
     return all(effect["detectability"] >= JUST_SEEN for effect in record["effects"])
 
 
-def all_show(record: Record) -> bool:
-    """Whether each hidden effect shows beside the others, whose sizes are free (`several_seen`)."""
-    return all(effect["beside"] >= JUST_SEEN for effect in record["effects"])
+def one_alone(record: Record) -> bool:
+    """`identified`, and only a part of what was hidden."""
+    return record["verdict"] == "identified" and set(record["plausible"]) < set(record["truth"])
 
 
 def held_or_listed(record: Record) -> bool:
@@ -38,27 +43,14 @@ def strongest_right(record: Record, count: int = 2) -> bool:
     return {effect["effect"] for effect in ordered[:count]} <= set(record["plausible"]) and not false_name(record)
 
 
-def rows_of_suspect(suspect: Any) -> set[int]:
-    """Rows (from 1) that an entry of `suspect_rows` names: a number, or `row`, `rows`, `line` or `lines` (row + 1)."""
-    if isinstance(suspect, int):
-        return {suspect}
-    found = _numbers(suspect.get("row")) | _numbers(suspect.get("rows"))
-    return found or {line - 1 for line in _numbers(suspect.get("line")) | _numbers(suspect.get("lines"))}
-
-
-def _numbers(value: Any) -> set[int]:
-    return {int(one) for one in (value if isinstance(value, list) else [] if value is None else [value])}
-
-
 def named_rows(record: Record) -> set[int]:
     """All rows that the diagnosis suspects."""
-    return {row for suspect in record["suspects"] for row in rows_of_suspect(suspect)}
+    return {row for suspect in record["suspects"] for row in suspect["rows"]}
 
 
 def slip_found(record: Record) -> bool:
     """Whether every slip has one of its rows named: of two exchanged readings one is enough to find the other."""
-    rows = named_rows(record)
-    return all(rows & set(slip["rows"]) for slip in record["slips"])
+    return all(named_rows(record) & set(slip["rows"]) for slip in record["slips"])
 
 
 def slip_visible(record: Record) -> bool:
@@ -67,31 +59,22 @@ def slip_visible(record: Record) -> bool:
 
 
 def meant_named(record: Record) -> bool:
-    """Whether the right value of each slip stands in what is said of one of its rows: it would have been believed.
+    """Whether what belongs there stands in what is said of a row of each slip; a refusal says what it expected."""
+    return "refused" in record or all(_meant_in(record, slip) for slip in record["slips"])
 
-    A refusal by the reader says what it expected instead: that counts.
-    """
-    if "refused" in record:
-        return slip_found(record)
-    for slip in record["slips"]:
-        words = [str(s) for s in record["suspects"] if rows_of_suspect(s) & set(slip["rows"])]
-        values = [value for column in slip["meant"].values() for value in column]
-        if slip["kind"] == "directions_exchanged":
-            hit = any("direction" in one for one in words)
-        elif slip["kind"] in ("lbf_per_in", "N_per_um"):
-            hit = any("lbf" in one or "N/um" in one for one in words)
-        else:
-            hit = any(f"{value:g}" in one for one in words for value in values)
-        if not hit:
-            return False
-    return True
+
+def _meant_in(record: Record, slip: dict[str, Any]) -> bool:
+    words = " ".join(str(suspect) for suspect in record["suspects"] if set(suspect["rows"]) & set(slip["rows"]))
+    if slip["kind"] == "directions_exchanged":
+        return "direction" in words
+    if slip["kind"] in ("lbf_per_in", "N_per_um"):
+        return "lbf" in words or "N/um" in words
+    return any(f"{value:g}" in words for column in slip["meant"].values() for value in column)
 
 
 def figures(records: Sequence[Record]) -> list[Figure]:
     """Every figure, of the groups that were run."""
-    groups: dict[str, Callable[[Sequence[Record]], list[Figure]]] = {
-        "pair": _pairs, "three": _three, "outliers": _outliers, "stated": _stated, "slip": _slips,
-    }  # fmt: skip
+    groups = {"pair": _pairs, "three": _three, "outliers": _outliers, "stated": _stated, "slip": _slips}
     return [
         figure
         for group, count in groups.items()
@@ -100,138 +83,117 @@ def figures(records: Sequence[Record]) -> list[Figure]:
     ]
 
 
+def _each(records: Sequence[Record], what: str, test: Test, where: Test | None = None, **bars: float) -> Figure:
+    """The share of the cases, or of some of them, that pass a test."""
+    return share("tilted", what, [test(r) for r in records if where is None or where(r)], **bars)
+
+
 def _pairs(records: Sequence[Record]) -> list[Figure]:
-    at = "tilted"
+    of = partial(_each, records)
     return [
-        share(at, "pairs: both in `plausible`", [holds_truth(r) for r in records], at_least=0.90),
-        share(at, f"the same, both with a detectability of {JUST_SEEN:g} or more",
-              [holds_truth(r) for r in records if all_seen(r)]),
-        share(at, "the same, each beside the other, whose sizes are free",
-              [holds_truth(r) for r in records if all_show(r)]),
-        share(at, "pairs: both in `plausible` or `not_excluded`", [held_or_listed(r) for r in records]),
-        *_listed(at, "pairs", records),
-        share(at, "pairs: `identified`, both", [named(r) for r in records]),
-        share(at, "pairs: `identified`, a name that is not hidden", [false_name(r) for r in records], at_most=0.04),
-        share(at, "pairs: `identified`, one of them alone",
-              [r["verdict"] == "identified" and set(r["plausible"]) < set(r["truth"]) for r in records]),
-        share(at, "pairs: `unexplained`", [r["verdict"] == "unexplained" for r in records]),
-        share(at, "pairs: at most four names in `plausible`", [len(r["plausible"]) <= 4 for r in records]),
-    ]  # fmt: skip
+        of("pairs: both in `plausible`", holds_truth, at_least=0.90),
+        of(f"the same, both with a detectability of {JUST_SEEN:g} or more", holds_truth, all_show),
+        of("pairs: both in `plausible` or `not_excluded`", held_or_listed),
+        *_listed("pairs", records),
+        of("pairs: `identified`, both", named),
+        of("pairs: `identified`, a name that is not hidden", false_name, at_most=0.04),
+        of("pairs: `identified`, one of them alone", one_alone),
+        of("pairs: `unexplained`", told("unexplained")),
+        of("pairs: at most four names in `plausible`", lambda r: len(r["plausible"]) <= 4),
+    ]
 
 
-def _listed(at: str, what: str, records: Sequence[Record]) -> list[Figure]:
+def _listed(what: str, records: Sequence[Record]) -> list[Figure]:
     """How many effects are told as not excluded, how often one of them is there, and how likely each was said to be."""
     listed = [(name in r["truth"], chance) for r in records for name, chance in r["not_excluded"].items()]
     return [
-        mean(at, f"{what}: effects in `not_excluded`", [float(len(r["not_excluded"])) for r in records]),
-        share(at, f"{what}: one that is listed there is hidden", [there for there, _ in listed]),
-        mean(at, f"{what}: probability (%) that is given with it", [100.0 * chance for _, chance in listed]),
+        mean("tilted", f"{what}: effects in `not_excluded`", [float(len(r["not_excluded"])) for r in records]),
+        share("tilted", f"{what}: one that is listed there is hidden", [there for there, _ in listed]),
+        mean("tilted", f"{what}: probability (%) that is given with it", [100.0 * chance for _, chance in listed]),
     ]
 
 
 def _three(records: Sequence[Record]) -> list[Figure]:
-    at = "tilted"
+    of = partial(_each, records)
     return [
-        share(at, "three: the strongest two in `plausible`, nothing false named", [strongest_right(r) for r in records],
-              at_least=0.80),
-        share(at, f"the same, all with a detectability of {JUST_SEEN:g} or more",
-              [strongest_right(r) for r in records if all_seen(r)]),
-        share(at, "the same, each beside the others, whose sizes are free",
-              [strongest_right(r) for r in records if all_show(r)]),
-        share(at, "three: all in `plausible`", [holds_truth(r) for r in records]),
-        share(at, "three: all in `plausible` or `not_excluded`", [held_or_listed(r) for r in records]),
-        *_listed(at, "three", records),
-        share(at, "three: `identified`, a name that is not hidden", [false_name(r) for r in records], at_most=0.05),
-        share(at, "three: `unexplained`", [r["verdict"] == "unexplained" for r in records]),
-    ]  # fmt: skip
+        of("three: the strongest two in `plausible`, nothing false named", strongest_right, at_least=0.80),
+        of(f"the same, all with a detectability of {JUST_SEEN:g} or more", strongest_right, all_show),
+        of("three: all in `plausible`", holds_truth),
+        of("three: all in `plausible` or `not_excluded`", held_or_listed),
+        *_listed("three", records),
+        of("three: `identified`, a name that is not hidden", false_name, at_most=0.05),
+        of("three: `unexplained`", told("unexplained")),
+    ]
 
 
 def _outliers(records: Sequence[Record]) -> list[Figure]:
     """What many wild readings cost on the same machines, in percentage points."""
-    tests: list[tuple[str, str, Callable[[Record], bool]]] = [
-        ("none", "`adequate`", lambda r: r["verdict"] == "adequate"),
+    tests: list[tuple[str, str, Test]] = [
+        ("none", "`adequate`", told("adequate")),
         ("one", "truth in `plausible`", holds_truth),
         ("one", "`identified` and right", named),
         ("one", "no false name", lambda r: not false_name(r)),
         ("pair", "both in `plausible`", holds_truth),
         ("pair", "no false name", lambda r: not false_name(r)),
     ]
-    found = []
+    made = []
     for hidden, what, test in tests:
-        shares = {}
-        for many in (False, True):
-            mine = [r for r in records if r["hidden"] == hidden and (r["outliers"] == MANY_OUTLIERS) == many]
-            shares[many] = [test(r) for r in mine]
-            if mine:
-                found.append(share("tilted", f"{'10' if many else '2'} % wild, {hidden}: {what}", shares[many]))
-        if shares[True] and shares[False]:
-            cost = 100.0 * (sum(shares[False]) / len(shares[False]) - sum(shares[True]) / len(shares[True]))
-            found.append(
-                Figure("tilted", f"10 % wild cost, {hidden}: {what}", f"{cost:+.1f} points", "",
-                       f"at most {COST_OF_OUTLIERS:g}", cost <= COST_OF_OUTLIERS)
-            )  # fmt: skip
-    sound = [r for r in records if r["hidden"] == "none"]
-    one = [r for r in records if r["hidden"] == "one"]
-    return [*found, *_listed("tilted", "none hidden", sound), *_listed("tilted", "one hidden", one)]
+        mine = [r for r in records if r["hidden"] == hidden]
+        few, many = ([test(r) for r in mine if (r["outliers"] == MANY_OUTLIERS) == many] for many in (False, True))
+        made += [share("tilted", f"{n} % wild, {hidden}: {what}", hits) for n, hits in ((2, few), (10, many)) if hits]
+        if few and many:
+            cost = 100.0 * (sum(few) / len(few) - sum(many) / len(many))
+            of, bar = f"10 % wild cost, {hidden}: {what}", f"at most {COST_OF_OUTLIERS:g}"
+            made.append(Figure("tilted", of, f"{cost:+.1f} points", "", bar, cost <= COST_OF_OUTLIERS))
+    for hidden in ("none", "one"):
+        made += _listed(f"{hidden} hidden", [r for r in records if r["hidden"] == hidden])
+    return made
 
 
 def _stated(records: Sequence[Record]) -> list[Figure]:
     """A wrong noise is said to be wrong, and a right one is not; what it costs the verdicts."""
-    found = []
-    for layout, way in WAYS:
-        for factor in FACTORS:
-            mine = [r for r in records if (r["layout"], r["way"], r["factor"]) == (layout, way, factor)]
-            none = [r for r in mine if r["hidden"] == "none"]
-            one = [r for r in mine if r["hidden"] == "one"]
-            if not mine:
-                continue
-            at = f"{layout}, {'--noise' if way == 'option' else 'sd_N_per_mm'} x {factor:g}"
-            said = "the stated noise is said to be wrong"
-            if factor == 1.0:
-                found.append(share(at, said, [bool(r["noise_remarks"]) for r in mine], at_most=0.05))
-            else:
-                # Without repeats an effect can look like noise: the bar is for sound machines.
-                repeats = layout == "tilted"
-                found.append(
-                    share(at, said, [bool(r["noise_remarks"]) for r in (mine if repeats else none)], at_least=0.90)
-                )
-            found += [
-                share(at, "none hidden: `adequate`", [r["verdict"] == "adequate" for r in none]),
-                share(at, "one hidden: truth in `plausible`", [holds_truth(r) for r in one]),
-                share(at, "one hidden: `identified`, a name that is not hidden", [false_name(r) for r in one]),
-                share(at, "`unexplained`", [r["verdict"] == "unexplained" for r in mine]),
-            ]
-    return found
+    made = []
+    for layout, way, factor in ((layout, way, factor) for layout, way in WAYS for factor in FACTORS):
+        mine = [r for r in records if (r["layout"], r["way"], r["factor"]) == (layout, way, factor)]
+        none, one = ([r for r in mine if r["hidden"] == hidden] for hidden in ("none", "one"))
+        if not mine:
+            continue
+        name = f"{layout}, {'--noise' if way == 'option' else 'sd_N_per_mm'} x {factor:g}"
+        # Without repeats an effect can look like noise: the bar is for sound machines.
+        judged = mine if factor == 1.0 or layout == "tilted" else none
+        bar = {"at_most": 0.05} if factor == 1.0 else {"at_least": 0.90}
+        made += [
+            share(name, "the stated noise is said to be wrong", [bool(r["noise_remarks"]) for r in judged], **bar),
+            share(name, "none hidden: `adequate`", list(map(told("adequate"), none))),
+            share(name, "one hidden: truth in `plausible`", list(map(holds_truth, one))),
+            share(name, "one hidden: `identified`, a name that is not hidden", list(map(false_name, one))),
+            share(name, "`unexplained`", list(map(told("unexplained"), mine))),
+        ]
+    return made
 
 
 def _slips(records: Sequence[Record]) -> list[Figure]:
-    """Mistyped rows: found and named where they show, nothing suspected where there is none."""
-    clean = [r for r in records if not r["slip"]]
-    wrong = [r for r in records if r["slip"]]
-    plain = [r for r in wrong if slip_visible(r)]
-    faint = [r for r in wrong if not slip_visible(r)]
-    # Wild readings are no slips, but one of eight standard deviations may look like one: counted, without a bar.
-    beside = [bool(named_rows(r) - {row for slip in r["slips"] for row in slip["rows"]}) for r in wrong]
-    return [
-        share("tilted", f"slips with a detectability of {VISIBLE:g} or more: row named", [slip_found(r) for r in plain],
-              at_least=0.90),
-        share("tilted", "the same: and what it would be", [slip_found(r) and meant_named(r) for r in plain]),
-        share("tilted", "slips that show less: row named", [slip_found(r) for r in faint]),
-        share("tilted", "no slip: some row suspected", [bool(named_rows(r)) for r in clean], at_most=0.05),
-        share("tilted", "a slip: another row suspected as well", beside),
-        *_slips_verdicts(clean, wrong),
-    ]  # fmt: skip
+    """Mistyped rows: found and named where they show, nothing suspected where there is none.
 
+    Wild readings are no slips, but one of eight standard deviations may look like one: counted, without a bar. The
+    reader may refuse a table with a slip.
+    """
 
-def _slips_verdicts(clean: Sequence[Record], wrong: Sequence[Record]) -> list[Figure]:
-    """The verdict with nothing or one effect hidden; the reader may refuse a table with a slip."""
-    sound, spoiled = ([r for r in some if r["hidden"] == "none"] for some in (clean, wrong))
-    with_one = [r for r in wrong if r["hidden"] == "one"]
+    def beside(record: Record) -> bool:
+        return bool(named_rows(record) - {row for slip in record["slips"] for row in slip["rows"]})
+
+    clean, wrong = (partial(_each, [r for r in records if bool(r["slip"]) == slip]) for slip in (False, True))
+    none, one = ((lambda r, hidden=hidden: r["hidden"] == hidden) for hidden in ("none", "one"))
+    shown = f"slips with a detectability of {VISIBLE:g} or more: row named"
+    sound = "a slip, none hidden: `adequate` (or refused by the reader)"
+    held = "a slip, one hidden: truth in `plausible` (or refused)"
     return [
-        share("tilted", "no slip, none hidden: `adequate`",
-              [r["verdict"] == "adequate" for r in sound]),
-        share("tilted", "a slip, none hidden: `adequate` (or refused by the reader)",
-              [r["verdict"] in ("adequate", "refused") for r in spoiled]),
-        share("tilted", "a slip, one hidden: truth in `plausible` (or refused)",
-              [r["verdict"] == "refused" or holds_truth(r) for r in with_one]),
-    ]  # fmt: skip
+        wrong(shown, slip_found, slip_visible, at_least=0.90),
+        wrong("the same: and what it would be", lambda r: slip_found(r) and meant_named(r), slip_visible),
+        wrong("slips that show less: row named", slip_found, lambda r: not slip_visible(r)),
+        clean("no slip: some row suspected", lambda r: bool(named_rows(r)), at_most=0.05),
+        wrong("a slip: another row suspected as well", beside),
+        clean("no slip, none hidden: `adequate`", told("adequate"), none),
+        wrong(sound, lambda r: r["verdict"] in ("adequate", "refused"), none),
+        wrong(held, lambda r: r["verdict"] == "refused" or holds_truth(r), one),
+    ]

@@ -1,7 +1,5 @@
 """Blind cases of `benchmarks.several`: two and three effects at once, wild readings, a wrong noise, mistyped rows."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -11,7 +9,6 @@ from typing import Any
 
 from benchmarks.case_loop import record_of
 from benchmarks.diagnosis_cases import judged
-from benchmarks.several_seen import shows_beside
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.hidden import Nuisances
@@ -29,22 +26,9 @@ GROUP_SEEDS = 10_000  # distance of the seeds of groups
 
 @dataclass(frozen=True)
 class Job:
-    """One case.
+    """One case: of `GROUPS` and a key of `HIDDEN`; the share of wild readings; a slip's kind.
 
-    Attributes
-    ----------
-    group
-        One of `GROUPS`.
-    layout, seed
-        Of the rig.
-    hidden
-        A key of `HIDDEN`.
-    outliers
-        Share of wild readings.
-    way, factor
-        How a noise is stated (`option`: `--noise`; `column`: `sd_N_per_mm`; "": not), and over the true one.
-    slip
-        Kind of the slip; "": none.
+    `way` says how a noise is stated (`option`: `--noise`; `column`: `sd_N_per_mm`), `factor` times the true one.
     """
 
     group: str
@@ -91,16 +75,13 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     """Draw, disturb, diagnose, and what the document says of noise and rows."""
     nuisances = Nuisances(outliers=job.outliers)
     case = rig.draw_case(job.seed, job.layout, HIDDEN[job.hidden], size=SIZES[job.hidden], noise=nuisances)
-    rows, truth, stated = case.rows, dict(case.truth), {}
+    rows, truth, stated = case.rows, case.truth, {}
     more: dict[str, Any] = {}
     if job.way == "column":
         rows, more["noise"] = with_stated_noise(rows, nuisances, job.factor)
     elif job.way == "option":
         rows = {name: values for name, values in rows.items() if name != "sd_N_per_mm"}
         stated["noise"] = (job.factor * nuisances.repeat, job.factor * nuisances.clamping)
-    if len(truth["effects"]) > 1:
-        beside = zip(truth["effects"], shows_beside(case), strict=True)
-        truth["effects"] = [{**effect, "beside": round(length, 2)} for effect, length in beside]
     if job.slip:
         rows, more["slips"] = slipped_case(case, job.seed, job.slip)
     try:
@@ -119,7 +100,7 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
 
 def suspects_of_refusal(message: str) -> list[dict[str, Any]]:
     """The lines that the reader names (`FILE.csv:152: ...`) as suspected rows; the heading is line 1."""
-    return [{"row": int(line) - 1, "words": message} for line in re.findall(r"\.csv:(\d+)", message)]
+    return [{"rows": [int(line) - 1], "words": message} for line in re.findall(r"\.csv:(\d+)", message)]
 
 
 # What a sentence must say to be about a wrong noise: that one was stated, and that it is not what the readings show.

@@ -1,7 +1,5 @@
 """Programs as CAM systems write them, of any number of lines: the same bytes for the same number."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -2,15 +2,12 @@
 
     python -m benchmarks.studio --out benchmarks/studio.md
 
-A blind exercise of 288 readings, then one whose readings are repeated to 5,000; a program of 10,000 samples and one of
+A blind exercise of 288 readings, then a campaign of 5,000; a program of 10,000 samples and one of
 50,000 lines. Medians and the slowest of many, seen from the page: from the question until the answer is drawn, and
 from one frame to the next while the machine turns. Absolute times: they are what a hand at a slider feels.
 """
 
-from __future__ import annotations
-
 import argparse
-import os
 import statistics
 import subprocess
 import sys
@@ -20,8 +17,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from benchmarks import pages
-from benchmarks.pages import write_page
+from benchmarks.diagnosis_size import campaign
+from benchmarks.pages import bar, table, write_page
 
 ANSWER_BAR, FRAME_BAR = 100.0, 50.0  # ms, medians
 ROUNDS = 40
@@ -77,33 +74,19 @@ def programs(folder: Path) -> tuple[Path, Path]:
     return long, many
 
 
-def many_readings(folder: Path, count: int) -> Path:
-    """Readings of an exercise, repeated under other numbers of clampings and repeats."""
-    import pandas as pd
-
-    from toolpath_stiff.rig import case as rig
-
-    rows, _ = rig.make_case(7, layout="tilted")
-    frame = pd.DataFrame(rows)
-    copies = -(-count // len(frame))
-    parts = [frame.assign(clamp=frame["clamp"] + 1000 * k) for k in range(copies)]
-    file = folder / "many.csv"
-    pd.concat(parts).head(count).to_csv(file, index=False)
-    return file
-
-
 def row(name: str, times: list[float], most: float) -> tuple[tuple[str, ...], bool]:
     """A row of the table, and whether its bar is cleared."""
     clears = statistics.median(times) < most
     figures = (f"{statistics.median(times):.0f}", f"{max(times):.0f}")
-    return (name, *figures, pages.bar(clears, f"under {most:g}")), clears
+    return (name, *figures, bar(clears, f"under {most:g}")), clears
 
 
 def measure(browser: Any, folder: Path) -> list[tuple[tuple[str, ...], bool]]:
     """All rows of the table."""
     long, many = programs(folder)
     own = ("--exercise", "7", "--program", str(long))
-    large = (str(many_readings(folder, 5000)), "--program", str(many))
+    (folder / "many.csv").write_text(campaign(5000))
+    large = (str(folder / "many.csv"), "--program", str(many))
     return [
         *measure_one(browser, folder / "288", own, "288 readings", "10,000 samples"),
         *measure_one(browser, folder / "5000", large, "5,000 readings", "50,000 lines"),
@@ -133,14 +116,6 @@ def measure_one(
     return [*found, row(f"{readings}, {program}: a frame while turning", times[1:], FRAME_BAR)]
 
 
-def load() -> str:
-    """What else the machine was doing: times on a busy one are longer than those that a user sees."""
-    mean, count = os.getloadavg()[0], os.cpu_count() or 1
-    return f"{count} processors, load {mean:.0f}: " + (
-        "idle but for this." if mean <= count + 1 else "busy with other work, an idle machine answers sooner."
-    )
-
-
 def main() -> int:
     """Measure, print, exit with 1 where a bar is not cleared."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -154,11 +129,11 @@ def main() -> int:
         browser = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
         rows = measure(browser, Path(folder))
         browser.close()
-    text = "\n".join(pages.table("what | ms, median: | ms, slowest: | bar", [cells for cells, _ in rows])) + "\n"
+    text = "\n".join(table("what | ms, median: | ms, slowest: | bar", [cells for cells, _ in rows])) + "\n"
     print(text)
     if args.out:
         made = f"Made by `python -m benchmarks.studio --out {args.out}`."
-        write_page(args.out, f"# The studio's answers\n\n{text}\n{load()}\n\n{made}")
+        write_page(args.out, f"# The studio's answers\n\n{text}\n{made}")
     return 0 if all(clears for _, clears in rows) else 1
 
 

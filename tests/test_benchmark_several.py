@@ -4,29 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from benchmarks.several import FIRST_SEED, report
 from benchmarks.several_bars import (
     false_name,
     figures,
     meant_named,
     named_rows,
-    rows_of_suspect,
     slip_found,
     strongest_right,
 )
 from benchmarks.several_cases import GROUPS, make_jobs, noise_remarks, suspects_of_refusal
-from benchmarks.several_seen import shows_beside
-from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.case import clamp_of, draw_case, rows_of
-from toolpath_stiff.rig.effects import with_effect
-from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.sizes import Scale
 
 
 def record(truth: dict[str, float], verdict: str, plausible: list[str], **more: Any) -> dict[str, Any]:
-    effects = [{"effect": name, "size": size, "detectability": 9.0, "beside": 9.0} for name, size in truth.items()]
+    effects = [{"effect": name, "size": size, "detectability": 9.0} for name, size in truth.items()]
     return {"group": "pair", "layout": "tilted", "seed": 1, "hidden": "pair", "slip": "", "outliers": 0.02,
             "truth": list(truth), "effects": effects, "verdict": verdict, "plausible": plausible, "not_excluded": {},
             "suspects": [], **more}  # fmt: skip
@@ -39,31 +30,6 @@ def test_a_part_of_the_truth_is_no_false_name_and_an_open_list_is_none_either() 
     assert false_name(record(pair, "identified", ["weak_strut", "strut_law"]))
 
 
-def test_an_effect_shows_beside_another_by_what_that_cannot_take_up() -> None:
-    """Against generalised least squares with a full covariance, and bounded by what it shows alone."""
-    case = draw_case(3, "paper", ["weak_strut", "table_compliance"], size=[0.05, 0.04])
-    first, second = shows_beside(case)
-    assert 0.0 < first < case.truth["effects"][0]["detectability"] * 1.2
-    assert 0.0 < second < case.truth["effects"][1]["detectability"] * 1.2
-    rows, clamps = rows_of(case.rows), clamp_of(case.rows)
-    known = Scale(case.nominal, rows, clamps, case.nuisances).covariance
-    covariance = known.spread @ known.spread.T + known.noise * np.eye(len(clamps))
-    covariance += case.nuisances.clamping**2 * (clamps[:, None] == clamps)
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
-
-    def logs(factor: float) -> FloatArray:
-        strut = {"strut": case.truth["effects"][0]["parameters"]["strut"], "factor": factor}
-        machine = with_effect(HiddenMachine(), "table_compliance", case.truth["effects"][1]["parameters"])
-        return np.asarray(np.log(readings(case.nominal, with_effect(machine, "weak_strut", strut), rows)))
-
-    weak = case.truth["effects"][0]["parameters"]["factor"]
-    alone = with_effect(HiddenMachine(), "weak_strut", case.truth["effects"][0]["parameters"])
-    change = root @ (logs(weak) - np.log(readings(case.nominal, alone, rows)))
-    slope = root @ (logs(1.001 * weak) - logs(weak))
-    left = change - slope * float(slope @ change) / float(slope @ slope)
-    np.testing.assert_allclose(second, np.linalg.norm(left), rtol=0.02)
-
-
 def test_the_strongest_two_are_those_with_the_largest_sizes() -> None:
     three = {"weak_strut": 0.05, "gauge_scale": 0.10, "strut_law": 0.07}
     assert strongest_right(record(three, "identified", ["gauge_scale", "strut_law"]))
@@ -71,18 +37,15 @@ def test_the_strongest_two_are_those_with_the_largest_sizes() -> None:
     assert not strongest_right(record(three, "identified", ["gauge_scale", "strut_law", "spindle_compliance"]))
 
 
-def test_rows_are_read_however_they_are_named() -> None:
-    assert rows_of_suspect({"row": 7, "line": 8, "words": ""}) == {7}
-    assert rows_of_suspect({"rows": [7, 9]}) == rows_of_suspect({"row": 7, "rows": [7, 9], "lines": [8, 10]}) == {7, 9}
-    assert rows_of_suspect({"line": 8}) == rows_of_suspect({"lines": [8]}) == rows_of_suspect(7) == {7}
-    assert suspects_of_refusal("measurements.csv:152: stiffness ...")[0]["row"] == 151
+def test_a_refusal_by_the_reader_names_its_row() -> None:
+    assert suspects_of_refusal("measurements.csv:152: stiffness ...")[0]["rows"] == [151]
 
 
 def test_a_slip_is_found_by_its_row_and_named_by_what_belongs_there() -> None:
     slip = {"kind": "sign_of_angle", "rows": [5], "meant": {"a_deg": [12.5]}, "detectability": 9.0}
-    found = record({}, "adequate", ["none"], slips=[slip], suspects=[{"row": 5, "words": "a_deg -12.5, would be 12.5"}])
-    other = record({}, "adequate", ["none"], slips=[slip], suspects=[{"row": 6, "words": "a_deg would be 12.5"}])
-    blunt = record({}, "adequate", ["none"], slips=[slip], suspects=[{"row": 5, "words": "wild"}])
+    found = record({}, "adequate", ["none"], slips=[slip], suspects=[{"rows": [5], "words": "would be 12.5"}])
+    other = record({}, "adequate", ["none"], slips=[slip], suspects=[{"rows": [6], "words": "a_deg would be 12.5"}])
+    blunt = record({}, "adequate", ["none"], slips=[slip], suspects=[{"rows": [5], "words": "wild"}])
     assert (slip_found(found), meant_named(found)) == (True, True)
     assert (slip_found(other), meant_named(other), named_rows(other)) == (False, False, {6})
     assert (slip_found(blunt), meant_named(blunt)) == (True, False)
