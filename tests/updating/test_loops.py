@@ -231,7 +231,7 @@ def test_what_the_tip_cannot_tell_an_indicator_names(joints):
     assert (found.verdict, found.plausible) == ("identified", ["joint_compliance"])
     written = found.to_dict()
     # Errors are those of the tip's readings; the loops stand beside them.
-    assert written["readings"] == 42 == len(found.before)
+    assert written["readings"] == 42 == len(found.as_given.residual)
     assert [one["loop"] for one in written["loops"]["by_loop"]] == ["joint 1", "strut 1", "table"]
     assert all(abs(one["standard_deviations"]) < 4.0 for one in written["loops"]["by_loop"])
 

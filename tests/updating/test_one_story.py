@@ -24,8 +24,8 @@ from toolpath_stiff.correction.result import Update, residuals_csv
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.diagnosis import words as verdict_words
+from toolpath_stiff.diagnosis.examination import odds_words
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.diagnosis.rows import odds_words
 from toolpath_stiff.diagnosis.words import next_steps, verdict_text, why
 from toolpath_stiff.hints import Asked, parted
 from toolpath_stiff.inference.errors import raised_text, scatter_text
@@ -353,6 +353,7 @@ def test_the_next_step_is_one_that_would_be_taken(bounded, command):
         explanations=("weak_strut",),
         plausible=("weak_strut", "frame_compliance"),
         fits={"weak_strut": fit},
+        remarks=(),
     )
     steps = verdict_words.next_steps(diagnosis, Asked(("m.csv",)))
     assert [parted(step)[1] for step in steps] == [command]

@@ -16,7 +16,7 @@ from toolpath_stiff.correction.machines import fitted_machine
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.strut_law import BarCurve, StrutLawSearch
 from toolpath_stiff.correction.task import LIKELIHOOD, UpdateTask
-from toolpath_stiff.diagnosis.rows import percent_of, rounded_errors
+from toolpath_stiff.diagnosis.examination import percent_of, rounded_errors
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions
-from toolpath_stiff.diagnosis.rows import FittedSize, fitted_sizes, held_errors, percent_of, rounded_errors
+from toolpath_stiff.diagnosis.examination import FittedSize, fitted_sizes, held_errors, percent_of, rounded_errors
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import HeldOut, error_falls, gain_in_standard_errors, held_out

@@ -29,7 +29,7 @@ from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.strut_law import bar_curve, leave_points_out, minimise_mean_error, resampled_covariance
 from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
 from toolpath_stiff.diagnosis.diagnose import check_measured
-from toolpath_stiff.diagnosis.rows import percent_of
+from toolpath_stiff.diagnosis.examination import percent_of
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import Candidate, testable_effects

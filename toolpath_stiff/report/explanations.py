@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from toolpath_stiff.diagnosis.examination import SHOWN, FittedSize, HypothesisRow, percent_of
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.diagnosis.rows import SHOWN, FittedSize, HypothesisRow, percent_of
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, next_steps, verdict_text, why
 from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import parted
@@ -225,7 +225,7 @@ def _next_readings(diagnosis: Diagnosis) -> list[str]:
     """How many readings are proposed, and what they would settle."""
     if not diagnosis.next_measurements:
         return []
-    reasons = list(dict.fromkeys(reading["why"] for reading in diagnosis.next_measurements))
+    reasons = list(dict.fromkeys(str(reading["why"]) for reading in diagnosis.next_measurements))
     more = [f"{len(reasons) - FEW_REASONS} more in the file"] if len(reasons) > FEW_REASONS else []
     proposed = counted(len(diagnosis.next_measurements), "reading")
     return [f"{proposed} proposed in diagnose.json: {'; '.join([*reasons[:FEW_REASONS], *more])}"]

@@ -79,7 +79,7 @@ def fits(diagnosis: Diagnosis) -> Figure:
     return before_after(
         Fits(
             diagnosis.data,
-            diagnosis.before,
+            diagnosis.as_given.residual,
             diagnosis.after,
             f"{word} {plain(best.label)}" if best else LAW_REFITTED,
             (best or base).held_out_error_percent,

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from toolpath_stiff.diagnosis.examination import HypothesisRow
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.diagnosis.rows import HypothesisRow
 from toolpath_stiff.inference.errors import AS_GIVEN
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.report.colours import BLUE, CHOSEN, GREY, INK, MUTED, ORANGE
