@@ -149,12 +149,11 @@ def _without_slips(
         # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
         progress("once more with the rows mended that look mistyped")
         clear = clear if judged(slips.mended(data, clear))[1].explained else []
-    entries = slips.suspect_entries(suspects, data, left_out=clear)
-    if clear:
-        progress("once more without the rows that look mistyped")
-        data = data.select(kept)
-        judgements, main = judged(data)
-    return judgements, main, data, tuple(entries)
+    entries = tuple(slips.suspect_entries(suspects, data, left_out=clear))
+    if not clear:
+        return judgements, main, data, entries
+    progress("once more without the rows that look mistyped")
+    return *judged(data.select(kept)), data.select(kept), entries
 
 
 def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:
@@ -162,12 +161,12 @@ def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...
     verdicts = {judgement.verdict for judgement in judgements}
     plausible = tuple(dict.fromkeys(name for judgement in judgements for name in judgement.plausible))
     same = len({frozenset(judgement.plausible) for judgement in judgements}) == 1
-    if len(verdicts) == 1:
-        (verdict,) = verdicts
-        return verdict if same or verdict not in NAMING else "ambiguous", plausible
     if verdicts == set(NAMING) and same:
         return "described", plausible
-    return "ambiguous", plausible or (NONE,)
+    if len(verdicts) > 1:
+        return "ambiguous", plausible or (NONE,)
+    (verdict,) = verdicts
+    return verdict if same or verdict not in NAMING else "ambiguous", plausible
 
 
 def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portrait | None:
@@ -175,23 +174,19 @@ def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portra
 
     None where nothing stands out of what is left, and where the readings do not look as if they were of this machine.
     """
-    main, verdict = diagnosis.main, diagnosis.verdict
-    if main.question or verdict == "adequate":
+    main, unexplained = diagnosis.main, diagnosis.verdict == "unexplained"
+    problem, noise, base = main.problem, diagnosis.noise, main.base if unexplained else diagnosis.likeliest
+    gate = main.gates.get(diagnosis.best or "")
+    left = gate is not None and gate.probability <= FALSE_ALARM and noise.tip is None
+    if main.question or diagnosis.verdict == "adequate" or not (unexplained or left):
         return None
-    base = main.base
-    if verdict != "unexplained":
-        gate = main.gates.get(diagnosis.best or "")
-        if gate is None or gate.probability > FALSE_ALARM or diagnosis.noise.tip is not None:
-            return None
-        base = diagnosis.likeliest
-    problem, noise = main.problem, diagnosis.noise
     if noise.tip is not None:  # its terms are compliances at the tip: other loops are left out
         noise = noise.select(noise.tip)
         problem = Problem.of(Predictor(diagnosis.machine, diagnosis.data, diagnosis.predictor.effect_files), noise)
         base = problem.score_base()
     progress("describing what is missing")
     portrait = draw_portrait(problem, base, noise, diagnosis.seed)
-    return portrait if portrait.terms or verdict == "unexplained" else None
+    return portrait if portrait.terms or unexplained else None
 
 
 def alike_of(diagnosis: Diagnosis) -> Alike | None:

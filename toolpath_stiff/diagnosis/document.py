@@ -48,7 +48,6 @@ def document_of(diagnosis: Examination) -> Document:
             "repeat_percent": percent_of(noise.typical_repeat, 4),
             "clamping_percent": percent_of(noise.clamping, 4),
             "strut_spread_percent": percent_of(noise.strut_spread, 4),
-            "joint_error_mm": json_number(float(mm_from_m(noise.joint_error)), 4),
             "origin": noise.origin,
         },
         "gates": _gates(main),
@@ -97,7 +96,6 @@ def _baseline(diagnosis: Examination) -> Document:
             {
                 "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),
                 "stiffness_N_per_um": json_number(n_per_um_from_n_per_m(stiffness * factor)),
-                "machine_file_N_per_um": json_number(n_per_um_from_n_per_m(stiffness)),
                 "sd_percent": percent_of(deviation, 3),
             }
             for (length, stiffness), factor, deviation in zip(ends, factors, deviations, strict=True)
@@ -183,6 +181,5 @@ def _in_short(judgement: Judgement) -> Document:
         "noise_percent": percent_of(judgement.noise.typical, 4),
         "origin": judgement.noise.origin,
         "probability": {name: json_number(weight, 4) for name, weight in judgement.likely if weight > 1e-4},
-        "baseline_gate_probability": json_number(judgement.base_gate.probability, 3),
         "structure": judgement.base_gate.worst,
     }

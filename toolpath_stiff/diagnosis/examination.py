@@ -202,11 +202,9 @@ class Examination:
 
         The likeliest, of equals the one with more evidence.
         """
-        names = [name for name, weight in self.main.likely if weight > 0.0] + [
-            family.name for family in self.main.families
-        ]
-        offered = (n for n in names if n in self.fits and any(size.any() for size in self.fits[n].sizes))
-        return next(offered, None)
+        names = [name for name, weight in self.main.likely if weight > 0.0]
+        names += [family.name for family in self.main.families]
+        return next((n for n in names if n in self.fits and any(size.any() for size in self.fits[n].sizes)), None)
 
     @property
     def likeliest(self) -> Fit:
@@ -237,15 +235,12 @@ class Examination:
         pairs.sort(key=lambda row: (-(row.probability or 0.0), -(row.log_evidence or 0.0)))
         every = [*candidates, *pairs]
         offered = max((row for row in every if row.offered), key=lambda row: row.probability or 0.0, default=None)
+        as_given = HypothesisRow(AS_GIVEN, AS_GIVEN, title="the machine file as it stands")
+        outside = HypothesisRow(OUTSIDE, OUTSIDE, title="a smooth unknown")
         return HypothesisRows(
-            HypothesisRow(
-                AS_GIVEN, AS_GIVEN, title="the machine file as it stands", mean_abs_error_percent=error,
-                held_out_error_percent=error,
-            ),
+            replace(as_given, mean_abs_error_percent=error, held_out_error_percent=error),
             replace(refitted, label="strut law refitted (none)", title="no further effect"),
-            HypothesisRow(
-                OUTSIDE, OUTSIDE, title="a smooth unknown", probability=json_number(likely.get(OUTSIDE, 0.0))
-            ),
+            replace(outside, probability=json_number(likely.get(OUTSIDE, 0.0))),
             tuple(pairs), tuple(candidates), next((row for row in every if row.name == self.best), offered),
         )  # fmt: skip
 
@@ -279,13 +274,12 @@ def _row(diagnosis: Examination, name: str, log_evidence: float) -> HypothesisRo
 
 def _candidate(diagnosis: Examination, family: Family) -> HypothesisRow:
     """A single effect; where it fits best when it is absent, without sizes."""
-    main, name = diagnosis.main, family.name
-    alone = main.base_gate.probability > FALSE_ALARM
+    name, alone = family.name, diagnosis.main.base_gate.probability > FALSE_ALARM
     row = replace(_row(diagnosis, name, family.log_evidence), title=family.effect.title)
     if not row.sizes:
         return replace(row, adequate=alone, eligible=False, remark="fits best when it is absent")
     bounded = diagnosis.fits[name].at_upper_bound()
-    remark = "" if name in main.gates or alone else "not tested further"
+    remark = "" if name in diagnosis.main.gates or alone else "not tested further"
     return replace(row, eligible=not bounded, remark=f"{', '.join(bounded)} at its bound" if bounded else remark)
 
 
@@ -313,17 +307,12 @@ def odds_words(probability: float, best: float) -> str:
 
 def fitted_sizes(fit: Fit, family: Family | None = None, widening: float = 1.0) -> dict[str, dict[str, FittedSize]]:
     """Effect -> key -> value, unit, 95 % interval of all effects of a fit, with standard deviations so much wider."""
-    sizes: dict[str, dict[str, FittedSize]] = {}
-    index = 0
-    for candidate, values in zip(fit.candidates, fit.sizes, strict=True):
-        entries = sizes.setdefault(candidate.name, {})
-        for component, size in zip(candidate.components, values.tolist(), strict=True):
-            parameter = component.parameter
-            ends = interval(fit, index, component, size, family, widening)
-            low, high = sorted(component.value(end) / parameter.si for end in ends)
-            value = json_number(component.value(size) / parameter.si)
-            entries[parameter.key] = FittedSize(value, parameter.unit, (json_number(low), json_number(high)))
-            index += 1
+    sizes: dict[str, dict[str, FittedSize]] = {candidate.name: {} for candidate in fit.candidates}
+    owners = [candidate.name for candidate in fit.candidates for _ in candidate.components]
+    for index, (owner, (component, size)) in enumerate(zip(owners, fit.parts, strict=True)):
+        ends = [component.value(end) for end in interval(fit, index, component, size, family, widening)]
+        value, low, high = (json_number(x / component.parameter.si) for x in (component.value(size), *sorted(ends)))
+        sizes[owner][component.parameter.key] = FittedSize(value, component.parameter.unit, (low, high))
     return sizes
 
 

@@ -29,5 +29,4 @@ class Diagnosis(Examination, FolderResult):
         return frame_of(self.to_dict()["candidates"])
 
     def _short(self) -> str:
-        names = ", ".join(self.plausible)
-        return f"{self.verdict}: {names}" if names else self.verdict
+        return f"{self.verdict}: {', '.join(self.plausible)}" if self.plausible else self.verdict

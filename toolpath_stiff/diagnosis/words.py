@@ -1,6 +1,7 @@
 """A diagnosis in sentences."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import NAMING, Examination
 from toolpath_stiff.hints import Asked, both_names, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
+from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR
@@ -107,9 +109,8 @@ def _hidden(diagnosis: Examination) -> str:
         return ""
     shown = [smallest.rms for smallest in diagnosis.detectable if smallest.seen]
     law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
-    change = "every effect"
-    if shown:
-        change = f"a missing effect that changes the stiffness by less than {100.0 * min(shown):.2g} % (rms)"
+    change = f"a missing effect that changes the stiffness by less than {100.0 * min(shown, default=0.0):.2g} % (rms)"
+    change = change if shown else "every effect"
     return (
         f" But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading would "
         f"hide {change} and struts that are off by up to {100.0 * law:.2g} %."
@@ -163,16 +164,16 @@ def _base_text(judgement: Judgement, several: bool) -> str:
 
 def _not_told_apart(diagnosis: Examination) -> list[str]:
     """Why the plausible effects cannot be told apart."""
-    data = diagnosis.data
-    groups = [[name for name in group if name in diagnosis.plausible] for group in diagnosis.confounding.sets]
-    same = "have the same signature on these poses, loads and directions"
-    reasons = [f"{joined(group)} {same}" for group in groups if len(group) > 1]
+    data, names, matrix = diagnosis.data, diagnosis.confounding.names, diagnosis.confounding.matrix
+    pairs = combinations([names.index(name) for name in diagnosis.plausible if name in names], 2)
+    same = "have the same signature on these poses, loads and directions: correlation"
+    reasons = [f"{names[i]} and {names[j]} {same} {matrix[i, j]:.3f}" for i, j in pairs if matrix[i, j] > CONFOUNDED]
     if NONE in diagnosis.plausible:
         reasons.append("chance alone is not excluded either")
     for effect in (family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible):
         if count := int(seen_readings([effect], data).sum()):
-            seen = f"the form of {effect.name} was read off {count} of these {len(data)} readings"
-            reasons.append(f"{seen}: its probability is too high")
+            seen = f"was read off {count} of these {len(data)} readings: its probability is too high"
+            reasons.append(f"the form of {effect.name} {seen}")
     return reasons
 
 
@@ -201,12 +202,11 @@ def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str
             hint("see which readings are how far off", request.command("compare")),
         ]
     if verdict == "unexplained":
+        file = request.new_effect()
+        write = hint("write the effect that you suspect as one file", command_line("effects", "new", file))
         if diagnosis.portrait is not None and any(sized.term.acts for sized in diagnosis.portrait.terms):
             file = request.new_effect("missing", ".toml")
             write = hint("write what it looks like as an effect to edit", request.command("effects draft", "-o", file))
-        else:
-            file = request.new_effect()
-            write = hint("write the effect that you suspect as one file", command_line("effects", "new", file))
         look = hint("look where the residuals lie", request.command("compare"))
         return [look, write, hint("and try it", request.command("diagnose", effects=[file]))]
     use = "use the model; `detectable` lists what could still be there unseen"
@@ -239,24 +239,19 @@ def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
     """What is neither shown nor excluded, and where an indicator would tell; "" where there is nothing."""
     if not unexcluded:
         return ""
-    named, more = unexcluded[:MOST_BESIDE], len(unexcluded) - MOST_BESIDE
-    effects = [
-        f"{hidden.effect.name} ({_up_to(hidden)}, {100.0 * hidden.rms:.2g} % of the tip's stiffness)"
-        for hidden in named
-    ]
+    named, more, effects = unexcluded[:MOST_BESIDE], len(unexcluded) - MOST_BESIDE, list[str]()
+    for hidden in named:
+        parameter, choice = hidden.parameter, hidden.candidate.choice
+        chosen = [choice_text(key, value) for key, value in choice if value not in ("", 0)]
+        way = "down to" if np.isinf(parameter.neutral) else "up to"  # a stiffness goes down
+        up_to = f"{way} {float(f'{hidden.value / parameter.si:.2g}'):g} {parameter.unit}"
+        share = f"{100.0 * hidden.rms:.2g} % of the tip's stiffness"
+        effects.append(f"{hidden.effect.name} ({', '.join([up_to, *chosen, share])})")
     effects += [f"{more} more"] if more > 0 else []
     places = dict.fromkeys(INDICATORS[hidden.effect.link].split(":")[0] for hidden in named)
     tells = " or ".join(place for place in places if place != "none")
     words = f"{joined(effects)}: the readings neither show nor exclude {'it' if len(unexcluded) == 1 else 'them'}"
     return f"{words}; an indicator {tells} would tell" if tells else words
-
-
-def _up_to(hidden: Unexcluded) -> str:
-    """The size up to which an effect is not excluded, with its unit and what it acts on; a stiffness goes down."""
-    parameter = hidden.parameter
-    chosen = [choice_text(key, value) for key, value in hidden.candidate.choice if value not in ("", 0)]
-    way = "down to" if np.isinf(parameter.neutral) else "up to"
-    return ", ".join([f"{way} {float(f'{hidden.value / parameter.si:.2g}'):g} {parameter.unit}", *chosen])
 
 
 def would_tell(hidden: Unexcluded) -> str:
