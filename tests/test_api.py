@@ -194,7 +194,6 @@ NO_EXAMPLE = {
         "unconfirmed",
         "predictor",
         "explanations",
-        "before",
         "after",
     },
     "Plan": {"rows", "sentences", "notes", "visits"},
@@ -219,7 +218,7 @@ NO_EXAMPLE = {
     },
     "Update": {  # steps and fits in SI, and what follows from them
         *("described", "last", "changed", "worse", "supported", "verdict", "widening", "corrected", "fitted"),
-        "document",
+        *("document", "noise", "question", "text", "assumptions"),
     },
     "Machine": {"picture"},
     "MachineCheck": {"picture"},

@@ -105,7 +105,7 @@ class Update(FolderResult):
     provenance: Document = field(default_factory=dict)
     next: Sequence[str] = ()
     inputs: tuple[str, ...] = ()
-    opened: Callable[[Hexapod], Any] = lambda machine: machine
+    opened: Callable[[Hexapod], Any] | None = None
 
     @property
     def noise(self) -> Noise:
@@ -186,7 +186,8 @@ class Update(FolderResult):
     @property
     def machine(self) -> Any:
         """The machine that carries what was added; raises `InputError` where it was refused."""
-        return self.opened(self._written())
+        machine = self._written()
+        return machine if self.opened is None else self.opened(machine)
 
     def machine_text(self) -> str:
         """The new machine file, with where its fitted values come from; raises `InputError` where it was refused."""
