@@ -258,7 +258,7 @@ functions, types = set(), set()
 def note(frame, event, argument):
     if event == "call" and frame.f_globals.get("__name__", "").startswith("{package}."):
         code = frame.f_code
-        if not code.co_name.startswith("<"):
+        if code.co_flags & 1 and not code.co_name.startswith("<"):  # not a class body
             functions.add((code.co_filename, code.co_firstlineno, code.co_name))
         for name in code.co_varnames[:code.co_argcount + code.co_kwonlyargcount]:
             kind = type(frame.f_locals.get(name))

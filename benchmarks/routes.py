@@ -54,15 +54,11 @@ def methods(tilted: bool) -> list[Method]:
         for p, r in zip(position[few], plain_rotation[few], strict=True):
             opensees.compliance(bars, p, r, BAR_STIFFNESS)
 
-    def route(name: str) -> Callable[[], object]:
-        return lambda: core.tip_compliance(model, position, rotation, route=name)
-
     one_way = (kernel, columns, loads, turned)
     calls: dict[str, Callable[[], object]] = {
         "24 x 24 assembly and solve, pose by pose (numpy)": plain,
         "OpenSees, model rebuilt, pose by pose": rebuilt,
-        "exact route (batched LAPACK)": route("exact"),
-        "closed form (numpy), whole call": route("closed_form"),
+        "exact route (batched LAPACK)": lambda: core.tip_compliance(model, position, rotation),
         "evaluate(): stiffness, margins, limits (numpy)": lambda: evaluate(model, position, abc, direction),
         "closed form (numpy), one direction and lengths": lambda: closed_form.compliance_along_columns(*one_way),
         "compiled (numba), the same, poses last": lambda: compiled.compliance_along_columns(*one_way),
@@ -77,12 +73,16 @@ def check_agreement(tilted: bool) -> None:
     bars = machine.with_changes(platform_bar_stiffness=BAR_STIFFNESS)
     position, rotation = poses(20, tilted)
     turns = rotation if rotation is not None else np.broadcast_to(np.eye(3), (20, 3, 3))
-    fast = [core.tip_compliance(build_model(machine), position, rotation, route=r) for r in ("exact", "closed_form")]
+    fast = core.tip_compliance(build_model(machine), position, rotation)
+    kernel, tip = closed_form.prepare(machine), np.ascontiguousarray(position.T)
+    columns = None if rotation is None else rotation.reshape(-1, 9).T
+    axes = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, 20))
+    along = closed_form.compliance_along_columns(kernel, tip, axes, columns)[0]
     for i, (p, r) in enumerate(zip(position, turns, strict=True)):
         plain = reference.tip_compliance(bars, p, r)
         np.testing.assert_allclose(opensees.compliance(bars, p, r, BAR_STIFFNESS), plain, rtol=1e-6, atol=1e-14)
-        for other in fast:
-            np.testing.assert_allclose(other[i], plain, rtol=1e-3, atol=1e-12)  # bars of 1e12 against rigid ones
+        np.testing.assert_allclose(fast[i], plain, rtol=1e-3, atol=1e-12)  # bars of 1e12 against rigid ones
+        np.testing.assert_allclose(along[:, i], np.diag(plain), rtol=1e-3, atol=1e-12)
 
 
 def measure_routes(rounds: int) -> tuple[list[str], bool]:

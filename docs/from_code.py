@@ -188,11 +188,11 @@ def commands() -> str:
         lines += [f"## {group.capitalize()}", ""]
         for name, about in names.items():
             actions = actions_of(name)
-            if "" not in actions:
+            if name not in actions:
                 lines += [f"### tps {name}", "", _escaped(about[:1].upper() + about[1:]) + ".", ""]
-            for action, command in actions.items():
-                title = f"tps {name} {action}".strip()
-                lines += _command(command.parser(title), about if not action else "", 4 if action else 3)
+            for title, command in actions.items():
+                alone = title == name
+                lines += _command(command.parser(f"tps {title}"), about if alone else "", 3 if alone else 4)
     return "\n".join(lines)
 
 

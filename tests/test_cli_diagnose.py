@@ -165,7 +165,7 @@ SHORT_NOISE = "more than 0 and at most 50"
         (["{strut}", "--noise", "two"], "two"),
         (["{strut}", "--noise", "nan"], "nan"),
         (["{strut}", "--seed", "-1"], "seed"),
-        (["{strut}", "--strut-spread", "-1"], "0 to 50"),
+        (["{strut}", "--strut-spread", "-1"], "at most 50"),
         (["{strut}", "--machine", "no-such-machine"], "no-such-machine"),
         (["{strut}", "--effects", "{missing}"], "missing.csv"),
         (["{strut}", "{strut}"], "twice"),

@@ -50,16 +50,16 @@ def unwritable(folder):
 @pytest.mark.parametrize(
     ("kind", "go"),
     [
-        (errors.MachineFileError, lambda folder: load_machine("nits")),
-        (errors.MachineFileError, broken_machine),
+        (errors.InputError, lambda folder: load_machine("nits")),
+        (errors.InputError, broken_machine),
         (errors.EffectError, machine_without_effect),
         (errors.EffectError, lambda folder: find_effect("weak_stru")),
         (errors.ProgramError, lambda folder: parse_program("G1 X1 X2\n", "part.nc")),
         (errors.ProgramError, broken_controller),
-        (errors.TableError, lambda folder: parse_table("", "t.csv", Columns(("x_mm",)))),
+        (errors.InputError, lambda folder: parse_table("", "t.csv", Columns(("x_mm",)))),
         (errors.MeasurementError, no_measurements),
-        (errors.FileError, unwritable),
-        (errors.PoseError, lambda folder: forward_kinematics(load_machine("nist"), [[0.1] * 6])),
+        (errors.InputError, unwritable),
+        (errors.InputError, lambda folder: forward_kinematics(load_machine("nist"), [[0.1] * 6])),
     ],
 )
 def test_what_is_wrong_decides_the_class(tmp_path, kind, go):
@@ -69,9 +69,8 @@ def test_what_is_wrong_decides_the_class(tmp_path, kind, go):
     assert caught.value.exit_code == 2
 
 
-def test_a_table_can_be_caught_with_or_without_its_measurements():
-    assert issubclass(errors.MeasurementError, errors.TableError)
-    assert issubclass(errors.UnreachableError, errors.PoseError)
+def test_what_a_fit_walks_away_from_is_an_input_error_and_a_fault_is_none():
+    assert issubclass(errors.EffectError, errors.InputError)
     assert not issubclass(errors.EffectFault, errors.InputError)
 
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
 import toolpath_stiff as tps
 from tests.faults import FAULTS, count_points, fail_at, killed, points
-from toolpath_stiff.cli.main import main
-from toolpath_stiff.errors import FileError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.results_folder import INCOMPLETE, MANIFEST, Rules, incomplete, write_folder
+from toolpath_stiff.results_folder import INCOMPLETE, MANIFEST, Rules, write_folder
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and counts the calls of Linux")
 
@@ -31,6 +32,10 @@ def tree(folder):
 def left(place):
     """What a run leaves that is not a result."""
     return [path.name for path in place.rglob(".*") if path.name != MANIFEST]
+
+
+def incomplete(folder):
+    return (folder / INCOMPLETE).exists()
 
 
 def nothing_there(out):
@@ -86,7 +91,7 @@ def test_an_error_at_any_point_leaves_the_old_files_or_the_new_or_the_folder_say
         try:
             with points(fail_at(number, *FAULTS[fault])):
                 write(out)
-        except FileError as error:
+        except InputError as error:
             assert os.strerror(FAULTS[fault][0]) in str(error)
             refused += 1
         assert tree(out) in (old, new) or incomplete(out), number
@@ -124,9 +129,9 @@ def test_a_single_file_is_the_old_or_the_new(tmp_path):
             if fault is None:
                 assert killed(run, number)
             else:
-                with pytest.raises(FileError), points(fail_at(number, *fault)):
+                with pytest.raises(InputError), points(fail_at(number, *fault)):
                     run()
-                    raise FileError("a failed fsync of the folder is no failure")
+                    raise InputError("a failed fsync of the folder is no failure")
             assert file.read_text() in ("old", "new text")
             run()
             assert file.read_text() == "new text"
@@ -136,49 +141,17 @@ def test_a_single_file_is_the_old_or_the_new(tmp_path):
                 path.unlink()
 
 
-@pytest.mark.parametrize("prepare", [nothing_there, old_results, old_results_and_a_folder])
-def test_a_file_elsewhere_and_its_folder_are_of_one_run_or_the_folder_says_so(tmp_path, prepare):
-    """`place --write`, `update -o`."""
-    place = tmp_path / "place"
-    out, file = place / "out", place / "machine.toml"
+def test_another_run_waits_for_its_turn(tmp_path):
+    second = threading.Thread(target=lambda: write_folder(tmp_path, {"a": "second"}, command="test"))
 
-    def fresh():
-        shutil.rmtree(place, ignore_errors=True)
-        prepare(out)
-        write_atomically(file, "old")
-        return tree(out)
+    def content():
+        second.start()
+        time.sleep(0.1)
+        return "first"
 
-    def run():
-        write_folder(out, NEW, command="test", elsewhere={file: "new"})
-
-    before = fresh()
-    total = count_points(run)
-    after = tree(out)
-    assert INCOMPLETE not in after and not incomplete(out)
-    states = set()
-    for number in range(1, total + 1):
-        fresh()
-        assert killed(run, number)
-        whole = tree(out) in ((before, after)[file.read_text() == "new"],)
-        assert whole or incomplete(out), number
-        states.add(whole)
-        for code, lasting in FAULTS.values():
-            fresh()
-            try:
-                with points(fail_at(number, code, lasting)):
-                    run()
-            except FileError:
-                assert incomplete(out) or (tree(out), file.read_text()) in ((before, "old"), (after, "new")), number
-        run()
-        assert tree(out) == after and file.read_text() == "new" and not left(place)
-    assert states == {True, False}
-
-
-def test_another_run_is_kept_out(tmp_path):
-    inside = {"a": lambda: write_folder(tmp_path / "out", {"b": ""}, command="test")}
-    with pytest.raises(FileError, match=r"is being written by another run\. Wait for it"):
-        write_folder(tmp_path / "out", inside, command="test")
-    assert not list(tmp_path.iterdir())
+    assert write_folder(tmp_path, {"a": content}, command="test")[0].read_text() == "first"
+    second.join()
+    assert (tmp_path / "a").read_text() == "second"
 
 
 def test_the_current_folder_stays_itself(tmp_path, monkeypatch):
@@ -218,22 +191,3 @@ def test_many_programs_killed_leave_no_overview_of_another_run(tmp_path):
         else:
             stopped += 1
     assert stopped
-
-
-def test_every_command_that_reads_an_incomplete_folder_says_so(tmp_path, capsys):
-    """The process that writes a file elsewhere dies between the folder and that file."""
-    out, file = tmp_path / "out", tmp_path / "part.nc"
-    command = ["machine", "check", str(out / "machine.toml"), "--json"]
-
-    def run():
-        write_folder(out, {"machine.toml": text}, command="test", elsewhere={file: "new"})
-
-    text = tps.Machine.load("nist").save(tmp_path / "nist.toml").read_text()
-    run()
-    assert main(command) == 0 and not capsys.readouterr().err
-    number = count_points(run)
-    while not incomplete(out):
-        assert killed(run, number)
-        number -= 1
-    assert main(command) == 0
-    assert "is incomplete: the run that wrote it has not come to its end" in capsys.readouterr().err

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import inspect
 import re
 import shlex
 from pathlib import Path
@@ -14,10 +13,10 @@ import pytest
 import toolpath_stiff
 from tests.effects.cases import BENCH_FILE
 from tests.machine.test_machine_files import HAL
-from toolpath_stiff.cli.main import COMMANDS, main
+from toolpath_stiff.cli.main import MODULES as COMMANDS
+from toolpath_stiff.cli.main import main
 from toolpath_stiff.diagnosis.words import next_steps
-from toolpath_stiff.hints import ARGUMENTS, Asked, command_line, hint, parted
-from toolpath_stiff.nc.program import Reading
+from toolpath_stiff.hints import Asked, command_line, hint, parted
 from toolpath_stiff.rig import case, exercise
 
 PACKAGE = Path(toolpath_stiff.__file__).parent
@@ -204,33 +203,3 @@ def test_no_message_holds_a_command_with_a_gap_to_fill():
             if "tps " in node.value and gap.search(node.value)
         ]
     assert found == []
-
-
-def literals(module: Path) -> list[str]:
-    """Texts of a module: not docstrings, not what `both_names` is given."""
-    tree = ast.parse(module.read_text(encoding="utf-8"))
-    skipped = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "both_names":
-            skipped |= {id(one) for argument in node.args for one in ast.walk(argument)}
-    nodes = [one for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)]
-    return [one.value for one in nodes if id(one) not in skipped]
-
-
-def test_messages_below_the_command_line_name_an_option_as_the_function_does_too():
-    """Python callers get the same messages: an option whose argument has another name goes through `both_names`."""
-    pattern = re.compile(rf"--({'|'.join(ARGUMENTS)})\b(?!-)")
-    exempt = {"cli", "studio", "rig"}  # rooms of the command line alone
-    for module in PACKAGE.rglob("*.py"):
-        if module.relative_to(PACKAGE).parts[0] in exempt or module.name == "hints.py":
-            continue
-        for text in literals(module):
-            if not text.startswith("--"):  # a key of a document or a word of a command
-                assert not pattern.search(text), f"{module.name}: {text}"
-
-
-def test_the_arguments_of_options_are_arguments_of_public_functions():
-    functions = [getattr(toolpath_stiff, name) for name in toolpath_stiff.__all__]
-    functions += [toolpath_stiff.Program.read, toolpath_stiff.Machine.load, toolpath_stiff.Analysis.save]
-    taken = {name for one in functions if inspect.isroutine(one) for name in inspect.signature(one).parameters}
-    assert set(ARGUMENTS.values()) <= taken | set(Reading.__annotations__)  # `Program.read` takes these by Unpack

@@ -12,7 +12,7 @@ from concurrent.futures import CancelledError, as_completed
 import pytest
 from pebble import ProcessExpired
 
-from toolpath_stiff.defaults import THREADS, job_count
+from toolpath_stiff.defaults import THREADS
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.processes import ProcessPool, death
 
@@ -98,9 +98,3 @@ def test_whoever_leaves_early_stops_the_processes():
     assert all(future.done() for future in futures)
     assert all(f.cancelled() or isinstance(f.exception(), ProcessExpired | CancelledError) for f in futures[1:])
     assert set(threading.enumerate()) <= threads
-
-
-def test_jobs_are_as_asked_and_never_more_than_items():
-    assert job_count(7, 3) == 3 and job_count(2, 3) == 2 and 1 <= job_count(None, 3) <= 3
-    with pytest.raises(InputError):
-        job_count(0, 3)

@@ -14,7 +14,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 import toolpath_stiff
-from toolpath_stiff.cli.main import COMMANDS
+from toolpath_stiff.cli.main import MODULES as COMMANDS
 from toolpath_stiff.nc.codes.refused import REFUSED
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.cutter_location.vocabulary import WORDS

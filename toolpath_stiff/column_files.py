@@ -7,7 +7,6 @@ bytes that are taken out at the end. Where that cannot hold a number or a word, 
 
 import csv
 import io
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import AnyArray, BoolArray
+from toolpath_stiff.arrays import AnyArray
 from toolpath_stiff.errors import InputError
 
 Columns = Mapping[str, AnyArray]
@@ -24,10 +23,7 @@ Cells = NDArray[np.uint8]
 
 BLOCK = 8_192  # rows of CSV: their bytes fit into a processor's cache
 ROW_GROUP = 131_072  # rows of Parquet
-MOST_FRESH = 0.7  # share of rows; of columns that change in fewer, the rows in which they do not are copied
 LARGEST = 2.0**53  # beyond, a double does not hold every whole number
-
-
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet takes for a formula when a cell begins with it
 
 
@@ -112,13 +108,13 @@ def parquet_pieces(columns_of: Callable[[slice], Columns], rows: int) -> Iterato
 
 
 def _arrow(column: AnyArray) -> Any:
-    """A column of a Parquet file; of words, which cost a microsecond each to convert, those that follow others."""
+    """A column of a Parquet file; words, which cost a microsecond each to convert, once each."""
     import pyarrow as pa
 
-    fresh = _changes(column) if column.dtype.kind == "U" else None
-    if fresh is None:
+    if column.dtype.kind != "U":
         return pa.array(column, from_pandas=True)
-    return pa.array(column[fresh]).take(pa.array(np.cumsum(fresh) - 1))
+    words, places = np.unique(column, return_inverse=True)
+    return pa.array(words).take(pa.array(places))
 
 
 def _blocks(rows: int, size: int) -> Iterator[slice]:
@@ -128,53 +124,7 @@ def _blocks(rows: int, size: int) -> Iterator[slice]:
 
 def _by_digits(columns: Columns, decimals: Decimals) -> bytes | None:
     """Rows as `csv_rows` has them; None where a number is infinite or too large, or a word is not plain ASCII."""
-    parts = []
-    for names, fresh in _runs(columns):
-        rows = None if fresh is None else np.flatnonzero(fresh)
-        some = [columns[name] if rows is None else columns[name].take(rows) for name in names]
-        part = _joined([_cell(np.asarray(column), decimals[name]) for name, column in zip(names, some, strict=True)])
-        if part is None:
-            return None
-        parts.append(part if fresh is None else part.take(np.cumsum(fresh) - 1, axis=0))
-    cells = np.concatenate(parts, axis=1)
-    cells[:, -1] = ord("\n")
-    return cells.tobytes().replace(b"\0", b"")
-
-
-def _runs(columns: Columns) -> Iterator[tuple[list[str], BoolArray | None]]:
-    """Columns side by side that are written alike: all rows, or those (n,) in which any of them changes.
-
-    At a corner of a path the end of one move and the start of the next stand at the same place: half the digits of a
-    program of short moves are those of the row before.
-    """
-    names: list[str] = []
-    changed: BoolArray | None = None
-    for name, column in columns.items():
-        differs = _changes(column)
-        either = None if changed is None or differs is None else _if_few(changed | differs)
-        if names and either is None and not (changed is None and differs is None):
-            yield names, changed
-            names, either = [], None
-        names.append(name)
-        changed = differs if either is None else either
-    yield names, changed
-
-
-def _if_few(fresh: BoolArray) -> BoolArray | None:
-    return fresh if np.count_nonzero(fresh) <= MOST_FRESH * len(fresh) else None
-
-
-def _changes(column: AnyArray) -> BoolArray | None:
-    """(n,) whether a number or word is another one than in the row before; None where most are."""
-    if not len(column):
-        return None
-    fresh = np.ones(len(column), dtype=bool)
-    np.not_equal(column[1:], column[:-1], out=fresh[1:])
-    return _if_few(fresh)
-
-
-def _joined(cells: Sequence[Cells | None]) -> Cells | None:
-    """Cells side by side, a comma behind each; None where one of them is none."""
+    cells = [_cell(np.asarray(column), decimals[name]) for name, column in columns.items()]
     known = [cell for cell in cells if cell is not None]
     if len(known) < len(cells):
         return None
@@ -182,7 +132,8 @@ def _joined(cells: Sequence[Cells | None]) -> Cells | None:
     rows = np.full((len(known[0]), int(ends[-1])), ord(","), dtype=np.uint8)
     for cell, end in zip(known, ends, strict=True):
         rows[:, end - 1 - cell.shape[1] : end - 1] = cell
-    return rows
+    rows[:, -1] = ord("\n")
+    return rows.tobytes().replace(b"\0", b"")
 
 
 def _cell(column: AnyArray, digits: int | None) -> Cells | None:
@@ -193,29 +144,24 @@ def _cell(column: AnyArray, digits: int | None) -> Cells | None:
         letters = np.ascontiguousarray(column).view(np.uint32).reshape(len(column), -1)
         longest = int(np.flatnonzero(letters.any(axis=0)).max(initial=-1)) + 1
         return letters[:, :longest].astype(np.uint8) if letters.max() < 128 else None
-    if digits is None:
-        if column.dtype.kind not in "iu":
-            return None
-        low, high = int(column.min()), int(column.max())
-        return _number(column, 0, low, high) if max(-low, high) < LARGEST else None
-    # As numpy's round counts them, so that both ways print the same digits.
-    units = np.rint(column * 10.0**digits)
-    missing = None
-    if math.isnan(units.min()):
-        missing = np.isnan(units)
-        units[missing] = 0.0
-    ends = float(units.min()), float(units.max())
-    if not max(-ends[0], ends[1]) < LARGEST:
+    if digits is None and column.dtype.kind not in "iu":
         return None
-    cell = _number(units, digits, int(ends[0]), int(ends[1]))
+    # As numpy's round counts them, so that both ways print the same digits.
+    units = column if digits is None else np.rint(column * 10.0**digits)
+    missing = np.isnan(units) if np.isnan(units.min()) else None
+    if missing is not None:
+        units[missing] = 0.0
+    low, high = units.min(), units.max()
+    if not max(-low, high) < LARGEST:
+        return None
+    cell = _number(units, digits or 0, int(low), int(high))
     return cell if missing is None else np.where(missing[:, None], np.uint8(0), cell)
 
 
 def _number(units: AnyArray, digits: int, low: int, high: int) -> Cells:
     """Whole numbers of units (n,), from `low` to `high`, with a decimal point before the last `digits`."""
     if low == high:  # an axis that stands still, the only tool
-        text = f"{abs(low):0{digits + 1}d}"
-        text = "-" * (low < 0) + (f"{text[:-digits]}.{text[-digits:]}" if digits else text)
+        text = f"{'-' * (low < 0)}{abs(low) // 10**digits}" + (f".{abs(low) % 10**digits:0{digits}d}" if digits else "")
         return np.broadcast_to(np.frombuffer(text.encode(), dtype=np.uint8), (len(units), len(text)))
     largest = max(-low, high)
     # Half as wide numbers are divided four times as fast.
@@ -232,16 +178,12 @@ def _number(units: AnyArray, digits: int, low: int, high: int) -> Cells:
     for place in range(width - digits - 1):  # no zeros before the first figure, but the one before the point
         if least < 10 ** (width - 1 - place):
             figures[:, place] *= size >= 10 ** (width - 1 - place)
-    if not digits and low >= 0:
-        return figures
-    sign, point = int(low < 0), width - digits
-    cell = np.empty((len(units), sign + width + bool(digits)), dtype=np.uint8)
-    if sign:
-        np.multiply(units < 0, np.uint8(ord("-")), out=cell[:, 0])
-    cell[:, sign : sign + point] = figures[:, :point]
-    if digits:
-        cell[:, sign + point] = ord(".")
-        cell[:, sign + point + 1 :] = figures[:, point:]
+    point = width - digits
+    cell = np.empty((len(units), width + 2), dtype=np.uint8)
+    np.multiply(units < 0, np.uint8(ord("-")), out=cell[:, 0])
+    cell[:, 1 : point + 1] = figures[:, :point]
+    cell[:, point + 1] = ord(".") if digits else 0
+    cell[:, point + 2 :] = figures[:, point:]
     return cell
 
 

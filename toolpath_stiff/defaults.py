@@ -3,7 +3,6 @@
 import math
 import os
 
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, rad_from_deg
 
 VERSION = "0.2.0"  # of the package; pyproject.toml reads it from this text
@@ -44,19 +43,4 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 def usable_cpus() -> int:
     """CPUs that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def job_count(jobs: int | None, items: int) -> int:
-    """Processes for so many items: `jobs`, else one a CPU. Raises `InputError` for fewer than one."""
-    if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs {jobs}", expected="1 or more")
-    return max(1, min(jobs or usable_cpus(), items))
-
-
-def one_thread() -> None:
-    """Linear algebra on one thread, if it is not loaded yet: the processes share the CPUs, sums keep their order."""
-    for name in THREADS:
-        os.environ[name] = "1"
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

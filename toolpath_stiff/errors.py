@@ -4,21 +4,17 @@ A tree, so that a caller can catch as much as it can handle::
 
     TpsError
       InputError            something in the input is wrong
-        FileError           a file cannot be read or written
         ProgramError        an NC program, or what belongs to its control
-        MachineFileError    a machine file
-        TableError          a table: CSV or Excel
-          MeasurementError  readings, raw records, plans
+        MeasurementError    readings, raw records, plans
         EffectError         a physical effect, or its parameters
-        PoseError           a pose that cannot be computed
-          UnreachableError  a pose beyond the machine's limits
+        UnreachableError    a pose beyond the machine's limits
       InputErrors           several input errors together
       EffectFault           a user's own effect breaks the contract
 
 >>> from toolpath_stiff.machine.file import load_machine
 >>> try:
 ...     load_machine("nits")
-... except MachineFileError as error:
+... except InputError as error:
 ...     print(error.found)
 machine 'nits' is neither a packaged machine nor a file
 """
@@ -40,12 +36,7 @@ def harmless(text: str) -> str:
 
 
 LONGEST_QUOTE = 2000  # characters of what was found: a line, a number or a name may have a million
-
-
-def _cut(text: str) -> str:
-    """What was found, cut in its middle where it is endless."""
-    half = LONGEST_QUOTE // 2
-    return text if len(text) <= LONGEST_QUOTE else f"{text[:half]} ... {text[-half:]}"
+MOST_TOLD = 20  # of several errors
 
 
 class TpsError(Exception):
@@ -97,9 +88,13 @@ class InputError(TpsError):
         line: int | None = None,
         column: int | None = None,
     ) -> None:
-        self.found, self.expected, self.hint = _cut(found), expected, hint
+        half = LONGEST_QUOTE // 2
+        self.found = found if len(found) <= LONGEST_QUOTE else f"{found[:half]} ... {found[-half:]}"
+        self.expected, self.hint = expected, hint
         self.file, self.line, self.column = file, line, column
-        super().__init__(self._message())
+        where = "".join(f"{part}:" for part in (file, line, column) if part is not None)
+        text = f"{where} {self.found}".strip() + (f"; expected {expected}" if expected else "")
+        super().__init__(f"{text}. {hint[0].upper()}{hint[1:]}" if hint else text)
 
     def in_line(self, file: str, line: int) -> InputError:
         """The same error, of a line of a file.
@@ -110,15 +105,6 @@ class InputError(TpsError):
         a.csv:3: no number
         """
         return type(self)(self.found, expected=self.expected, hint=self.hint, file=file, line=line)
-
-    def _message(self) -> str:
-        where = [str(part) for part in (self.file, self.line, self.column) if part is not None]
-        text = f"{':'.join(where)}: {self.found}" if where else self.found
-        if self.expected:
-            text += f"; expected {self.expected}"
-        if self.hint:
-            text += f". {self.hint[0].upper()}{self.hint[1:]}"
-        return text
 
 
 class InputErrors(TpsError):
@@ -133,52 +119,9 @@ class InputErrors(TpsError):
 
     def __init__(self, errors: Iterable[InputError]) -> None:
         self.errors = tuple(errors)
-        super().__init__("\n".join(_told_once(self.errors)))
-
-
-SAME = 3  # errors that say the same of further lines than these are told of together
-
-
-def _told_once(errors: Iterable[InputError]) -> list[str]:
-    """The messages; of many that differ in nothing but the line the first, and the lines of the others."""
-    groups: dict[tuple[str | None, str, str, str], list[InputError]] = {}
-    for error in errors:
-        groups.setdefault((error.file, error.found, error.expected, error.hint), []).append(error)
-    messages = []
-    for error in errors:
-        group = groups[error.file, error.found, error.expected, error.hint]
-        lines = [same.line for same in group if same.line is not None]
-        if len(group) <= SAME or len(lines) < len(group):
-            messages.append(str(error))
-        elif error is group[0]:
-            where = f"{error.file}: " if error.file else ""
-            messages += [str(error), f"{where}the same in {len(group) - 1} further lines: {_ranges(lines[1:])}"]
-    return messages
-
-
-def _ranges(lines: list[int]) -> str:
-    """Rising line numbers, runs of them as 3-17."""
-    runs: list[list[int]] = []
-    for line in lines:
-        if runs and line == runs[-1][1] + 1:
-            runs[-1][1] = line
-        else:
-            runs.append([line, line])
-    return ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in runs)
-
-
-class FileError(InputError):
-    """A file cannot be read or written, or a folder holds what would be lost: choose another, or make room.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> try:
-    ...     tps.machine_from_linuxcnc("nowhere.hal")
-    ... except tps.FileError as error:
-    ...     print(error.found)
-    cannot read the file of HAL pins 'nowhere.hal': No such file or directory
-    """
+        further = len(self.errors) - MOST_TOLD
+        last = [f"and {further} further errors"] if further > 0 else []
+        super().__init__("\n".join([*map(str, self.errors[:MOST_TOLD]), *last]))
 
 
 class ProgramError(InputError):
@@ -197,39 +140,7 @@ class ProgramError(InputError):
     """
 
 
-class MachineFileError(InputError):
-    """A machine file is missing or wrong: `tps machine new` writes a template, `tps machine check` tries a file.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> try:
-    ...     tps.Machine.load("nits")
-    ... except tps.MachineFileError as error:
-    ...     print(error.found)
-    machine 'nits' is neither a packaged machine nor a file
-    """
-
-
-class TableError(InputError):
-    """A table (CSV or a sheet of a workbook) is empty, damaged, or has cells that can be read in two ways.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import toolpath_stiff as tps
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder, "poses.csv")
-    ...     file.touch()
-    ...     try:
-    ...         tps.read_poses(file)
-    ...     except tps.TableError as error:
-    ...         print(error.found)
-    the file is empty
-    """
-
-
-class MeasurementError(TableError):
+class MeasurementError(InputError):
     r"""Readings, raw records or a plan lack what is needed, or contradict themselves; `line` says which row.
 
     Examples
@@ -263,22 +174,7 @@ class EffectError(InputError):
     """
 
 
-class PoseError(InputError):
-    """A pose cannot be computed: strut lengths that belong to no pose, or a strut law carried beyond zero.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> from toolpath_stiff.machine.kinematics import forward_kinematics
-    >>> try:
-    ...     forward_kinematics(tps.Machine.load("nist").model.machine, [[1.0] * 6], [[0.0, 0.0, 0.8, 0.0, 0.0, 0.0]])
-    ... except tps.PoseError as error:
-    ...     print(type(error).__name__)
-    PoseError
-    """
-
-
-class UnreachableError(PoseError):
+class UnreachableError(InputError):
     """A pose that the machine cannot take: a limit exceeded, or a singular configuration.
 
     Move the work (`origin`), widen the search, or keep the reachable part.

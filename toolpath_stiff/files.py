@@ -1,6 +1,7 @@
 """Files that are whole or not there: written beside their place and flushed to the disk, then renamed."""
 
 import errno
+import filecmp
 import itertools
 import os
 import stat
@@ -8,9 +9,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from toolpath_stiff.errors import FileError
+from toolpath_stiff.errors import InputError
 
-NOT_WINDOWS = frozenset(b"\x81\x8d\x8f\x90\x9d")  # bytes that Windows' Latin-1 (cp1252) leaves undefined
 LARGEST_BYTES = 1 << 30  # of a file that is read
 BLOCK = 1 << 20  # bytes written at once
 
@@ -23,13 +23,14 @@ def writing_errors(path: str | Path, what: str = "write") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise FileError(f"cannot {what} {str(path)!r}: {error.strerror or error}") from None
+        raise InputError(f"cannot {what} {str(path)!r}: {error.strerror or error}") from None
 
 
-def write_atomically(path: str | Path, content: Content) -> Path:
+def write_atomically(path: str | Path, content: Content, keep: bool = False) -> Path:
     """Write text (UTF-8, line feeds as they are), bytes or pieces of text; folders are made as needed.
 
-    A symbolic link is followed. A device or pipe (`/dev/stdout`) is written to, never replaced by a file.
+    A symbolic link is followed. A device or pipe (`/dev/stdout`) is written to, never replaced by a file. With `keep`
+    an old file of other content is kept beside the new one, by its `old_name`.
 
     Raises
     ------
@@ -48,6 +49,8 @@ def write_atomically(path: str | Path, content: Content) -> Path:
         part = target.with_name(f".tps-part-{os.urandom(4).hex()}")
         try:
             write_new(part, content)
+            if keep and target.is_file() and not filecmp.cmp(part, target, shallow=False):
+                write_atomically(old_name(place), target.read_bytes())
             part.replace(target)
         except BaseException:
             part.unlink(missing_ok=True)
@@ -84,9 +87,9 @@ def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
         with Path(path).open("rb") as stream:
             content = stream.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        raise FileError(f"cannot read {what} {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
+        raise InputError(f"cannot read {what} {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
     if len(content) > most:
-        raise FileError(f"{what} {str(path)!r} has more than {most / 1e6:.0f} MB", hint="is it the right file?")
+        raise InputError(f"{what} {str(path)!r} has more than {most / 1e6:.0f} MB", hint="is it the right file?")
     return content
 
 
@@ -103,17 +106,13 @@ def check_regular(path: Path, pipes: bool = False) -> None:
 
 
 def decoded(content: bytes) -> str:
-    """Text of bytes: UTF-16 (told by its byte-order mark or its zeros), UTF-8 or, failing that, Windows' Latin-1."""
-    start = content[:400]
-    if start.startswith((b"\xff\xfe", b"\xfe\xff")):
+    """Text of bytes: UTF-16 with its byte-order mark, UTF-8 or, failing that, Windows' Latin-1."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16", "replace")
-    for encoding, zeros in (("utf-16-le", start[1::2]), ("utf-16-be", start[::2])):
-        if zeros and zeros.count(0) > 0.8 * len(zeros):
-            return content.decode(encoding, "replace")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return content.decode("cp1252") if not set(content) & NOT_WINDOWS else content.decode("latin-1")
+        return content.decode("cp1252", "replace")
 
 
 def read_text(path: str | Path, what: str) -> str:
@@ -129,24 +128,14 @@ def check_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path], r
     given = [Path(file) for file in inputs if is_file(file)]
     read = [Path(out) for out in outputs if is_file(out) and any(Path(out).samefile(file) for file in given)]
     if read and not replace:
-        raise FileError(
+        raise InputError(
             f"{str(read[0])!r} is read here and would be written over",
             hint="write somewhere else, or say --replace (replace=True): the old file is kept beside the new one",
         )
     return read
 
 
-def keep_old(file: str | Path) -> Path | None:
-    """Copy a file to a free name beside it, `NAME.old` or `NAME.old2` and so on; None where there is no file.
-
-    Raises `InputError` where that cannot be done.
-    """
-    path = Path(file)
-    return write_atomically(old_name(path), read_bytes(path, "file")) if path.is_file() else None
-
-
 def old_name(file: Path) -> Path:
     """`NAME.old`, or `NAME.old2` and so on, whichever is free first."""
-    numbers = itertools.chain([""], itertools.count(2))
-    names: Iterator[Path] = (file.with_name(f"{file.name}.old{number}") for number in numbers)
+    names = (file.with_name(f"{file.name}.old{'' if number == 1 else number}") for number in itertools.count(1))
     return next(name for name in names if not os.path.lexists(name))

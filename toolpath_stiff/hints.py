@@ -15,38 +15,6 @@ from toolpath_stiff import defaults
 PROGRAM = "tps"
 NUMBERED = re.compile(r"-updated(?:-(\d+))?$")
 
-# Option -> the argument of the public functions that says the same, where that is not the option's own name with
-# underscores (--strut-law is `strut_law` anyway).
-ARGUMENTS = {
-    "compare": "compare_with",
-    "feed": "feed_mm_per_min",
-    "linearise": "linearise_mm",
-    "margin": "margin_percent",
-    "noise": "noise_percent",
-    "origin": "origin_mm_deg",
-    "out": "folder",
-    "region": "regions",
-    "require": "require_N_per_mm",
-    "step": "step_mm",
-    "strut-speed": "strut_speed_mm_per_min",
-    "strut-spread": "strut_spread_percent",
-    "temperature": "temperature_C",
-    "z-values": "z_values_mm",
-}
-
-
-def both_names(option: str, value: str = "") -> str:
-    """An option as a message names it to callers of the command and of the function: "--step 0.5 (step_mm)".
-
-    Examples
-    --------
-    >>> both_names("--step", "0.5"), both_names("--dialect", "haas")
-    ('--step 0.5 (step_mm)', '--dialect haas')
-    """
-    argument = ARGUMENTS.get(option.removeprefix("--"))
-    shown = f"{option} {value}" if value else option
-    return f"{shown} ({argument})" if argument else shown
-
 
 def command_line(*words: object) -> str:
     """A command line of `tps`, quoted for the shell."""

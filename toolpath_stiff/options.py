@@ -45,7 +45,7 @@ class Option:
     Examples
     --------
     >>> Option("--margin", "%", at_least=0, below=50).expected
-    '0 to less than 50 %'
+    'at least 0 and less than 50 %'
     """
 
     name: str
@@ -63,15 +63,9 @@ class Option:
     @property
     def expected(self) -> str:
         """The numbers that it may be, in words."""
-        low = self.at_least if self.above is None else self.above
-        high = self.at_most if self.below is None else self.below
-        if low is None:
-            return "a finite number"
-        least = f"more than {low:g}" if self.above is not None else f"{low:g}"
-        if high is None:
-            return f"{least}{'' if self.above is not None else ' or more'} {self.unit}".strip()
-        joined = "at most " if self.above is not None else "" if self.below is None else "less than "
-        return f"{least} {'and' if self.above is not None else 'to'} {joined}{high:g} {self.unit}".strip()
+        bounds = {"more than": self.above, "at least": self.at_least, "less than": self.below, "at most": self.at_most}
+        words = [f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None]
+        return f"{' and '.join(words) or 'a finite number'} {self.unit}".strip()
 
     def holds(self, number: float) -> bool:
         """True for a finite number within the bounds."""
@@ -95,16 +89,12 @@ class Argument:
     default: Any = None
     required: bool = False
 
-    def value(self, words: Any) -> Any:
-        """The value that a command line gives: of a word, of several, or True. Raises `InputError`."""
-        if isinstance(words, list):
-            return [self.value(word) for word in words]
-        if not isinstance(words, str):
-            return words
+    def value(self, word: str) -> Any:
+        """The value of a word of the command line. Raises `InputError`."""
         try:
-            value = self.option.read(words) if self.option.read else words
+            value = self.option.read(word) if self.option.read else word
         except ValueError as error:
-            raise self._wrong(words, str(error)) from None
+            raise self._wrong(word, str(error)) from None
         number = self.check(value)
         return value if number is None else number
 
@@ -115,19 +105,23 @@ class Argument:
         if self.kind not in (int, float):
             return None
         number = number_in(value)
-        shown = f"{number:g}" if not math.isnan(number) or not isinstance(value, str) else value
         if not self.option.holds(number):
-            raise self._wrong(shown, self.option.expected)
-        if self.kind is float:
-            return number
-        if number != int(number):
-            raise self._wrong(shown, "a whole number")
-        return int(number)
+            raise self._wrong(value, self.option.expected)
+        if self.kind is int and number != int(number):
+            raise self._wrong(value, "a whole number")
+        return int(number) if self.kind is int else number
+
+    def words(self, value: Any) -> list[str]:
+        """A value as the command takes it: several words of an option that is given several times."""
+        if isinstance(value, Mapping):
+            value = [f"{key}={part:.10g}" for key, part in value.items()]
+        parts = value if isinstance(value, list | tuple | frozenset | set) else [value]
+        words = [f"{part:.10g}" if isinstance(part, int | float) else str(part) for part in parts]
+        return words if self.option.count else [(":" if self.option.read is low_high else ",").join(words)]
 
     def _wrong(self, value: Any, expected: str) -> InputError:
         name = self.option.name.split()[-1] if self.option.name.startswith("-") else self.name
-        same = name.strip("-").replace("-", "_").lower() == self.name
-        return InputError(f"{name} {str(value)[:60]}{'' if same else f' ({self.name})'}", expected=expected)
+        return InputError(f"{name} {str(value)[:60]}", expected=expected)
 
 
 def number_in(value: Any) -> float:
@@ -138,41 +132,23 @@ def number_in(value: Any) -> float:
         return math.nan
 
 
-def _hints(function: Callable[..., Any]) -> dict[str, Any]:
-    """The annotations of a function; types that only type checkers import stand as `object`."""
-    unknown: dict[str, Any] = {}
-    while True:
-        try:
-            return get_type_hints(function, None, unknown, include_extras=True)
-        except NameError as error:
-            unknown[str(error.name)] = object
-
-
 @cache
 def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
     """The arguments of a function that are options, by name."""
     function = inspect.unwrap(getattr(function, "__func__", function))
-    texts, hints = parameter_texts(function), _hints(function)
-    for name, hint in tuple(hints.items()):
-        if get_origin(hint) is Unpack:  # the rest of the arguments, as a dictionary of options
-            hints |= _hints(get_args(hints.pop(name))[0])
-    arguments = {}
+    texts, hints = parameter_texts(function), get_type_hints(function, include_extras=True)
+    for name in [name for name, hint in hints.items() if get_origin(hint) is Unpack]:  # a dictionary of options
+        hints |= get_type_hints(get_args(hints.pop(name))[0], include_extras=True)
+    parameters, arguments = inspect.signature(function).parameters, {}
     for name, hint in hints.items():
-        parts = [hint, *get_args(hint)]
-        marks = [mark for part in parts for mark in getattr(part, "__metadata__", ())]
-        option = next((mark for mark in marks if isinstance(mark, Option)), None)
+        option = next((mark for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Option)), None)
         if option is not None:
-            parameter = inspect.signature(function).parameters.get(name)
-            default = parameter.default if parameter else None
-            kinds = [kind for part in parts for kind in (part, *get_args(part)) if kind in (bool, int, float)]
-            arguments[name] = Argument(
-                name,
-                option,
-                option.help or texts.get(name, ""),
-                kinds[0] if kinds and option.read is None else str,
-                None if default is inspect.Parameter.empty else default,
-                default is inspect.Parameter.empty,
-            )
+            kinds = [kind for kind in (hint.__origin__, *get_args(hint.__origin__)) if kind in (bool, int, float)]
+            kind = kinds[0] if kinds and option.read is None else str
+            default = parameters[name].default if name in parameters else None
+            required = default is inspect.Parameter.empty
+            text = option.help or texts.get(name, "")
+            arguments[name] = Argument(name, option, text, kind, None if required else default, required)
     return arguments
 
 
@@ -187,30 +163,17 @@ def words_of(function: Callable[..., Any], given: Mapping[str, Any]) -> list[str
     """
     words: list[str] = []
     for name, argument in arguments_of(function).items():
-        value = given.get(name)
-        if value is None or value is False or value == argument.default:
-            continue
-        if isinstance(value, Mapping):
-            value = [f"{key}={part:.10g}" for key, part in value.items()]
-        several = value if isinstance(value, list | tuple | frozenset | set) else [value]
-        shown = [f"{part:.10g}" if isinstance(part, int | float) else str(part) for part in several]
-        joined = shown if argument.option.count else [(":" if argument.option.read is low_high else ",").join(shown)]
-        option = argument.option.name.split()[-1]
-        words += [option] if value is True else [word for text in joined for word in (option, text)]
+        value, option = given.get(name), argument.option.name.split()[-1]
+        if value is not None and value is not False and value != argument.default:
+            words += [option] if value is True else [word for text in argument.words(value) for word in (option, text)]
     return words
 
 
 def parameter_texts(function: Callable[..., Any]) -> dict[str, str]:
     """What a docstring says of each argument."""
     section = (inspect.getdoc(function) or "").partition(PARAMETERS)[2].partition("\n\n")[0]
-    texts: dict[str, str] = {}
-    names: list[str] = []
-    for line in section.splitlines():
-        if line.startswith(" "):
-            texts.update({name: f"{texts.get(name, '')} {line.strip()}".strip() for name in names})
-        else:
-            names = line.split(", ")
-    return texts
+    entries = re.findall(r"^(\S.*)\n((?: .*\n?)+)", section, re.M)
+    return {name: " ".join(text.split()) for names, text in entries for name in names.split(", ")}
 
 
 def finite_number(text: str) -> float:
@@ -224,11 +187,6 @@ def finite_number(text: str) -> float:
 def numbers(text: str) -> tuple[float, ...]:
     """`1,2,3`."""
     return tuple(map(finite_number, text.split(",")))
-
-
-def distinct_numbers(text: str) -> tuple[float, ...]:
-    """The same, each once."""
-    return tuple(dict.fromkeys(numbers(text)))
 
 
 def low_high(text: str) -> tuple[float, float]:

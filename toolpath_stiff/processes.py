@@ -22,7 +22,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import pebble
 
-from toolpath_stiff.defaults import THREADS, one_thread
+from toolpath_stiff.defaults import THREADS
 
 Arguments = ParamSpec("Arguments")
 Answer = TypeVar("Answer")
@@ -48,7 +48,9 @@ class ProcessPool(Executor):
         self._pool: Any = pebble.ProcessPool(jobs, initializer=_prepare, context=get_context("spawn"))
         self._calls: list[Future[Any]] = []
         self._threads_before = {name: os.environ.get(name) for name in THREADS}
-        one_thread()  # of the processes, which take these variables over as they start
+        os.environ.update(
+            dict.fromkeys(THREADS, "1")
+        )  # of the processes, which take these variables over as they start
         with _signals_blocked():  # in the pool's threads and in the processes that they start
             if not self._pool.active:
                 raise RuntimeError("the processes cannot be started")

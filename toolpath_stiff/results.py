@@ -63,7 +63,7 @@ class Result(ABC):
         --------
         >>> import toolpath_stiff as tps
         >>> sorted(tps.machine_template("mill.toml").to_dict())
-        ['machine', 'notes', 'text']
+        ['name', 'notes', 'text']
         """
 
     def __str__(self) -> str:
@@ -209,16 +209,33 @@ class FolderResult(Result):
 
 
 class TextFile(Result):
-    """A result that is the text of a file: `print` shows it, `save` writes it."""
+    """The text of a file, a machine's or an effect's, to print and to save.
 
-    def __init__(self, name: str, text: str) -> None:
-        self.name, self.text = name, text
+    Attributes
+    ----------
+    name, text, notes
+        Of the machine or effect; the file; what was assumed in making it.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> template = tps.effect_template("my_screw")
+    >>> template.name, template.notes, template.text == str(template)
+    ('my_screw', [], True)
+    """
+
+    def __init__(self, name: str, text: str, notes: Sequence[str] = ()) -> None:
+        self.name, self.text, self.notes = name, text, list(notes)
 
     def __str__(self) -> str:
         return self.text
 
     def _short(self) -> str:
         return f"{self.name}, {len(self.text.splitlines())} lines"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Name, text and notes."""
+        return {"name": self.name, "text": self.text, "notes": self.notes}
 
     def save(self, file: str | Path) -> Path:
         """Write the file, whole or not at all.
@@ -232,23 +249,6 @@ class TextFile(Result):
         'mill.toml'
         """
         return write_atomically(file, self.text)
-
-
-class TextResult(Result):
-    """A result whose text and document were made when it was found."""
-
-    def __init__(self, text: str, document: dict[str, Any], short: str) -> None:
-        self._text, self._document, self._said = text, document, short
-
-    def __str__(self) -> str:
-        return self._text
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self._document
-
-    def _short(self) -> str:
-        return self._said
 
 
 def notebook_text(text: str) -> str:

@@ -6,8 +6,7 @@ where the run has no file of that name, and where it has one, nothing is written
 holds nothing of the tool's.
 
 The new files are made in a hidden folder within, which only one run can hold; an error until then leaves the results
-as they were. Then the old ones are taken away and the new ones renamed, and meanwhile `INCOMPLETE.txt` says so: every
-command that reads there asks to run again what was cut off.
+as they were. Then the old ones are taken away and the new ones renamed, and meanwhile `INCOMPLETE.txt` says so.
 """
 
 import json
@@ -16,13 +15,11 @@ import shutil
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
-from toolpath_stiff.errors import FileError
-from toolpath_stiff.files import BLOCK, Content, check_outputs, old_name, write_atomically, write_new, writing_errors
-from toolpath_stiff.hints import both_names
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import BLOCK, Content, check_outputs, old_name, write_new, writing_errors
 
 try:
     import fcntl
@@ -32,19 +29,8 @@ except ImportError:  # Windows: there nothing keeps two runs apart
 MANIFEST = ".tps-files.json"
 INCOMPLETE = "INCOMPLETE.txt"
 STAGE = ".tps-stage"  # the hidden folder; what a killed run left in it the next run takes away
-_OTHER_FOLDER = f"choose another folder with {both_names('--out')}"
-ELSEWHERE = f"{_OTHER_FOLDER}, or say --replace (replace=True): the old file is kept beside the new one"
-
-
-@dataclass(frozen=True)
-class Manifest:
-    """What a run left in a folder: file name -> `checksum`.
-
-    `of` says what the results are of: names, or paths relative to the folder. Empty where the user named the folder.
-    """
-
-    of: tuple[str, ...] = ()
-    files: Mapping[str, str] = field(default_factory=dict)
+ELSEWHERE = "choose another folder with --out"
+REPLACE = f"{ELSEWHERE}, or say --replace (replace=True): the old file is kept beside the new one"
 
 
 @dataclass(frozen=True)
@@ -79,7 +65,6 @@ def write_folder(
     *,
     command: str,
     rules: Rules = Rules(),
-    elsewhere: Mapping[str | Path, Content] = MappingProxyType({}),
     unfinished: bool = False,
 ) -> list[Path]:
     """Write the files of one run, all or none, and clear those of an earlier run; the folder is made if need be.
@@ -94,8 +79,6 @@ def write_folder(
         Name of the command, for the manifest.
     rules
         What must not be replaced, and what to do about it.
-    elsewhere
-        Files of the same run in other folders: put in their places right before those of the folder.
     unfinished
         Whether the run goes on to write: the folder is marked as incomplete until its next files.
 
@@ -109,30 +92,21 @@ def write_folder(
     InputError
         A file of such a name is not the tool's, is an input, or the folder cannot be written. Nothing is changed then.
     """
-    target = Path(folder)
-    with writing_errors(folder, "write to"), _made(target.absolute()), _stage(target) as stage:
+    target, note = Path(folder), Path(folder, INCOMPLETE)
+    with writing_errors(folder, "write to"), _stage(target) as stage:
         in_the_way = check_folder(target, contents, rules)
-        sums = {}
         for name, content in contents.items():
             write_new(stage / name, content() if callable(content) else content)
-            sums[name] = checksum(stage / name)
+        sums = {name: checksum(stage / name) for name in contents}
         # Nothing in it depends on when or by whom it was written. Escaped, as names need not be UTF-8.
         document = {"written_by": f"tps {command}", "results_of": _relative(target, rules.of), "checksums": sums}
         write_new(stage / MANIFEST, json.dumps(document, indent=1) + "\n")
-        note, incomplete_before = target / INCOMPLETE, bool(incomplete(target))
-        if not incomplete_before:
+        if not note.exists():
             write_new(note, f"`tps {command}` writes here. While this file is here, run it again.\n")
-        try:
-            for file, other in elsewhere.items():
-                write_atomically(file, other)
-        except BaseException:
-            if not incomplete_before:
-                note.unlink()
-            raise
-        old = read_manifest(target)
-        for name in old.files:
-            if target / name not in in_the_way and _is_ours(target / name, old):
-                (target / name).unlink()
+        _, old = read_manifest(target)
+        for file in (target / name for name in old):
+            if file not in in_the_way and _is_ours(file, old):
+                file.unlink()
         for file in (*in_the_way, *(target / name for name in contents)):
             if os.path.lexists(file):
                 kept = file.rename(old_name(file))
@@ -146,56 +120,22 @@ def write_folder(
 
 
 @contextmanager
-def _made(folder: Path) -> Iterator[None]:
-    """The folder is there; after an error it is taken away again, with those above that were made for it."""
-    made = [place for place in (folder, *folder.parents) if not place.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        yield
-    except BaseException:
-        for place in made:
-            with suppress(OSError):  # not empty: someone else uses it by now
-                place.rmdir()
-        raise
-
-
-@contextmanager
 def _stage(folder: Path) -> Iterator[Path]:
-    """An empty folder within, of this run alone. Raises `InputError` where another run has it."""
+    """An empty folder within, of one run at a time: the next one waits, where the file system has locks."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = os.open(folder, os.O_RDONLY) if fcntl else -1
     stage = folder / STAGE
-    stage.mkdir(exist_ok=True)
-    handle = None if fcntl is None else os.open(stage, os.O_RDONLY)
     try:
-        if handle is not None and not _held(handle):
-            hint = "wait for it, or choose another folder"
-            raise FileError(f"{str(folder)!r} is being written by another run", hint=hint)
-        try:
-            for left in stage.iterdir():
-                left.unlink()
-            yield stage
-        finally:
-            shutil.rmtree(stage, ignore_errors=True)
+        if fcntl:
+            with suppress(OSError):
+                fcntl.flock(lock, fcntl.LOCK_EX)  # it ends with the process
+        shutil.rmtree(stage, ignore_errors=True)
+        stage.mkdir()
+        yield stage
     finally:
-        if handle is not None:
-            os.close(handle)
-
-
-def _held(handle: int) -> bool:
-    """Whether this run has the lock of an open folder; it ends with the process."""
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks keeps nobody out
-        return True
-    return True
-
-
-def incomplete(folder: str | Path) -> str:
-    """Why the results in a folder are not those of one whole run, a sentence; "" where nothing says so."""
-    if not (Path(folder) / INCOMPLETE).is_file():
-        return ""
-    return f"{str(folder)!r} is incomplete: the run that wrote it has not come to its end; run it again"
+        shutil.rmtree(stage, ignore_errors=True)
+        if fcntl:
+            os.close(lock)
 
 
 def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules()) -> list[Path]:
@@ -206,60 +146,52 @@ def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules(
     InputError
         As `write_folder`.
     """
-    target, names = Path(folder), list(names)
-    nearest = next(path for path in (target, *target.absolute().parents) if os.path.lexists(path))
-    if not nearest.is_dir():
-        raise FileError(f"cannot write to {str(target)!r}: {str(nearest)!r} is not a folder")
-    old = read_manifest(target)
-    touched = [target / name for name in dict.fromkeys([*names, *old.files])]
-    read = check_outputs(touched, rules.inputs, rules.replace)
-    if not rules.replace and holds_others(target, rules.of):
-        others = ", ".join(map(repr, old.of))
-        raise FileError(f"{str(target)!r} holds the results of {others} (seen from there)", hint=_OTHER_FOLDER)
-    objections = {target / name: _objection(target / name, old, rules) for name in names}
-    for file, objection in objections.items():
+    target = Path(folder)
+    of, sums = read_manifest(target)
+    files = [target / name for name in names]
+    in_the_way = check_outputs([*files, *(target / name for name in sums)], rules.inputs, rules.replace)
+    if rules.of and of and of != _relative(target, rules.of) and not rules.replace:
+        raise InputError(f"{str(target)!r} holds the results of {', '.join(of)} (seen from there)", hint=ELSEWHERE)
+    for file in files:
+        objection = _objection(file, sums, rules) if os.path.lexists(file) else ""
         if objection and not rules.replace:
-            raise FileError(f"{str(file)!r} {objection}", hint=ELSEWHERE)
-    return list(dict.fromkeys([*read, *(file for file, objection in objections.items() if objection)]))
+            raise InputError(f"{str(file)!r} {objection}", hint=REPLACE)
+        in_the_way += [file] * bool(objection)
+    return list(dict.fromkeys(in_the_way))
 
 
-def holds_others(folder: Path, of: Sequence[str]) -> bool:
-    """Whether a folder that was named by default holds the results of something else."""
-    old = read_manifest(folder)
-    return bool(of and old.of and old.of != _relative(folder, of))
-
-
-def _objection(file: Path, old: Manifest, rules: Rules) -> str:
-    """Why a file must not be replaced; nothing where it may."""
-    if not os.path.lexists(file):
-        return ""
+def _objection(file: Path, sums: Mapping[str, str], rules: Rules) -> str:
+    """Why a file that is there must not be replaced; nothing where it may."""
     if rules.fresh:
         return "is there already"
-    if file.name not in old.files:
+    if file.name not in sums:
         return f"is there already, and no {MANIFEST} beside it says that tps wrote it"
-    return "" if _is_ours(file, old) else "was changed since tps wrote it"
+    return "" if _is_ours(file, sums) else "was changed since tps wrote it"
 
 
-def read_manifest(folder: Path) -> Manifest:
-    """The record in a folder, empty where there is none. Raises `InputError` where it is not to be understood."""
+def read_manifest(folder: Path) -> tuple[tuple[str, ...], dict[str, str]]:
+    """What the results in a folder are of, seen from there ((): not said), and file -> `checksum`.
+
+    Both empty where there is no record. Raises `InputError` where it is not to be understood.
+    """
     file = folder / MANIFEST
-    try:
+    with writing_errors(file, "read"):
         if not file.exists():
-            return Manifest()
-        document = json.loads(file.read_bytes())
-        sums = {name: str(known) for name, known in document["checksums"].items() if Path(name).name == name}
-        return Manifest(tuple(map(str, document["results_of"])), sums)
-    except OSError as error:
-        raise FileError(f"cannot read {str(file)!r}: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        hint = "delete it, or choose another folder"
-        raise FileError(f"{str(file)!r} does not record what tps wrote", hint=hint) from None
+            return (), {}
+        try:
+            document = json.loads(file.read_bytes())
+            sums = {name: str(known) for name, known in document["checksums"].items() if Path(name).name == name}
+            return tuple(map(str, document["results_of"])), sums
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            raise InputError(
+                f"{str(file)!r} does not record what tps wrote", hint=f"delete it, or {ELSEWHERE}"
+            ) from None
 
 
-def _is_ours(file: Path, manifest: Manifest) -> bool:
+def _is_ours(file: Path, sums: Mapping[str, str]) -> bool:
     """Whether the file is as the tool wrote it."""
     with writing_errors(file, "read"):
-        return not file.is_symlink() and file.is_file() and checksum(file) == manifest.files[file.name]
+        return not file.is_symlink() and file.is_file() and checksum(file) == sums[file.name]
 
 
 def checksum(path: Path) -> str:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from toolpath_stiff.column_names import columns_option, converted, entry, heading_key, parted, same_quantity
-from toolpath_stiff.errors import TableError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import decoded, read_bytes
 from toolpath_stiff.workbooks import Rows, is_workbook, sheet_rows, split_name
 
@@ -80,7 +80,7 @@ class Table:
         written = len(self.heading) - len(self.constants)
         if len(cells) != written:
             hint = "a decimal comma between commas? Write semicolons between the cells" if len(cells) > written else ""
-            raise TableError(f"row with {len(cells)} cells", expected=f"{written} as in the heading", hint=hint)
+            raise InputError(f"row with {len(cells)} cells", expected=f"{written} as in the heading", hint=hint)
         return {**dict(zip(self.heading, cells, strict=False)), **self.constants}
 
 
@@ -107,14 +107,14 @@ def read_table(path: str, what: str, columns: Columns) -> Table:
         rows, remark = sheet_rows(content, workbook, sheet)
         return _table(rows, path, columns, "", [remark] * bool(remark))
     if sheet:
-        raise TableError(f"{workbook!r} is not an Excel workbook and has no sheets", file=path)
+        raise InputError(f"{workbook!r} is not an Excel workbook and has no sheets", file=path)
     return parse_table(decoded(content), path, columns)
 
 
 def parse_table(text: str, file: str, columns: Columns) -> Table:
     """The same from the text of a file."""
     if "\0" in text:
-        raise TableError("neither text nor an Excel workbook", hint="export it as CSV", file=file)
+        raise InputError("neither text nor an Excel workbook", hint="export it as CSV", file=file)
     lines = (re.sub('"[^"]*"', "quoted", line) for line in io.StringIO(text, newline=None))
     first = next((line for line in lines if line.strip(" ,;\t\n") and not line.startswith("#")), "")
     separator = max(SEPARATORS, key=first.count)
@@ -122,14 +122,14 @@ def parse_table(text: str, file: str, columns: Columns) -> Table:
     try:
         return _table([(reader.line_num, cells) for cells in reader], file, columns, separator, [])
     except csv.Error as error:  # a quote that never ends, say
-        raise TableError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
+        raise InputError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
 
 
 def _table(rows: Rows, file: str, columns: Columns, separator: str, remarks: list[str]) -> Table:
     rows = [(line, [_stripped(cell) for cell in cells]) for line, cells in rows]
     rows = [(line, cells) for line, cells in rows if any(cells) and not _is_comment(cells[0])]
     if not rows:
-        raise TableError("the file is empty", expected="a heading and rows below it", file=file)
+        raise InputError("the file is empty", expected="a heading and rows below it", file=file)
     (line, written), *body = rows
     while not written[-1]:
         written.pop()
@@ -184,10 +184,10 @@ def _named(
     absent = next((cell for cell in mapped if cell not in written), None)
     if absent is not None:
         shown = ", ".join(repr(cell) for cell in written if cell)
-        raise TableError(f"no column {absent!r}", expected=f"one of {shown}", file=file, line=line)
+        raise InputError(f"no column {absent!r}", expected=f"one of {shown}", file=file, line=line)
     twice = next((name for name in heading if name and heading.count(name) > 1), None)
     if twice is not None:
-        raise TableError(f"column {twice} stands twice", file=file, line=line)
+        raise InputError(f"column {twice} stands twice", file=file, line=line)
     absent_names = [name for name in known.values() if name not in (*heading, *sources)]
     slips = {cell: name for cell in heading if cell not in known.values() for name in _meant(cell, absent_names)[:1]}
     if slips:
@@ -196,7 +196,7 @@ def _named(
         if columns.sources is not None:
             entries = [entry(name, cell, parted(cell)[1]) for cell, name in slips.items()]
             hint += f", or say its unit: {columns_option(entries)}"
-        raise TableError(f"column {cell!r}", expected=name, hint=hint, file=file, line=line)
+        raise InputError(f"column {cell!r}", expected=name, hint=hint, file=file, line=line)
     units: dict[int, tuple[str, str]] = {}
     for i, (cell, name) in enumerate(zip(written, heading, strict=True)):
         own = parted(name)[1]
@@ -224,7 +224,7 @@ def _has_commas(heading: Sequence[str], rows: Rows, numbers: Sequence[int], file
         doubtful = [commas[0]] if "," not in marked[0][2] else [next(cell for cell in marked if "," not in cell[2])]
     if doubtful:
         line, name, text = doubtful[0]
-        raise TableError(
+        raise InputError(
             f"{name} = {text!r} could be {text.replace(',', '.')} or {re.sub('[.,]', '', text)}",
             expected="decimal commas in the whole file, or decimal points, and no thousands separators",
             file=file,

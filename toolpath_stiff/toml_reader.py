@@ -8,20 +8,22 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeGuard
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import read_bytes
 
 LARGEST_BYTES = 4_000_000
-LARGEST_INTEGER = 2**63 - 1  # TOML 1.0: "64-bit signed integers"
-HEADING = re.compile(r"""[ \t]*\[\[?([\w.'" \t-]+)\]""")
-NTH = re.compile(r"(.*)\[(\d+)\]")
+HEADING = re.compile(r"""[ \t]*\[(\[?)([\w.'" \t-]+)\]""")
+QUOTES = re.compile("['\"\t]")
+KEY = re.compile(r"""([\w.'" \t-]+)=""")
 
 
 class TomlReader:
-    """The tables of one file, and its lines, so that messages can name them.
+    """The tables of one file, and the lines of its keys, so that messages can name them.
 
     Attributes
     ----------
@@ -36,83 +38,37 @@ class TomlReader:
 
         Raises `kind` with line and column if the text is not TOML.
         """
-        self.file, self.lines, self.kind = file, text.splitlines(), kind
+        self.file, self.kind, lines = file, kind, text.splitlines()
         if len(text) > LARGEST_BYTES:
             raise kind(f"more than {LARGEST_BYTES / 1e6:.0f} MB", hint="is it the right file?", file=file)
         try:
             self.data: dict[str, Any] = tomllib.loads(text)
         except (ValueError, RecursionError) as error:  # or thousands of digits, or of brackets
             place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
-            line, column = (int(place[1]), int(place[2])) if place else (len(self.lines), None)  # at its end
+            line, column = (int(place[1]), int(place[2])) if place else (len(lines), None)  # at its end
             reason = str(error).split(" (at ")[0]
             fault = f"{what} is not TOML: {reason}" if what else f"not valid TOML: {reason}"
             raise kind(fault, file=file, line=line, column=column) from None
-        self._check_values()
-
-    def _check_values(self) -> None:
-        """Refuse integers that TOML does not know: numbers that are none of Python's floats."""
-        values: list[object] = [self.data]
-        for value in values:  # what a table or an array holds comes after it
-            if isinstance(value, dict | list):
-                values += value.values() if isinstance(value, dict) else value
-            elif isinstance(value, int) and abs(value) > LARGEST_INTEGER:
-                raise self.kind("an integer beyond 64 bits", expected="a smaller number", file=self.file)
+        self._places = _places(lines, self.data)
 
     @classmethod
     def read(cls, path: str | Path, what: str, kind: type[InputError] = InputError) -> TomlReader:
-        """Read a file, as the constructor. Raises `kind` if it cannot be read or is not TOML."""
+        """Read a file, as the constructor. Raises `InputError` if it cannot be read, `kind` if it is not TOML."""
         try:
-            with Path(path).open("rb") as stream:
-                text = stream.read(LARGEST_BYTES + 1).decode("utf-8-sig")  # one more than the constructor takes
-        except OSError as error:
-            raise kind(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+            return cls(read_bytes(path, what, LARGEST_BYTES).decode("utf-8-sig"), str(path), what, kind)
         except UnicodeDecodeError:
             raise kind(f"{what} is not a text file", file=str(path)) from None
-        return cls(text, str(path), what, kind)
 
     def line_of(self, section: str, key: str = "", nth: int = 0) -> int | None:
         """Line of a key of a section (the nth of its name), or of its heading; None if it is not found."""
-        inside, seen = section == "", -1
-        for number, line in enumerate(self.lines, 1):
-            heading = self._heading(line)
-            if heading:
-                seen += heading == section
-                inside = heading == section and seen == nth
-                if inside and not key:
-                    return number
-            elif inside and key and re.match(rf"\s*(?:[\"']?{re.escape(key)}[\"']?\s*=|{re.escape(key)}\s*\.)", line):
-                return number
-        return None
+        numbered = f"{section}[{nth + 1}]"
+        return self._places.get(f"{numbered if numbered in self._places else section}.{key}".strip("."))
 
     def line_at(self, where: str) -> int | None:
         """Line of a dotted name such as `kinematics.head.letter` or `tools[2].number`; else of what it stands in."""
-        while where:
-            line = self._line_exactly(where)
-            if line is not None:
-                return line
+        while where and where not in self._places:
             where = where.rpartition(".")[0]
-        return None
-
-    def _line_exactly(self, where: str) -> int | None:
-        """The same of the name itself; a key in quotes may hold dots."""
-        parts = where.split(".")
-        for count in range(len(parts) - 1, -1, -1):
-            section, key = ".".join(parts[:count]), ".".join(parts[count:])
-            nth = NTH.fullmatch(section)
-            line = self.line_of(nth[1], key, int(nth[2]) - 1) if nth else self.line_of(section, key)
-            if line is not None:
-                return line
-        nth = NTH.fullmatch(where)
-        line = self.line_of(nth[1], "", int(nth[2]) - 1) if nth else self.line_of(where)
-        return line or next(
-            (n for n, text in enumerate(self.lines, 1) if self._heading(text).startswith(f"{where}.")), None
-        )
-
-    def _heading(self, line: str) -> str:
-        """The table that a line is the heading of, without blanks and quotes; "" if it is none."""
-        heading = HEADING.match(line)
-        name = re.sub(r"[ \t'\"]", "", heading[1]) if heading else ""
-        return name if name.partition(".")[0] in self.data else ""  # else a row of an array, as [-25.4]
+        return self._places.get(where)
 
     def error(self, mistake: str, expected: str = "", hint: str = "", where: str = "") -> InputError:
         """An error at the line of the dotted name `where`."""
@@ -155,6 +111,27 @@ class TomlReader:
         if not isinstance(value, dict):
             raise self.error(f"{where} = {value!r}", expected, where=where)
         return value
+
+
+def _places(lines: Sequence[str], data: Mapping[str, Any]) -> dict[str, int]:
+    """Line of each dotted name, first of its name: keys, tables, what holds them; `tools[2]` is of a list of tables."""
+    places: dict[str, int] = {}
+    above: dict[str, int] = {}
+    counts: Counter[str] = Counter()
+    section = ""
+    for number, line in enumerate(lines, 1):
+        heading, key = HEADING.match(line), KEY.match(line)
+        name = QUOTES.sub("", heading[2]).replace(" ", "") if heading else ""
+        if heading and name.partition(".")[0] in data:  # else a row of an array, as [-25.4]
+            counts[name] += 1
+            section = f"{name}[{counts[name]}]" if heading[1] else name
+            places.setdefault(section, number)
+        elif key:
+            name = f"{section}.{QUOTES.sub('', key[1]).strip()}".strip(".")
+        places.setdefault(name, number)
+        while name := name.rpartition(".")[0]:
+            above.setdefault(name, number)
+    return above | places
 
 
 def is_number(value: object) -> TypeGuard[int | float]:

@@ -7,7 +7,7 @@ import warnings
 import zipfile
 from typing import Any
 
-from toolpath_stiff.errors import TableError
+from toolpath_stiff.errors import InputError
 
 ZIP, OLD_EXCEL = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 LARGEST_BYTES = 50_000_000  # unpacked
@@ -47,22 +47,22 @@ def sheet_rows(content: bytes, file: str, sheet: str = "") -> tuple[Rows, str]:
     large = next((page for page in pages.values() if page.max_row * page.max_column > LARGEST_CELLS), None)
     if large is not None:
         fault = f"sheet {large.title!r} has {large.max_row} rows and {large.max_column} columns"
-        raise TableError(fault, expected=f"at most {LARGEST_CELLS:,} cells", hint=SAVE_AS, file=file)
+        raise InputError(fault, expected=f"at most {LARGEST_CELLS:,} cells", hint=SAVE_AS, file=file)
     filled = [title for title, page in pages.items() if any(v is not None for row in page.values for v in row)]
     if not filled or (sheet and sheet not in filled):
         fault = f"the workbook has no sheet {sheet!r} with cells" if filled else "the workbook is empty"
-        raise TableError(fault, expected=f"one of {', '.join(filled)}" if filled else "", file=file)
+        raise InputError(fault, expected=f"one of {', '.join(filled)}" if filled else "", file=file)
     chosen = pages[sheet or filled[0]]
     if chosen.merged_cells.ranges:
         merged = ", ".join(sorted(area.coord for area in chosen.merged_cells.ranges))
-        raise TableError(f"merged cells {merged}", hint="split them, each cell with its own value", file=file)
+        raise InputError(f"merged cells {merged}", hint="split them, each cell with its own value", file=file)
     rows = [list(row) for row in chosen.values]
     if any(value is None for row in rows for value in row):
         for row in _open(content, file, values=False)[chosen.title].iter_rows():
             for cell in row:
                 if cell.data_type == "f" and rows[cell.row - 1][cell.column - 1] is None:
                     fault = f"cell {cell.coordinate} holds a formula without a stored value"
-                    raise TableError(fault, hint="open and save the workbook in Excel once", file=file, line=cell.row)
+                    raise InputError(fault, hint="open and save the workbook in Excel once", file=file, line=cell.row)
     others = "" if sheet or len(filled) == 1 else f"sheet {filled[0]!r} is read; {file}#SHEET names another"
     return [(line, [_shown(value) for value in row]) for line, row in enumerate(rows, 1)], others
 
@@ -79,7 +79,7 @@ def _open(content: bytes, file: str, values: bool) -> Any:
             return openpyxl.load_workbook(io.BytesIO(content), data_only=values)
     except Exception as error:  # whatever a damaged file makes of the library
         reason = str(error.__cause__ or error).partition("\n")[0] or type(error).__name__  # the library's: three lines
-        raise TableError(f"a workbook that cannot be read: {reason}", hint=SAVE_AS, file=file) from None
+        raise InputError(f"a workbook that cannot be read: {reason}", hint=SAVE_AS, file=file) from None
 
 
 def _shown(value: Any) -> str:

@@ -9,12 +9,11 @@ import pytest
 from scipy.linalg import eigh
 
 from tests.effects.cases import model_with, readings
-from tests.stiffness.cases import nist, orthogonal_hexapod, random_poses
+from tests.stiffness.cases import compliance_of_wrenches, nist, orthogonal_hexapod, random_poses
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import parse_machine
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.readings.measurements import read_measurements
-from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
 from toolpath_stiff.stiffness.model import build_model, load_path
@@ -129,7 +128,7 @@ def test_a_longer_tool_leaves_the_struts_and_moves_the_tip():
         solve_struts(nist(), position, rotation).lengths, abs=1e-14
     )
     plain = model_with()
-    six = exact.wrench_compliance(plain, load_path(plain, position, rotation))
+    six = compliance_of_wrenches(plain, load_path(plain, position, rotation))
     lever = -0.040 * rotation[:, :, 2]
     carry = np.zeros((6, 3, 6))
     for i, (x, y, z) in enumerate(lever):  # motion of the true tip = v + theta x lever

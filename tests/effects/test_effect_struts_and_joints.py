@@ -122,7 +122,7 @@ def test_joint_moment_stiffness_from_measured_swings():
     machine = nist()
     positions, rotations = random_poses(4, 11)
     model = model_with("joint_moment_stiffness", stiffness=1.0)
-    parallel = exact.assemble_links(model, load_path(model, positions, rotations)).parallel
+    parallel = exact.assemble_links(model, load_path(model, positions, rotations))[1]
     step = 1e-5  # angles of 1e-5 are exact to 1e-11 in arctan2, and second-order terms are 1e-5 of the first
     for i in range(4):
         for twist in np.random.default_rng(i).normal(size=(8, 6)) * step:

@@ -17,7 +17,7 @@ from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.poses import evaluate_poses
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.errors import InputError, PoseError, TpsError
+from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -123,7 +123,7 @@ def test_a_pose_that_is_singular_and_within_the_limits_is_an_error(monkeypatch):
     monkeypatch.setattr(core, "tip_compliance", lambda model, tip, *_: np.full((len(tip), 3, 3), np.nan))
     zeros = np.zeros((1, 3))
     for evaluated in (partial(evaluate, tangent=np.eye(3)[:1]), evaluate_poses):
-        with pytest.raises(PoseError, match=r"machine nist is singular at X0 Y0 Z800 mm.*min_index"):
+        with pytest.raises(InputError, match=r"machine nist is singular at X0 Y0 Z800 mm.*min_index"):
             evaluated(build_model(nist()), position=TIP[:1], abc=zeros)
 
 

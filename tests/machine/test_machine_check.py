@@ -164,13 +164,13 @@ def test_entries_from_no_file_still_say_whose_they_are():
         build_model(machine)
 
 
-@pytest.mark.parametrize("out", ["mc", "mc/fine.png", "mc.svg"])
-def test_the_picture_goes_to_a_folder_or_a_png(tmp_path, monkeypatch, capsys, out):
+@pytest.mark.parametrize("out", ["mc/fine.png", "mc.svg"])
+def test_the_picture_is_a_png(tmp_path, monkeypatch, capsys, out):
     monkeypatch.chdir(tmp_path)
     assert main(["machine", "new", "mine.toml"]) == 0
     code = main(["machine", "check", "mine.toml", "--out", out])
     written = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
     if out == "mc.svg":
-        assert code == 2 and written == ["mine.toml"] and "expected FILE.png or a folder" in capsys.readouterr().err
+        assert code == 2 and written == ["mine.toml"] and "ends in .png" in capsys.readouterr().err
     else:
-        assert written == [out if out.endswith(".png") else "mc/mine_machine.png", "mine.toml"]
+        assert written == [out, "mine.toml"]

@@ -12,7 +12,6 @@ import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.linuxcnc import reader, runner
-from toolpath_stiff.nc.linuxcnc.runner import RunLimits
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.request import Request
@@ -251,9 +250,11 @@ def test_a_program_is_not_changed_and_a_run_leaves_no_trace_in_the_next(tmp_path
     assert file.read_bytes() == before and list(tmp_path.iterdir()) == [file]
 
 
-def read_limited(text: str, limits: RunLimits, unconfined: bool = False) -> ReadProgram:
+def read_limited(text: str, monkeypatch, seconds: int, file_bytes: int = 1 << 28, confined: bool = True) -> ReadProgram:
+    monkeypatch.setattr(runner, "SECONDS", seconds)
+    monkeypatch.setattr(runner, "FILE_BYTES", file_bytes)
     lines = tuple(text.split("\n"))
-    return reader.read(Request(lines, "part.nc", interpreter="linuxcnc", unconfined=unconfined), limits)
+    return reader.read(Request(lines, "part.nc", interpreter="linuxcnc", unconfined=not confined))
 
 
 @needs_rs274
@@ -262,7 +263,7 @@ def test_an_endless_loop_ends(confined, monkeypatch):
     if not confined:
         monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
     with pytest.raises(InputError, match=r"part\.nc.*after 1 s of processor time.*endless loop"):
-        read_limited("G1 X1 F100\no100 while [1]\n#1 = 1\no100 endwhile\nM2", RunLimits(seconds=1), not confined)
+        read_limited("G1 X1 F100\no100 while [1]\n#1 = 1\no100 endwhile\nM2", monkeypatch, 1, confined=confined)
 
 
 @pytest.mark.skipif(os.getuid() == 0, reason="the kernel's limit does not bind on root")
@@ -276,19 +277,19 @@ def test_it_starts_no_process(confined, monkeypatch, tmp_path):
         "#!/bin/sh\necho alive > canon.txt\n/bin/true && echo started >> canon.txt\necho late >> canon.txt\n"
     )
     fake.chmod(0o755)
-    assert runner.run_rs274("M2\n", "", "", rs274=str(fake), limits=RunLimits()).canon == "alive\n"
+    assert runner.run_rs274("M2\n", "", "", rs274=str(fake)).canon == "alive\n"
 
 
 @needs_rs274
-def test_an_endless_path_ends():
+def test_an_endless_path_ends(monkeypatch):
     with pytest.raises(InputError, match=r"part\.nc:3: .*after 1 MB of output"):
-        read_limited("G91\no100 while [1]\nG1 X1 F100\no100 endwhile\nM2", RunLimits(2, file_bytes=1_000_000))
+        read_limited("G91\no100 while [1]\nG1 X1 F100\no100 endwhile\nM2", monkeypatch, 2, 1_000_000)
 
 
 @needs_rs274
-def test_endless_recursion_ends():
+def test_endless_recursion_ends(monkeypatch):
     with pytest.raises(InputError, match=r"part\.nc"):
-        read_limited("o100 sub\no100 call\no100 endsub\nG1 X1 F100\no100 call\nM2", RunLimits(seconds=5))
+        read_limited("o100 sub\no100 call\no100 endsub\nG1 X1 F100\no100 call\nM2", monkeypatch, 5)
 
 
 @pytest.mark.skipif(runner._bubblewrap() is None, reason="bubblewrap is not installed, or may not work here")
@@ -300,7 +301,7 @@ def test_in_bubblewrap_nothing_else_can_be_written_and_there_is_no_network(tmp_p
         f"#!/bin/sh\necho x > {outside}\nwhile read line; do echo $line; done < /proc/net/dev > canon.txt\n"
     )
     fake.chmod(0o755)
-    run = runner.run_rs274("M2\n", "", "", rs274=str(fake), limits=RunLimits())
+    run = runner.run_rs274("M2\n", "", "", rs274=str(fake))
     assert not outside.exists()
     interfaces = [line.split(":")[0].strip() for line in run.canon.splitlines() if ":" in line]
     assert interfaces == ["lo"]
@@ -312,7 +313,7 @@ def test_it_is_started_without_a_shell_in_a_home_of_its_own(tmp_path, monkeypatc
     fake.write_text("#!/bin/sh\nexport -p > canon.txt\npwd >> canon.txt\n")
     fake.chmod(0o755)
     monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
-    run = runner.run_rs274("M2\n", "", "", rs274=str(fake), limits=RunLimits())
+    run = runner.run_rs274("M2\n", "", "", rs274=str(fake))
     home = next(line for line in run.canon.splitlines() if line.startswith("export HOME=")).split("=")[1].strip("'")
     assert run.canon.splitlines()[-1] == home and home != os.environ.get("HOME")
     assert "SECRET" not in run.canon

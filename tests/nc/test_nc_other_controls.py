@@ -10,7 +10,7 @@ from tests.nc.test_nc_against_rs274 import TABLE_OURS, TABLE_RS274, assert_same_
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import Controller, dialect_named
-from toolpath_stiff.nc.lathes import lathe_program
+from toolpath_stiff.nc.languages import lathe_program
 from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.reader import parse_program, read_program

@@ -53,6 +53,41 @@ def test_never_another_path_than_linuxcnc(seed, tmp_path):
     assert outcome is None or outcome.verdict != OTHER, outcome
 
 
+CONTINUED = "#1=0\no2 do\n#1=[#1+1]\no2 continue\no2 while [#1 LT 2]\n"
+BROKEN = "#1=0\no2 while [1]\n#1=[#1+1]\no2 break\no2 endwhile\n"
+REPEAT, WHILE = "o3 repeat [2]\nG91 G1 X1\no3 endrepeat\n", "o6 while [#1 LT 9]\n#1=[#1+1]\nG1 X#1\no6 endwhile\n"
+DO, BREAK = (
+    "o4 do\nG1 X#1\n#1=[#1+1]\no4 while [#1 LT 5]\n",
+    "o3 while [#1 LT 9]\n#1=[#1+1]\nG1 X#1\no3 break\no3 endwhile\n",
+)
+
+
+@pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
+@pytest.mark.parametrize(
+    ("text", "moves", "line"),
+    [
+        (CONTINUED + REPEAT, 4, 7),  # and not 2
+        (CONTINUED + BREAK, 2, 10),  # and not 1
+        (BROKEN + DO, 1, 10),  # and not 4
+        (CONTINUED + WHILE, 7, None),
+        (CONTINUED + WHILE + REPEAT, 9, None),
+        (BROKEN + REPEAT, 2, None),
+        (BROKEN + DO.replace("5", "1") + DO.replace("o4", "o5"), 4, None),
+    ],
+)
+def test_marks_of_break_and_continue_that_linuxcnc_keeps(text, moves, line, tmp_path):
+    """It runs a repeat again after the `continue` of a do, and a do but once after the `break` of a while."""
+    file = tmp_path / "part.ngc"
+    file.write_text(f"G21 F100\n{text}M2\n")
+    theirs = rs274.run(file, tmp_path).moves
+    assert len(theirs) == moves
+    if line is None:
+        assert np.allclose(ends(file.read_text(), LINUXCNC), [end[:3] for _, _, end, _ in theirs])
+    else:
+        error = refusal(file.read_text(), LINUXCNC)
+        assert error.line == line and "LinuxCNC's interpreter would" in error.found
+
+
 @pytest.mark.parametrize(
     ("expression", "expected"),
     [
@@ -229,14 +264,13 @@ def test_return_to_a_block_of_the_caller():
         ("G1 F9 X[FIX[-1.5]]\n", UNKNOWN_CONTROL, 1, "controls differ in FIX"),
         ("#33=1\nG1 F9 X#33\n", UNKNOWN_CONTROL, 1, "#33 cannot be set here"),
         ("IF[1 EQ 1]GOTO1\no1 if [1]\no1 endif\nN1 G1 X1 F9\n", UNKNOWN_CONTROL, 2, "is of LinuxCNC's language"),
-        ("G1 F9 X" + "#" * 1900 + "1", LINUXCNC, 1, "within each other"),
-        ("G1 F9 X[" + "1+" * 900 + "1]", LINUXCNC, 1, "operators in a block"),
+        ("G1 F9 X" + "#" * 1900 + "1", LINUXCNC, 1, "characters without comments"),
         ("G1 F9 X[" + "1+" * 3000 + "1]", LINUXCNC, 1, "characters without comments"),
         ("#[10**300]=1\n", LINUXCNC, 1, "#1e+300"),
         ("#1=1 T1.5 M6\n", LINUXCNC, 1, "'T1.5' cannot be read"),
         ("T[1.5] M6\n", LINUXCNC, 1, "T[1.5] is T1.5"),
         ("G1 F9 X1\nG2 X10 I[10**15]\n", LINUXCNC, 2, "beyond any number"),
-        ("#1=1\nO" + "1" * 500, FANUC, 2, "program number of 500 digits"),
+        ("#1=1\nO" + "1" * 500, FANUC, 2, "501 characters without comments"),
         ("GOTO 7\nWHILE[1 EQ 0]DO1\nN7 X5.\nEND1\n", FANUC, 1, "a jump into the loop that begins in line 2"),
         ("N0 G1 F9. X1.\nGOTO 1.5\n", FANUC, 2, "N1.5, which no block has"),
         ("G1 F9. X#500\n", FANUC, 1, "which keep those from #500 on"),
@@ -259,8 +293,9 @@ def test_return_to_a_block_of_the_caller():
         ("o<a> call\n", LINUXCNC, 1, "no such sub"),
         ("o<a> sub\no<a> call\no<a> endsub\no<a> call\n", LINUXCNC, 2, "within each other"),
         ("GOTO 5\n", FANUC, 1, "N5, which no block has"),
-        ("WHILE[1 EQ 1]DO1\nEND2\n", FANUC, 2, "END2 without DO2"),
-        ("G1 F9 X" + "[" * 60 + "1" + "]" * 60, LINUXCNC, 1, "brackets within each other"),
+        ("WHILE[1 EQ 1]DO1\nEND2\n", FANUC, 1, "WHILE DO1 (line 1) has no end"),
+        ("G1 F9\nEND2\n", FANUC, 2, "END2 does not belong"),
+        ("o1 repeat [2]\no1 break\no1 endrepeat\n", LINUXCNC, 2, "o1 break does not belong"),
     ],
 )  # fmt: skip
 def test_refused_with_line_and_reason(text, controller, line, says):
@@ -269,7 +304,7 @@ def test_refused_with_line_and_reason(text, controller, line, says):
 
 
 @pytest.mark.parametrize("leave", ["break", "continue"])
-@pytest.mark.parametrize("loop", ["while [1]", "repeat [3]", "do"])
+@pytest.mark.parametrize("loop", ["while [1]", "do"])
 def test_check_goes_on_behind_a_loop_without_its_end(loop, leave):
     text = f"F100\nG0 X0\no10 {loop}\no10 {leave}\nG1 X1\nM2"
     findings = check(Request(tuple(text.splitlines()), "p.nc", controller=LINUXCNC)).findings
@@ -298,6 +333,17 @@ def test_a_loop_without_an_end_is_stopped(monkeypatch):
     monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_STEPS", 900)
     error = refusal("F9\n#1=0\no1 while [1]\nG1 X#1\n#1=[#1+1]\no1 endwhile\n", LINUXCNC)
     assert "900 blocks" in error.found
+
+
+@pytest.mark.parametrize("nest", ["[", "#", "#[", "-[", "ABS[", "1+"])
+def test_a_block_as_long_as_linuxcnc_reads_is_worked_out(nest):
+    """No text within the length of a block reaches Python's own limit of calls within calls."""
+    times = 245 // (len(nest) + nest.count("["))
+    text = f"G1F9X{nest * times}1{']' * times * nest.count('[')}"
+    if nest != "1+":
+        parse_program(f"F9\n#1=1\n{text}\nG1 X9\n", controller=LINUXCNC)
+    else:
+        refusal(text, LINUXCNC)
 
 
 def test_loops_that_read_the_position_end():

@@ -37,12 +37,12 @@ def two(kind: str, first: str, second: str, tcp: bool = False, more: str = "") -
 
 
 def tip_mm(posted: PostedKinematics, xyz_mm: tuple, abc_deg: tuple, tool_mm: float = math.nan) -> np.ndarray:
-    found = tool_poses(posted, np.array([xyz_mm]) / 1e3, np.radians([abc_deg]), tool_mm / 1e3)
-    return np.array(found.tip[0] * 1e3)
+    tip, _ = tool_poses(posted, np.array([xyz_mm]) / 1e3, np.radians([abc_deg]), tool_mm / 1e3)
+    return np.array(tip[0] * 1e3)
 
 
 def axis_of(posted: PostedKinematics, abc_deg: tuple) -> np.ndarray:
-    return tool_poses(posted, np.zeros((1, 3)), np.radians([abc_deg]), 0.0).axis[0]
+    return tool_poses(posted, np.zeros((1, 3)), np.radians([abc_deg]), 0.0)[1][0]
 
 
 # -- LinuxCNC's published kinematics -----------------------------------------------------------------------------------
@@ -218,7 +218,7 @@ def test_nothing_turned_changes_no_digit():
     xyz = np.array([[0.1, -0.2, 0.3]])
     head = 'type = "head"\ntcp = false\n[head]\nletter = "B"\npivot_mm = [3, 4, 5]'  # and the tool's length unknown
     for posted in (two("table-table", *AC_TABLE), kinematics(head)):
-        np.testing.assert_array_equal(tool_poses(posted, xyz, np.zeros((1, 3))).tip, xyz)
+        np.testing.assert_array_equal(tool_poses(posted, xyz, np.zeros((1, 3)))[0], xyz)
 
 
 @given(st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.1), min_size=1, max_size=5))

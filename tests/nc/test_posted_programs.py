@@ -297,15 +297,6 @@ def test_divided_moves_of_heads_stay_within_the_tolerance_too(tmp_path_factory, 
         previous = np.array(block)
 
 
-def test_moves_recovered_in_portions_are_the_same(control, monkeypatch):
-    text = hemisphere_program(40, 4).replace("M30", "G4 P1\nG93\nC900 F2\nG94\nG0 X20 Y-5 A0\nG93 G1 C0 F2\nX9 F3\nM30")
-    whole = parse_program(text, controller=control(AC)).moves
-    monkeypatch.setattr("toolpath_stiff.nc.recovery.MOVES_AT_A_TIME", 1)
-    portions = parse_program(text, controller=control(AC)).moves
-    for name in ("line", "motion", "start", "end", "feed", "dwell", "tool"):
-        np.testing.assert_array_equal(getattr(whole, name), getattr(portions, name))
-
-
 def distance_to_polyline(point: np.ndarray, nodes: np.ndarray) -> float:
     start, along = nodes[:-1], np.diff(nodes, axis=0)
     length = np.maximum(np.einsum("ni,ni->n", along, along), 1e-300)

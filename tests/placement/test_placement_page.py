@@ -17,7 +17,7 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.path.sampling import sample_moves
-from toolpath_stiff.report.place_page import thinned_rows
+from toolpath_stiff.report.place_path import thinned_rows
 
 ROOT = Path(__file__).parent.parent.parent
 NIST = load_machine("nist")

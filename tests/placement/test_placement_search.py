@@ -182,7 +182,7 @@ def test_command(tmp_path, monkeypatch, capsys):
     arguments = ["place", program, "--x", "-200:200", "--y", "-200:200", "--z", "400:1250", "--step", "10"]
     assert main([*arguments, "--out", "one"]) == 0
     assert "recommended" in capsys.readouterr().out
-    names = {"placements.csv", "placement.json", "front.png", "setup.pdf", "report.html"}
+    names = {"placements.csv", "placement.json", "setup.pdf", "report.html"}
     assert {p.name for p in (tmp_path / "one").glob("[!.]*")} == names
     page = (tmp_path / "one/report.html").read_text()
     assert "{{" not in page and re.findall(r"https?://[^\"]*", page) == ["http://www.w3.org/2000/svg"]

@@ -9,9 +9,8 @@ from matplotlib.image import imread
 from tests.updating.cases import VERDICTS, diagnosed
 from toolpath_stiff.report.diagnose import page as diagnose_html
 from toolpath_stiff.report.explanations import headline
-from toolpath_stiff.report.pictures.diagnose import fits
+from toolpath_stiff.report.pictures.diagnose import fits, ladder
 from toolpath_stiff.report.pictures.files import picture_file
-from toolpath_stiff.report.pictures.ladder import ladder
 
 PICTURES = (ladder, fits)
 

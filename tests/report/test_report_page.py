@@ -14,7 +14,7 @@ from tests.browser import needs_browser, opened, run_in
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.nc.moves import ToolUse, Unsupported
 from toolpath_stiff.report import analysis_page as page_module
-from toolpath_stiff.report.analysis_page import NONE, OUT_OF_REACH, PLUNGE, page_pieces, page_rows
+from toolpath_stiff.report.analysis_page import NONE, OUT_OF_REACH, PLUNGE, page, page_rows
 from toolpath_stiff.report.pages import json_pieces
 from toolpath_stiff.units import number
 
@@ -58,7 +58,7 @@ class Page(HTMLParser):
 
 
 def render(analysis, required=None, other=None):
-    return "".join(page_pieces(replace(analysis, required=required, on_other=other)))
+    return "".join(page(replace(analysis, required=required, on_other=other), {}))
 
 
 def column(text, dtype):
@@ -256,7 +256,7 @@ def test_the_page_knows_which_samples_are_set_aside_and_both_scales(analysis, pa
     assert Page(render(short())).data["scale_with_plunges"] is None
     (switch,) = [attrs for _, attrs in parsed.elements if attrs.get("id") == "plunges"]
     assert "checked" not in switch
-    shown = "".join(page_pieces(analysis, show_plunges=True))
+    shown = "".join(page(analysis, {}, show_plunges=True))
     (switch,) = [attrs for _, attrs in Page(shown).elements if attrs.get("id") == "plunges"]
     assert "checked" in switch
 

@@ -12,6 +12,9 @@ from tests.stiffness.reference import structure_stiffness
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.stiffness.truss import TIP, platform_nodes
 
 FloatArray = NDArray[np.float64]
@@ -68,6 +71,11 @@ def orthogonal_hexapod(offset: float = 0.0) -> Hexapod:
         reference_tool_length=0.1,
         strut_law=StrutLaw(1.0, 10e6, 3.0, 30e6),
     )
+
+
+def compliance_of_wrenches(model: StiffnessModel, path: LoadPath) -> FloatArray:
+    """(n, 6, 6) compliance of a model's tip for forces and moments."""
+    return exact.respond(path, *exact.assemble_links(model, path), np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
 
 
 def wrench_compliance(machine: Hexapod, position: FloatArray, rotation: FloatArray) -> FloatArray:

@@ -18,8 +18,7 @@ from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.poses import evaluate_poses
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
+from toolpath_stiff.rotations import roll_pitch_yaw
 from toolpath_stiff.stiffness import core, exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
@@ -131,10 +130,10 @@ def test_one_pass_was_too_stiff_by_several_per_cent():
         for along in direction:
             path = load_path(linear, POSITION[i : i + 1], ROTATION[i : i + 1], force=500.0)
             wrench = np.array([[*along, 0.0, 0.0, 0.0]])[..., None]
-            forces = exact.respond(path, exact.assemble_links(linear, path), wrench)[1][0, :, 0] * 500.0
-            struts = exact.assemble_links(linear, path).strut + 4e-6 / np.abs(forces)
-            links = exact.AssembledLinks(struts, None, exact.assemble_links(linear, path).parallel)
-            once = 1.0 / (exact.respond(path, links, wrench)[0][0, :3, 0] @ along)
+            form, parallel = exact.assemble_links(linear, path)
+            forces = exact.respond(path, form, parallel, wrench)[1][0, :, 0] * 500.0
+            form[0, range(6), range(6)] += 4e-6 / np.abs(forces)
+            once = 1.0 / (exact.respond(path, form, parallel, wrench)[0][0, :3, 0] @ along)
             worst = max(worst, once / stiffness(model, i, along, 500.0) - 1.0)
     assert 0.03 < worst < 0.2
 
@@ -192,27 +191,6 @@ def test_forces_that_do_not_settle_are_an_error_that_names_effect_and_pose():
         core.compliance_along(model, np.tile(unit([1, 2, 3]), (4, 1)), position, force=400.0)
 
 
-@pytest.mark.parametrize("kappa", [0.0, 1e5])
-def test_no_direction_is_softer_than_the_softest_or_stiffer_than_the_stiffest(kappa):
-    model = model_of(kappa, 4e-6, 10e-9)
-    rng = np.random.default_rng(8)
-    count = 800
-    found = evaluate_poses(model, POSITION[:3], roll_pitch_yaw(ROTATION[:3]), force=500.0)
-    linear = evaluate_poses(model_of(kappa), POSITION[:3], roll_pitch_yaw(ROTATION[:3]), force=500.0)
-    beyond = []
-    for i in range(3):
-        directions = rng.normal(size=(count, 3))
-        directions /= np.linalg.norm(directions, axis=1)[:, None]
-        place = np.repeat(POSITION[i : i + 1], count, axis=0), np.repeat(ROTATION[i : i + 1], count, axis=0)
-        tried = 1.0 / core.compliance_along(model, directions, *place, force=500.0)
-        assert found.softest_stiffness[i] <= tried.min() * (1.0 + 1e-6)
-        assert found.stiffest_stiffness[i] >= tried.max() * (1.0 - 1e-6)
-        by_tensor = stiffness(model, i, linear.softest[i], 500.0)
-        beyond.append(by_tensor / found.softest_stiffness[i] - 1.0)
-        assert by_tensor >= found.softest_stiffness[i] * (1.0 - 1e-9)
-    assert max(beyond) > 1e-3  # the eigenvector of the linear tensor was not the softest direction
-
-
 def pinned(machine, position, rotation, directions, force, gap, contact):
     """(m,) N/m of six pinned bars: forces by statics, each bar's own stretch, and the work that they do."""
     arms = machine.platform_joints @ rotation.T
@@ -229,56 +207,18 @@ def pinned(machine, position, rotation, directions, force, gap, contact):
 
 
 @pytest.mark.parametrize(("gap", "contact", "force"), [(4e-6, 10e-9, 500.0), (40e-6, 0.0, 500.0), (0.0, 50e-9, 100.0)])
-def test_softest_and_stiffest_are_the_extremes_of_bars_assembled_here(gap, contact, force):
-    """Over 20,000 directions; the stiffest ones lie in kinks too narrow for those, and so may be stiffer still."""
-    directions = core.half_sphere(20_000)
-    found = evaluate_poses(model_of(0.0, gap, contact), POSITION[:8], roll_pitch_yaw(ROTATION[:8]), force=force)
-    linear = evaluate_poses(model_of(), POSITION[:8], roll_pitch_yaw(ROTATION[:8]))
-    off = []
+def test_softest_and_stiffest_are_those_of_the_linear_machine_with_its_gaps_along_them(gap, contact, force):
+    """The directions are the linear tensor's, as every result says; the stiffness is that of bars assembled here."""
+    place = POSITION[:8], roll_pitch_yaw(ROTATION[:8])
+    found, linear = evaluate_poses(model_of(0.0, gap, contact), *place, force=force), evaluate_poses(model_of(), *place)
+    np.testing.assert_array_equal([found.softest, found.stiffest], [linear.softest, linear.stiffest])
     for i in range(8):
-        given = nist(), POSITION[i], ROTATION[i]
-        tried = pinned(*given, directions, force, gap, contact)
-        assert found.softest_stiffness[i] <= tried.min() * (1.0 + 1e-6)
-        assert found.stiffest_stiffness[i] >= tried.max() * (1.0 - 1e-6)
-        own = pinned(*given, np.array([found.softest[i], found.stiffest[i]]), force, gap, contact)
+        both = np.array([found.softest[i], found.stiffest[i]])
+        here = pinned(nist(), POSITION[i], ROTATION[i], both, force, gap, contact)
         # A strut below a thousandth of a newton counts as idle there.
-        assert own == pytest.approx([found.softest_stiffness[i], found.stiffest_stiffness[i]], rel=1e-5)
-        off.append(pinned(*given, linear.softest[i : i + 1], force, gap, contact)[0] / found.softest_stiffness[i] - 1.0)
-    assert max(off) > 1e-3  # what the linear tensor calls softest is not
-
-
-def test_the_softest_direction_is_not_missed_in_a_basin_of_its_own():
-    """With contact and clearance at 100 N; three climbs from the best of sixty directions ended 0.12 % stiffer."""
-    place = np.array([[-0.022242, -0.085002, 0.627592]]), rotation_matrices(np.radians([[2.694, 1.239, 5.739]]))
-    extra = [
-        ActiveEffect(find_effect("contact_nonlinearity"), {"compliance": 20e-9}),
-        ActiveEffect(find_effect("joint_clearance"), {"lost_motion": 5e-6}),
-    ]
-    model = build_model(load_machine("genhexkins"), extra=extra)
-    spread = core.half_sphere(20_000)
-    everywhere = (np.repeat(part, len(spread), axis=0) for part in place)
-    softest = core.compliance_along(model, spread, *everywhere, force=100.0).max()
-    found = core.extreme_directions(model, *place, force=100.0)
-    assert core.compliance_along(model, found, *place, force=100.0)[0] >= softest * (1.0 - 1e-6)
-
-
-def test_the_stiffest_direction_beside_stiff_joints_is_not_missed():
-    """A basin of its own, where three struts are idle: 1.1 % stiffer than the best of three climbs."""
-    place = POSITION[1:2], ROTATION[1:2]
-    model = model_of(1e5, 4e-6)
-    near = np.array([0.41081598, -0.55017609, 0.72700516])
-    direction = core.extreme_directions(model, *place, force=500.0, softest=False)
-    found = 1.0 / core.compliance_along(model, direction, *place, force=500.0)[0]
-    assert found >= opponent(nist(), POSITION[1], ROTATION[1], unit(near), 500.0, 1e5, 4e-6, 0.0) * (1.0 - 1e-5)
-
-
-def test_without_load_dependence_the_search_finds_the_eigenvectors():
-    model = model_of(1e5)
-    place = POSITION[:6], ROTATION[:6]
-    found = core.extreme_directions(model, *place)
-    values = np.linalg.eigvalsh(core.tip_compliance(model, *place))
-    along = core.compliance_along(model, found, *place)
-    assert along == pytest.approx(values[:, -1], rel=1e-6)
+        assert here == pytest.approx([found.softest_stiffness[i], found.stiffest_stiffness[i]], rel=1e-5)
+    names = [name for name, size in (("joint_clearance", gap), ("contact_nonlinearity", contact)) if size]
+    assert any(f"directions are those without {', '.join(names)}" in text for text in found.warnings)
 
 
 def test_loads_that_mean_the_softest_direction_mean_it_under_the_load():

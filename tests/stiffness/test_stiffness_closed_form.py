@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.stiffness import reference
-from tests.stiffness.cases import nist, orthogonal_hexapod, random_poses
+from tests.stiffness.cases import compliance_of_wrenches, nist, orthogonal_hexapod, random_poses
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
@@ -31,7 +31,7 @@ def skew(vector: np.ndarray) -> np.ndarray:
 def test_orthogonal_hexapod():
     """Pairs of struts are parallel springs; each pair is also a torsion spring k h^2 about one axis."""
     model = build_model(orthogonal_hexapod())
-    compliance = exact.wrench_compliance(model, load_path(model, ORIGIN))[0]
+    compliance = compliance_of_wrenches(model, load_path(model, ORIGIN))[0]
     by_hand = 1.0 / np.array([KX, KY, KZ, KY * H**2, KZ * H**2, KX * H**2])
     assert np.diag(compliance) == pytest.approx(by_hand, rel=1e-12)
     assert compliance - np.diag(np.diag(compliance)) == pytest.approx(0.0, abs=1e-12 * by_hand.min())
@@ -53,8 +53,8 @@ def test_moving_the_reference_point_along_the_tool():
     position, rotation = random_poses(5, 11)
     extension = 0.12
     shift = -extension * rotation[:, :, 2]
-    short = exact.wrench_compliance(model, load_path(model, position, rotation, 0.15))
-    long = exact.wrench_compliance(model, load_path(model, position + shift, rotation, 0.15 + extension))
+    short = compliance_of_wrenches(model, load_path(model, position, rotation, 0.15))
+    long = compliance_of_wrenches(model, load_path(model, position + shift, rotation, 0.15 + extension))
     for i in range(5):
         move = np.eye(6)
         move[:3, 3:] = -skew(shift[i])
@@ -86,7 +86,7 @@ def test_energy_balance(bars):
     model = build_model(nist(bars))
     path = load_path(model, *random_poses(20, 12))
     wrench = np.random.default_rng(1).normal(size=(20, 6, 1)) * [[500.0], [500.0], [500.0], [50.0], [50.0], [50.0]]
-    twists, forces = exact.respond(path, exact.assemble_links(model, path), wrench)
+    twists, forces = exact.respond(path, *exact.assemble_links(model, path), wrench)
     work = np.einsum("nij,nij->n", wrench, twists)
     in_struts = (forces[..., 0] ** 2 / model.machine.strut_law.stiffness(path.struts.lengths)).sum(axis=1)
     if np.isinf(bars):
@@ -123,7 +123,7 @@ def test_parallel_stiffness_on_a_rigid_platform():
     jacobian = path.struts.jacobian
     total = np.swapaxes(jacobian, 1, 2) @ (strut[..., None] * jacobian) + spring_stiffness()
     expected = np.linalg.inv(total)
-    for got, right in zip(exact.wrench_compliance(model, path), expected, strict=True):
+    for got, right in zip(compliance_of_wrenches(model, path), expected, strict=True):
         assert got == pytest.approx(right, rel=1e-8, abs=1e-11 * np.abs(right).max())
 
 
@@ -163,8 +163,8 @@ def test_no_spring_is_no_change():
     zero = build_model(machine, extra=[ActiveEffect(Spring(), {"scale": 0.0})])
     plain = build_model(machine)
     pose = random_poses(20, 15)
-    one = exact.wrench_compliance(zero, load_path(zero, *pose))
-    other = exact.wrench_compliance(plain, load_path(plain, *pose))
+    one = compliance_of_wrenches(zero, load_path(zero, *pose))
+    other = compliance_of_wrenches(plain, load_path(plain, *pose))
     assert np.abs(one - other).max() < 1e-9 * np.abs(other).max()
 
 

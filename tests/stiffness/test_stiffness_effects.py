@@ -1,9 +1,8 @@
-"""The effect contract from outside: machine files, user files, plug-ins, and every message that they can end in."""
+"""The effect contract from outside: machine files, user files, and every message that they can end in."""
 
 from __future__ import annotations
 
 from importlib import resources
-from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ import pytest
 from tests.stiffness.cases import nist, random_poses
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import parse_machine
-from toolpath_stiff.stiffness import catalogue as registry
 from toolpath_stiff.stiffness.catalogue import effects_from_file, known_effects
 from toolpath_stiff.stiffness.contract import LINKS
 from toolpath_stiff.stiffness.core import tip_compliance
@@ -198,32 +196,3 @@ def test_a_file_that_does_not_exist_or_is_no_python(tmp_path):
     (tmp_path / "text.txt").write_text("hello")
     with pytest.raises(InputError, match=r"ends in \.py"):
         effects_from_file(tmp_path / "text.txt")
-
-
-@pytest.fixture
-def plug_ins(monkeypatch):
-    """Entry points of packages that are installed, as `importlib.metadata` reports them."""
-
-    def install(*targets: tuple[str, str]):
-        points = [EntryPoint(name, target, registry.ENTRY_POINTS) for name, target in targets]
-        monkeypatch.setattr("importlib.metadata.entry_points", lambda group: points)
-        registry.installed_effects.cache_clear()
-
-    yield install
-    registry.installed_effects.cache_clear()
-
-
-def test_plug_ins_load_and_broken_ones_say_why(plug_ins):
-    here = "tests.stiffness.test_stiffness_closed_form"
-    plug_ins(("spring", f"{here}:Spring"), ("gone", "no_such_package:Thing"), ("odd", "math:pi"))
-    assert "spring" in known_effects()
-    broken = registry.installed_effects()[1]
-    assert set(broken) == {"gone", "odd"}
-    with pytest.raises(InputError, match=r"gone does not load.*no_such_package"):
-        registry.find_effect("gone")
-
-
-def test_a_plug_in_cannot_replace_a_packaged_effect(plug_ins):
-    target = "toolpath_stiff.stiffness.effects.platform_flexibility:PlatformFlexibility"
-    plug_ins(("platform_flexibility", target))
-    assert "exists already" in registry.installed_effects()[1]["platform_flexibility"]

@@ -117,7 +117,7 @@ def test_the_token_goes_into_a_cookie_that_scripts_and_other_sites_do_not_get(ru
 
 
 @pytest.mark.parametrize(
-    "path", ["../case.toml", "%2e%2e/secret.csv", "/etc/passwd", "exercise/machine.toml", "case", "results/../../x.csv"]
+    "path", ["../case.json", "%2e%2e/secret.csv", "/etc/passwd", "exercise/machine.toml", "case", "results/../../x.csv"]
 )
 def test_nothing_outside_the_case_and_not_the_seal(running, path):
     (running.folder.parent / "secret.csv").write_text("secret")
@@ -142,7 +142,7 @@ def test_large_bodies_are_refused_before_they_are_read(running):
         ({"do": "format"}, "nothing called"),
         ({"do": "aside", "file": "../x.csv", "line": 3}, ""),
         ({"do": "switch", "effect": "ghost", "values": {}}, ""),
-        ({"do": "claim", "effects": "weak_strut"}, "no exercise"),
+        ({"do": "claim", "effects": "weak_strut"}, "sealed"),
         ({"do": "fit"}, "no effect is switched on"),
         ({"do": "place", "x_mm": 0, "out": "/tmp"}, "unexpected"),
         ({"do": "undo", "what": 1}, "undo"),
@@ -296,10 +296,9 @@ def test_own_effects_are_edited_beside_the_page(running, browser, tmp_path):
     line = 1 + text[: text.index("link =")].count("\n")
     assert f"{line}" in tab.text("#own-fault-0")
     assert running.state()["own_effects"][0]["file"] == "effects/my_screw.py"
-    # In an editor: saving is enough.
-    copy = Path(running.state()["own_effects"][0]["copy"])
     title = re.search(r'title = "([^"]*)"', text)[1]
-    copy.write_text(text.replace(title, "the screws of the shop give way"))
+    page.fill("#own-0", text.replace(title, "the screws of the shop give way"))
+    page.click("#own-save-0")
     tab.until("document.querySelector('label[for=sw-my_screw]').textContent.includes('screws of the shop')")
     assert page.locator("#own-fault-0").count() == 0
     assert tps.Case.open(running.folder).state.effects == ("effects/my_screw-2.py",)
@@ -703,7 +702,7 @@ def test_broken_files_are_told_and_change_nothing(running, browser, tmp_path):
         tab.until(f"document.querySelector('#message').textContent.includes({json.dumps(said)})")
         tab.page.evaluate("document.querySelector('#message').hidden = true")
     running.idle()
-    assert [s.kind for s in tps.Case.open(running.folder).history[steps:] if s.change and s.kind == "data"] == []
+    assert [s.kind for s in tps.Case.open(running.folder).history[steps:] if s.kind == "data"] == []
     assert tab.page.locator("b", has_text=".csv").count() == 0
     tab.close()
 

@@ -20,7 +20,7 @@ from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.model import build_model, load_path
 from toolpath_stiff.stiffness.term_effect import effect_of
 from toolpath_stiff.stiffness.term_file import entry_of
-from toolpath_stiff.stiffness.terms import Factor, Term
+from toolpath_stiff.stiffness.terms import Term
 from toolpath_stiff.stiffness.trial import all_passed, try_effect
 
 MARKS = ("0123456789",) * 12
@@ -28,8 +28,8 @@ LINE, RAMP = (("start", -0.11), ("end", 0.17)), (("start", 0.71), ("end", 1.13))
 ABOVE, BELOW = (("edge", 0.02), ("side", 1.0)), (("edge", 0.013), ("side", -1.0))
 FALLING = (("power", -1.0 / 3.0), ("reference", 500.0))
 STRUT = "along the struts"
-HERE = Factor("setup", "offset", column='it\'s "here"')
-SWUNG = Factor("tilt", "square", (("centre", 0.0), ("reach", 0.6)), "platform joint")
+HERE = ("setup", "offset", (), 'it\'s "here"')
+SWUNG = ("tilt", "square", (("centre", 0.0), ("reach", 0.6)), "platform joint")
 TERMS = [
     Term("table", "Y", "y", "slope", "give", at=LINE),
     Term("table", "all", "constant", "offset", "give"),
@@ -70,11 +70,11 @@ TERMS = [
     Term("joints", "all", "constant", "offset", "turning", where=2),
     Term("joints", "radial", "constant", "offset", "platform pin"),
     Term("joints", "tangential", "strut force", "threshold", "frame pin", where=4, at=(("within", 200.0),)),
-    Term("table", "horizontal", "load", "threshold", "give", at=(("beyond", 500.0),), times=HERE),
-    Term("instrument", "Y", "y", "slope", "reading factor", at=LINE, times=Factor("load", "slope", FALLING)),
-    Term("joints", STRUT, "time", "slope", "strut", at=(("start", 0.0), ("end", 9.0)), times=SWUNG),
-    Term("one strut", STRUT, "strut length", "slope", "strut factor", 3, RAMP, times=HERE),
-    Term("joints", "all", "load", "slope", "turning", at=FALLING, times=SWUNG),
+    Term("table", "horizontal", "load", "threshold", "give", at=(("beyond", 500.0),)).with_second(*HERE),
+    Term("instrument", "Y", "y", "slope", "reading factor", at=LINE).with_second("load", "slope", FALLING),
+    Term("joints", STRUT, "time", "slope", "strut", at=(("start", 0.0), ("end", 9.0))).with_second(*SWUNG),
+    Term("one strut", STRUT, "strut length", "slope", "strut factor", 3, RAMP).with_second(*HERE),
+    Term("joints", "all", "load", "slope", "turning", at=FALLING).with_second(*SWUNG),
     Term("joints", STRUT, "tilt", "slope", "strut", at=(("start", 0.1), ("end", 0.5)), column="frame joint"),
 ]  # fmt: skip
 WORDS = "a long clause without an end, " * 5 + 'the "table" of C:\\new gives way """here"""'

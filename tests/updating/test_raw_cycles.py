@@ -118,7 +118,7 @@ def test_a_table_of_stiffnesses_is_a_history(reduced, tmp_path):
     texts = [one["text"] for one in found.to_dict()["history"]["struts"]]
     assert "no change" in texts[0] and "became 10 % softer between 2019-05-01 and 2020-05-01" in texts[1]
     names = [path.name for path in found.save(tmp_path / "m.csv")]
-    assert names == ["m.csv", "m_history.png"] and "40,007 to 36,010" in str(found)
+    assert names == ["m.csv"] and "40,007 to 36,010" in str(found)
     again = tps.reduce(tmp_path / "m.csv").to_dict()["history"]
     assert [one["text"] for one in again["struts"]] == texts
 

@@ -14,7 +14,6 @@ from toolpath_stiff.analysis.statistics import (
 )
 from toolpath_stiff.analysis.uncertainty import band_figures
 from toolpath_stiff.documents import Document, to_dict
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.stiffness.model import acting_effects, conditions_stated, effects_stated
 from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m, pose_in_mm
@@ -33,7 +32,7 @@ def assumptions(analysis: EvaluatedPath) -> list[str]:
         where = " ".join(words if any(analysis.origin[3:]) else words[:3])
         sentences.append(
             f"program zero (G54) sits at {where} in machine coordinates, the machine's default; "
-            f"{both_names('--origin')} puts it elsewhere"
+            "--origin puts it elsewhere"
         )
     for quantity, origin in machine.origins.items():
         if origin != "published":

@@ -9,7 +9,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import Load, geometric_directions, load_directions
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import PoseError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Extremes, Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod
@@ -227,14 +227,12 @@ def _evaluate_rows(task: _Task, rows: slice | IntArray) -> None:
     within = stand.reachable
     compliance = np.full((len(tip), 3, 3), np.nan)
     turned = None if rotation is None else rotation[within]
-    compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force, task.route)
+    compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force)
     refuse_no_number(machine, tip, within & np.isnan(compliance[:, 0, 0]))
 
     direction, substituted = load_directions(task.load, compliance, tip, rotation, task.tangent[rows])
     if model.load_dependent:
         there = (tip[within], turned, tool[within], force)
-        if task.load.kind == "softest":
-            direction[within] = core.extreme_directions(model, *there)
         along = np.full(len(tip), np.nan)
         along[within] = core.compliance_along(model, direction[within], *there)
     else:
@@ -247,10 +245,10 @@ def _evaluate_rows(task: _Task, rows: slice | IntArray) -> None:
 
 
 def refuse_no_number(machine: Hexapod, tip: FloatArray, bad: BoolArray) -> None:
-    """Raise `PoseError` where the limits let poses pass (n,) that have no stiffness."""
+    """Raise `InputError` where the limits let poses pass (n,) that have no stiffness."""
     if bad.any():
         x, y, z = (mm_from_m(float(v)) + 0.0 for v in tip[int(np.argmax(bad))])
-        raise PoseError(
+        raise InputError(
             f"machine {machine.name} is singular at X{x:g} Y{y:g} Z{z:g} mm: the tip has no stiffness there",
             hint="keep such poses out of reach: min_index of [limits.singularity] in the machine file, such as 0.05",
         )

@@ -16,7 +16,6 @@ import numpy as np
 from toolpath_stiff import defaults, rotations
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.stiffness.core import signed
 
 LOADS = ("tangential", "axial", "normal", "softest", "radial", "x", "y", "z")
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -131,7 +130,9 @@ def principal_directions(compliance: FloatArray, softest: bool = True) -> FloatA
     """(n, 3) unit vectors of the largest, else the smallest eigenvalue of C; their largest component is positive."""
     finite = np.isfinite(compliance).all(axis=(1, 2))
     directions = np.full((len(compliance), 3), np.nan)
-    directions[finite] = signed(np.linalg.eigh(compliance[finite])[1][:, :, -1 if softest else 0])
+    vectors = np.linalg.eigh(compliance[finite])[1][:, :, -1 if softest else 0]
+    largest = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=1)[:, None], axis=1)
+    directions[finite] = np.where(largest < 0.0, -vectors, vectors)
     return directions
 
 

@@ -172,10 +172,7 @@ def evaluate_poses(
             return core.compliance_along(model, direction, tip, turn, tool_length, force)
         return np.asarray(np.einsum("ni,nij,nj->n", direction, compliance, direction))
 
-    if model.load_dependent:
-        soft, stiff = (core.extreme_directions(model, tip, turn, tool_length, force, which) for which in (True, False))
-    else:
-        soft, stiff = (principal_directions(compliance, which) for which in (True, False))
+    soft, stiff = (principal_directions(compliance, which) for which in (True, False))
     axes = [along(np.broadcast_to(axis, (len(tip), 3))) for axis in np.eye(3)]
 
     def spread(values: FloatArray) -> FloatArray:

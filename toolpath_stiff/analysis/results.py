@@ -23,7 +23,6 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.path.placing import place
@@ -134,7 +133,7 @@ class Analysis(EvaluatedPath, FolderResult):
         if self.on_other is not None:
             other = self.on_other.to_dict()
             summary["compare"] = compare_summaries(summary, other)
-            option = both_names("--compare", other["machine"])  # without these the two machines may look the same
+            option = f"--compare {other['machine']}"  # without these the two machines may look the same
             idle = [f"{option}: {row['effect']} does not act: {row['reason']}" for row in other["effects_idle"]]
             summary["warnings"] = [*self.warnings, *idle]
         finite: dict[str, Any] = without_nan(summary)
@@ -213,8 +212,7 @@ def analyze(
     evaluation = evaluate(
         model, samples.position, samples.abc, samples.tangent, samples.tool_length, direction, force, progress
     )
-    tool_given = not np.isnan(samples.tool_length[samples.cutting]).any()
-    warnings = [*map(str, program.warnings), *condition_warnings(model, tool_given), *_warnings(samples, evaluation)]
+    warnings = [*map(str, program.warnings), *condition_warnings(model), *_warnings(samples, evaluation)]
     analysis = Analysis(
         program=program, model=model, origin=place_at, origin_source=source, load=direction, force=force, step=step,
         samples=samples, at=evaluation, warnings=warnings,
@@ -277,7 +275,7 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     if not bad.any() or (partial and not bad[samples.cutting].all()):
         return
     first = int(np.argmax(bad))
-    hint = f"place the work elsewhere with {both_names('--origin')}"
+    hint = "place the work elsewhere with --origin"
     hint += "" if partial else ", or keep the reachable part with --partial"
     if words_turn_the_platform(analysis.program):
         hint += "; if the program was posted for another machine, name it with [kinematics] in a controller file"

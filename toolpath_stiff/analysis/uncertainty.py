@@ -58,7 +58,7 @@ def parameter_band(
     uncertainty = model.given.uncertainty if model.given is not None else None
     if uncertainty is None:
         return None
-    idle = {active.effect.name for active in model.instruments} | {effect.effect for effect in idle_effects(model)}
+    idle = {active.effect.name for active in model.instruments} | idle_effects(model).keys()
     kept = [
         i
         for i, (name, sd) in enumerate(zip(uncertainty.names, uncertainty.sd, strict=True))

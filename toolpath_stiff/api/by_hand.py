@@ -1,14 +1,14 @@
 """Effects set by hand: the error of every reading at once, and the machine that carries them."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.api.measurements import Data, Noise, Question
+from toolpath_stiff.api.measurements import Data
+from toolpath_stiff.api.questions import Noise, Question
 from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.candidates import Candidate, Component
 from toolpath_stiff.inference.errors import deviation_percent, error_figures
@@ -18,7 +18,6 @@ from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.machine.model import EffectEntry, StrutLaw
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.stiffness.parameters import read_parameters
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
@@ -37,18 +36,16 @@ class Preview:
     """
 
     def __init__(self, question: Question) -> None:
-
-        data = question.readings
+        data, given = question.readings, question.common
         # Under the noise that a diagnosis writes out in full.
-        noise = max(noise_models(data, question.noise, question.strut_spread), key=lambda noise: noise.typical)
+        noise = max(noise_models(data, given["noise"], given["strut_spread"]), key=lambda noise: noise.typical)
         self._problem = Problem.of(Predictor(question.model, data, question.on.effect_files), noise)
         self._on = question.on
         self._near: tuple[Mapping[str, Document], Fit] | None = None
 
     def machine(self, effects: Mapping[str, Document]) -> Machine:
         """The machine with these effects and the strut law refitted beside them; arguments and errors as of `at`."""
-        given = self._on.model.given or self._on.model.machine
-        return with_effects(self._on, effects, scaled_law(given.strut_law, self._fit(effects).law))
+        return with_effects(self._on, effects, scaled_law(self._on.stated.strut_law, self._fit(effects).law))
 
     def at(
         self,
@@ -105,11 +102,10 @@ class Preview:
         for entry in _entries(effects):
             effect = find_effect(entry.name, self._problem.predictor.effect_files)
             values = read_parameters(effect, entry, "by hand")
-            real = tuple(Component.of(parameter) for parameter in effect.parameters if not parameter.discrete)
-            choice = tuple(
-                (parameter.name, values[parameter.name]) for parameter in effect.parameters if parameter.discrete
+            real = tuple(Component.of(p) for p in effect.parameters if not p.discrete)
+            candidates.append(
+                Candidate(effect, tuple((p.name, values[p.name]) for p in effect.parameters if p.discrete), real)
             )
-            candidates.append(Candidate(effect, choice, real))
             sizes.append(np.array([component.size(values[component.parameter.name]) for component in real]))
         if near is not None:
             return fit_effects(self._problem, candidates, sizes, (), near.law, near.scatter, law_free)
@@ -123,15 +119,15 @@ class Preview:
 
 def with_effects(machine: Machine, effects: Mapping[str, Document], strut_law: StrutLaw | None = None) -> Machine:
     """A machine with further effects, name -> the keys of its entry in a machine file, and with another strut law."""
-    entries, given = _entries(effects), machine.model.given or machine.model.machine
+    entries, stated = _entries(effects), machine.stated
     read = [entry for entry in entries if find_effect(entry.name, machine.effect_files).is_instrument]
-    added = given.with_changes(
-        strut_law=strut_law or given.strut_law,
-        effects=(*given.effects, *(entry for entry in entries if entry not in read)),
-        instruments=(*given.instruments, *read),
+    return machine.carrying(
+        stated.with_changes(
+            strut_law=strut_law or stated.strut_law,
+            effects=(*stated.effects, *(entry for entry in entries if entry not in read)),
+            instruments=(*stated.instruments, *read),
+        )
     )
-    model = build_model(added, machine.effect_files, conditions=machine.model.conditions)
-    return replace(machine, model=replace(model, unchecked=machine.model.unchecked))
 
 
 def _entries(effects: Mapping[str, Document]) -> list[EffectEntry]:

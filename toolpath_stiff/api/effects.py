@@ -6,13 +6,13 @@ from pathlib import Path
 
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.stiffness.catalogue import EffectCatalogue, effects_from_file, installed_effects, known_effects
-from toolpath_stiff.stiffness.effect_file import EffectFile
+from toolpath_stiff.results import TextFile
+from toolpath_stiff.stiffness.catalogue import EffectCatalogue, effects_from_file, known_effects
 from toolpath_stiff.stiffness.trial import EffectCheck, try_effect
 
 
 def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
-    """The effects that a machine can carry: the catalogue's, plug-ins', those in files of one's own.
+    """The effects that a machine can carry: the catalogue's, and those in files of one's own.
 
     Raises
     ------
@@ -25,7 +25,7 @@ def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
     >>> tps.effects()["weak_strut"].title
     'one strut is weak'
     """
-    return EffectCatalogue(list(known_effects(list(map(str, files))).values()), installed_effects()[1])
+    return EffectCatalogue(list(known_effects(list(map(str, files))).values()))
 
 
 def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> EffectCheck:
@@ -46,13 +46,12 @@ def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> E
     True
     """
     on = machine_from(machine)
-    model = on.model.given or on.model.machine
     known_effects([str(file)])  # names that are taken
-    trials = {name: try_effect(effect, model) for name, effect in effects_from_file(str(file)).items()}
+    trials = {name: try_effect(effect, on.stated) for name, effect in effects_from_file(str(file)).items()}
     return EffectCheck(str(file), on.name, trials)
 
 
-def effect_template(name: str) -> EffectFile:
+def effect_template(name: str) -> TextFile:
     """A commented, working example of an effect to change into one's own.
 
     Parameters
@@ -69,7 +68,7 @@ def effect_template(name: str) -> EffectFile:
     if not name.isidentifier():
         raise InputError(f"{name!r} cannot be an effect's name", expected="a name such as my_screw")
     text = (resources.files("toolpath_stiff") / "data" / "templates" / "effect.py.txt").read_text("utf-8")
-    return EffectFile(name, text.replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
+    return TextFile(name, text.replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
 
 
 def effect_name(file: str | Path, ending: str = ".py") -> str:

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.options import Option, numbers
 from toolpath_stiff.units import Pose, pose_in_si
 
@@ -50,4 +49,4 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
 
 def origin_si(origin_mm_deg: Sequence[float] | None) -> Pose | None:
     """A placement in SI, None where none is given. Raises `InputError`."""
-    return None if origin_mm_deg is None else pose_si(both_names("--origin"), origin_mm_deg)
+    return None if origin_mm_deg is None else pose_si("--origin", origin_mm_deg)

@@ -1,9 +1,10 @@
-"""A machine with the effects that act on it, and slips in its file."""
+"""Machines with the effects that act on them; machine files made."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -13,15 +14,19 @@ from toolpath_stiff.analysis.machine_check import MachineCheck, check_machine
 from toolpath_stiff.analysis.poses import reach_along
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.files import write_atomically
+from toolpath_stiff.correction.geometry import recover_geometry as recover
+from toolpath_stiff.documents import Document
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.machine.file import load_machine, packaged_machines
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.limits import Reach, stand
+from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import Option, checked
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, TextFile, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup
@@ -32,14 +37,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the paper's Figure 2
+
 
 def _named(text: str) -> str:
     if not text.strip():
         raise ValueError("a set-up, or none")
     return text.strip()
-
-
-FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the paper's Figure 2
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,8 @@ class Machine(Result):
     ('nist', [], ('nist',))
     >>> machine.origin_mm_deg
     (0.0, 0.0, 800.0, 0.0, 0.0, 0.0)
+    >>> machine.carrying(machine.stated)
+    <Machine nist: 6 struts, no effects>
     >>> [round(value) for value in machine.joints_mm["frame"][0]], machine.joints_mm["tool"]
     ([1207, 2091, 3013], 150.0)
     """
@@ -160,9 +166,9 @@ class Machine(Result):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For another process: effects of one's own travel as their files, a class of such a file cannot."""
-        model, files = self.model, tuple(str(Path(file).absolute()) for file in self.effect_files)
-        fields = (self.asked, files, self.setup, self.temperature_C, bool(model.unchecked))
-        return _machine_again, (model.given or model.machine, model.conditions, model.unchecked, fields)
+        files = tuple(str(Path(file).absolute()) for file in self.effect_files)
+        told = (self.asked, files, self.setup, self.temperature_C, self.allow_unchecked_effects)
+        return _machine_again, (self.stated, self.model.conditions, self.model.unchecked, told)
 
     @staticmethod
     def names() -> list[str]:
@@ -189,6 +195,16 @@ class Machine(Result):
     def name(self) -> str:
         """Its short name."""
         return self.model.machine.name
+
+    @property
+    def stated(self) -> Hexapod:
+        """The machine as its file has it."""
+        return self.model.given or self.model.machine
+
+    def carrying(self, stated: Hexapod) -> Machine:
+        """The same with what another machine file would have."""
+        model = build_model(stated, self.effect_files, conditions=self.model.conditions)
+        return replace(self, model=replace(model, unchecked=self.model.unchecked))
 
     @property
     def effects(self) -> list[str]:
@@ -263,9 +279,7 @@ class Machine(Result):
         >>> machine.to_frame()[["quantity", "unit", "origin"]].values.tolist()[-1]
         ['rapid feed', 'mm/min', 'assumed']
         """
-        import pandas as pd
-
-        return pd.DataFrame(self.to_dict()["figures"])
+        return frame_of(self.to_dict()["figures"])
 
     def plot(self, pose_mm_deg: Sequence[float] | None = None) -> Figure:
         """The machine at a pose, from three sides.
@@ -296,7 +310,7 @@ class Machine(Result):
         return stand(machine, pose_si("pose", pose_mm_deg))
 
     @property
-    def joints_mm(self) -> dict[str, Any]:
+    def joints_mm(self) -> Document:
         """What a drawing needs: "frame" (6, 3) in machine coordinates, "platform" (6, 3) from the tip, "tool" length.
 
         The platform's joints are those at zero rotation; they turn about the tip with it.
@@ -381,14 +395,14 @@ class Machine(Result):
         ...     tps.Machine.load(file).name
         'nist'
         """
-        return write_atomically(file, machine_toml(self.model.given or self.model.machine))
+        return write_atomically(file, machine_toml(self.stated))
 
 
 def _machine_again(
-    given: Hexapod, conditions: Conditions, unchecked: tuple[str, ...], fields: tuple[Any, ...]
+    stated: Hexapod, conditions: Conditions, unchecked: tuple[str, ...], told: tuple[Any, ...]
 ) -> Machine:
     """A machine in another process."""
-    return Machine(replace(build_model(given, fields[1], conditions=conditions), unchecked=unchecked), *fields)
+    return Machine(replace(build_model(stated, told[1], conditions=conditions), unchecked=unchecked), *told)
 
 
 def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects: bool) -> StiffnessModel:
@@ -404,3 +418,78 @@ def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects
 def machine_from(machine: Machine | str | Path) -> Machine:
     """A machine, loaded if it is a name or a file."""
     return machine if isinstance(machine, Machine) else Machine.load(machine)
+
+
+def machine_template(file: str | Path = "mine.toml") -> TextFile:
+    """A commented machine file to edit, named after its file; nothing is written before `save`.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.machine_template("mill.toml").name
+    'mill'
+    """
+    target = Path(file)
+    text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")
+    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
+    return TextFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
+
+
+@checked
+def machine_from_linuxcnc(
+    file: str | Path, units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None
+) -> TextFile:
+    """The machine of the genhexkins pins in a LinuxCNC HAL file.
+
+    Parameters
+    ----------
+    file
+        The HAL file.
+    units
+        Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, lacks pins, or nobody says the unit.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.machine_from_linuxcnc("nowhere.hal")
+    Traceback (most recent call last):
+    toolpath_stiff.errors.InputError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
+    """
+    path = Path(file)
+    text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
+    unit = units or units_of(path)
+    if unit is None:
+        mistake = "the unit of the pins is not known (no ini file beside it that says LINEAR_UNITS)"
+        raise InputError(mistake, hint="give it with --units mm or --units inch", file=str(file))
+    machine, notes = machine_from_hal(text, unit, path.name)
+    heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
+    return TextFile(machine.name, machine_toml(machine, heading), notes)
+
+
+@checked
+def recover_geometry(
+    *,
+    starts: Annotated[int, Option("--starts", at_least=1, at_most=1000)] = 20,
+    seed: Annotated[int, Option("--seed", at_least=0)] = 1,
+) -> Document:
+    """Fit the NIST geometry to the paper's Table 1 anew, from scattered starting points.
+
+    Parameters
+    ----------
+    starts
+        How many starting points.
+    seed
+        Of where they lie.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.recover_geometry(starts=1)["starts"]
+    1
+    """
+    return recover(starts=starts, seed=seed)

@@ -4,30 +4,40 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import pickle
-from collections.abc import Iterable, Sequence
-from concurrent.futures import Executor
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor, Future, as_completed
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.hand_out import BatchRun, Task, answers
+from pebble import ProcessExpired
+
+from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.analysis.results import Analysis
+from toolpath_stiff.api.inputs import origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table, analyze, check_options
-from toolpath_stiff.defaults import job_count
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table, analyze
+from toolpath_stiff.defaults import LOAD, usable_cpus
+from toolpath_stiff.documents import Document
+from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import writing_errors
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import arguments_of, checked
+from toolpath_stiff.processes import ProcessPool, death
 from toolpath_stiff.report.analysis import other_samples
 from toolpath_stiff.report.batch.index import files
-from toolpath_stiff.report.batch.outcomes import ProgramOutcome, columns_of, terminal_summary
-from toolpath_stiff.report.batch.programs import RESERVED, Found, find_programs, report_folders
+from toolpath_stiff.report.batch.outcomes import ProgramOutcome, columns_of, figures_of, terminal_summary
+from toolpath_stiff.report.batch.programs import RESERVED, Found, Listed, find_programs, report_folders
 from toolpath_stiff.report.words import counted
-from toolpath_stiff.results import Progress, Result
+from toolpath_stiff.results import Progress, Result, frame_of
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_ALONE = threading.Lock()  # a process analyzes one program at a time, however many threads an executor has
 
 
 class ManyAnalyses(Result):
@@ -63,26 +73,20 @@ class ManyAnalyses(Result):
         """The programs with a cut below what was required."""
         return [outcome for outcome in self.outcomes if outcome.figure("lines_below_required")]
 
-    def to_dict(self) -> list[dict[str, Any]]:  # type: ignore[override]  # the command prints a list
+    def to_dict(self) -> list[Document]:  # type: ignore[override]  # the command prints a list
         """The JSON document of the command, a list: each program's summary, its file and its report; or the error."""
         return [self._entry(outcome) for outcome in self.outcomes]
 
-    def _entry(self, outcome: ProgramOutcome) -> dict[str, Any]:
+    def _entry(self, outcome: ProgramOutcome) -> Document:
         if outcome.reason:
             return {"program": Path(outcome.file).name, "file": outcome.file, "error": outcome.reason}
         report = self.folder / outcome.opens
         summary = json.loads((report.parent / "summary.json").read_text(encoding="utf-8"))
         return {**summary, "file": outcome.file, "report": str(report)}
 
-    def to_json(self) -> str:
-        """`to_dict()` as text, as the command prints it."""
-        return json.dumps(self.to_dict(), indent=2) + "\n"  # names need not be UTF-8, so escaped
-
     def to_frame(self) -> pd.DataFrame:
         """One row a program, the columns of `summary.csv`."""
-        import pandas as pd
-
-        return pd.DataFrame(columns_of(self.outcomes))
+        return frame_of(columns_of(self.outcomes))
 
     def __str__(self) -> str:
         return terminal_summary(self.outcomes)
@@ -93,7 +97,7 @@ class ManyAnalyses(Result):
 
 @checked
 def analyze_many(
-    programs: Iterable[str | Path | Program | Found],
+    programs: Iterable[str | Path | Program],
     machine: Machine | str | Path,
     folder: str | Path,
     *,
@@ -158,70 +162,149 @@ def analyze_many(
     >>> found.to_frame()["status"].tolist()
     ['done', 'failed']
     """
-    on = machine_from(machine)
-    path_options = {name: options.pop(name) for name in arguments_of(analyze) if name in options}
+    on, arguments = machine_from(machine), arguments_of(analyze)
+    path_options = {name: options.pop(name) for name in arguments if name in options}
     compared = path_options.pop("compare_with", None)
     other = on.like(compared) if isinstance(compared, str | Path) else compared
-    check_options(**path_options)  # a mistake in them is one error
+    # A mistake in them is one error.
+    origin_si(path_options.get("origin_mm_deg"))
+    parse_load(path_options.get("load", LOAD))
+    for name, value in path_options.items():
+        if value is not None:
+            arguments[name].check(value)
     other_samples(table)
     listed, given = _listed(programs)
     example = Program.from_text("", **options)
-    each = [given.get(program.file) or _named(example, program.file) for program in listed]
+    each = [given.get(program.file) or _in_file(example, program.file) for program in listed]
     for program in (example, *given.values()):
         on.running(program, [other] if other else [])
-    count = job_count(jobs, len(listed))
     shared = (*on.inputs, *(other.inputs if other else ()))
     rules = Rules(inputs=(*(file for program in each for file in program.inputs), *shared), replace=replace)
     out = Path(folder)
     check_folder(out, RESERVED, rules)
-    saved = {"plots": plots, "table": table, "show_plunges": show_plunges}
-    run = BatchRun(out.absolute(), str(out), pickle.dumps((on, other)), path_options, saved, replace)
     # The overview of an earlier run goes, as its reports do from now on, one after the other.
     write_folder(out, {}, command="analyze", rules=rules, unfinished=True)
-    tasks = [
-        Task(_absolute(program), report, (*program.inputs, *shared), run)
-        for program, report in zip(each, report_folders(listed), strict=True)
-    ]
-    with writing_errors(out, "write to"):
-        for task in tasks:  # before the processes, which would take each other's away
-            task.folder.parent.mkdir(parents=True, exist_ok=True)
+    work = partial(analyze, machine=on, compare_with=other, **path_options)
+    tasks = []
+    for program, report in zip(each, report_folders(listed), strict=True):
+        own_rules = Rules(inputs=(*program.inputs, *shared), replace=replace)
+        save = partial(Analysis.save, rules=own_rules, plots=plots, table=table, show_plunges=show_plunges)
+        absolute = dataclasses.replace(program, file=program.file and str(Path(program.file).absolute()), _last=[])
+        opens = (report.folder / ("report.html" if plots else "summary.json")).as_posix()
+        tasks.append(Task(absolute, report, out.absolute(), opens, work, save))
+        with writing_errors(out, "write to"):  # before the processes, which would take each other's away
+            tasks[-1].folder.parent.mkdir(parents=True, exist_ok=True)
+    count = max(1, min(jobs or usable_cpus(), len(tasks)))
     outcomes = dict.fromkeys(range(len(tasks)), ProgramOutcome("", ""))
-    told = progress or (lambda text, done, total: None)
-    told(f"{count} at a time" if executor is None else type(executor).__name__, 0, len(tasks))
-    for done, (place, outcome) in enumerate(answers(tasks, executor, count), 1):
+    tell = progress or (lambda text, done, total: None)
+    tell(f"{count} at a time" if executor is None else type(executor).__name__, 0, len(tasks))
+    for done, (place, outcome) in enumerate(_outcomes(tasks, executor, count), 1):
         outcomes[place] = outcome
-        told(f"{outcome.name}{': failed' if outcome.reason else ''}", done, len(tasks))
+        tell(f"{outcome.name}{': failed' if outcome.reason else ''}", done, len(tasks))
     written = write_folder(out, files([*outcomes.values()]), command="analyze", rules=rules)
     return ManyAnalyses(out, [*outcomes.values()], written)
 
 
-def _named(example: Program, file: str) -> Program:
+def _in_file(example: Program, file: str) -> Program:
     """A program in a file, read as the example."""
     return dataclasses.replace(example, name=Path(file).name, file=file, text=None, _last=[])
 
 
-def _absolute(program: Program) -> Program:
-    """The same for another process."""
-    return dataclasses.replace(program, file=program.file and str(Path(program.file).absolute()), _last=[])
-
-
-def _listed(programs: Iterable[str | Path | Program | Found]) -> tuple[list[Found], dict[str, Program]]:
+def _listed(programs: Iterable[str | Path | Program]) -> tuple[list[Found], dict[str, Program]]:
     """The programs, each once, and the `Program` objects among them by file, or by name where they have none."""
+    several = [programs] if isinstance(programs, str | Path | Program) else list(programs)
     given: dict[str, Program] = {}
-    arguments: list[str | Found] = []
-    for program in [programs] if isinstance(programs, str | Path | Program) else programs:
+    for program in several:
         if isinstance(program, Program):
             file = program.file or program.name
             if file in given:
                 raise InputError(f"two programs are named {file!r}", hint="give each a name of its own")
             given[file] = program
-            arguments.append(Found(file, Path(Path(file).name)))
-        else:
-            arguments.append(program if isinstance(program, Found) else str(program))
-    listed, _ = find_programs(arguments)
-    missing = given.keys() - {program.file for program in listed}
-    if missing:
-        raise InputError(f"{min(missing)!r} is named twice", hint="name it once, as a file or as a Program")
+    objects = [Found(file, Path(Path(file).name)) for file in given]  # first, as they say how they are read
+    listed, _ = find_programs([*objects, *(str(program) for program in several if not isinstance(program, Program))])
     if not listed:
         raise InputError("no programs", expected="files, folders or Program objects")
     return listed, given
+
+
+@dataclass(frozen=True)
+class Task:
+    """One program, for another process.
+
+    Attributes
+    ----------
+    program, listed
+        What is read, its path absolute; its name and the folder of its report, below `out`, which is absolute.
+    opens
+        The file that shows most of it, seen from `out`.
+    analyze, save
+        What makes its analysis, and what writes it to a folder.
+    """
+
+    program: Program
+    listed: Listed
+    out: Path
+    opens: str
+    analyze: Callable[[Program], Analysis]
+    save: Callable[[Analysis, Path], object]
+
+    @property
+    def folder(self) -> Path:
+        """The folder of its report."""
+        return self.out / self.listed.folder
+
+    def failed(self, reason: str) -> ProgramOutcome:
+        """A failure: a sentence in one line that begins with the file as named; errors know its last name alone."""
+        file, last = self.listed.file, f"{Path(self.listed.file).name}:"
+        line = "; ".join(reason.splitlines()).replace(self.program.file or file, file)
+        if file not in line:
+            line = f"{file}:{line.removeprefix(last)}" if line.startswith(last) else f"{file}: {line}"
+        return ProgramOutcome(self.listed.name, file, line)
+
+
+def analyze_task(task: Task) -> ProgramOutcome:
+    """Analyse a program and write its report: what an executor is handed, in whatever process."""
+    if not task.out.is_dir():
+        return task.failed(f"its process does not see {task.out}: reports need a file system that all processes share")
+    try:
+        with _ALONE:
+            analysis = task.analyze(task.program)
+            task.save(analysis, task.folder)
+    except TpsError as error:
+        return task.failed(str(error))
+    except Exception as error:  # it must not stop the other programs
+        return task.failed(f"{_named(error)} (analyze it alone to see where)")
+    return ProgramOutcome(task.listed.name, task.listed.file, "", task.opens, figures_of(analysis.to_dict()))
+
+
+def _outcomes(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> Iterator[tuple[int, ProgramOutcome]]:
+    """Position and outcome of each task, as they come; of no executor, from so many processes, one being this one."""
+    if executor is None and jobs == 1:
+        yield from enumerate(map(analyze_task, tasks))
+    elif executor is None:
+        with ProcessPool(jobs) as pool:
+            yield from _outcomes(tasks, pool, jobs)
+    else:
+        futures = {executor.submit(analyze_task, task): place for place, task in enumerate(tasks)}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], _answer(tasks[futures[future]], future)
+        finally:
+            for future in futures:
+                future.cancel()
+
+
+def _answer(task: Task, future: Future[ProgramOutcome]) -> ProgramOutcome:
+    """What became of a program, also where its process gave no answer."""
+    if future.cancelled():
+        return task.failed("was cancelled: the executor was shut down, or lost its workers")
+    error = future.exception()
+    if error is None:
+        return future.result()
+    if isinstance(error, ProcessExpired):
+        return task.failed(death(error))
+    return task.failed(f"no process could do it: {_named(error)}")
+
+
+def _named(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,25 +1,24 @@
-"""A program on a machine: its stiffness along the path, what it uses and leaves out, its sampled path."""
+"""A program on a machine: its stiffness along the path, what it uses and leaves out, its path; the paper's regions."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.program_check import ProgramCheck, check_program
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.results import analyze as analyze_path
-from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.nc.request import ZERO
-from toolpath_stiff.options import Option, arguments_of, checked
+from toolpath_stiff.options import Option, checked
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.path.table import SampledPath
+from toolpath_stiff.placement.case_study import MOST_REGIONS, CaseStudy, Region, read_regions, run_case_study
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, n_per_m_from_n_per_mm
 
@@ -102,15 +101,6 @@ def analyze(
     )
 
 
-def check_options(origin_mm_deg: Sequence[float] | None = None, load: str = LOAD, **others: Any) -> None:
-    """Hold options of `analyze` against what they may be, before any program is read. Raises `InputError`."""
-    origin_si(origin_mm_deg)
-    parse_load(load)
-    for name, value in others.items():
-        if value is not None:
-            arguments_of(analyze)[name].check(value)
-
-
 @checked
 def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, step_mm: Step = 1.0) -> SampledPath:
     r"""The tool's path, sampled along its true shape.
@@ -183,10 +173,73 @@ def check(
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
     if on is None and strut_speed_mm_per_min is not None:
-        raise InputError(f"{both_names('--strut-speed')} without a machine", hint="name one with --machine")
+        raise InputError("--strut-speed without a machine", hint="name one with --machine")
     speed = None
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
     hexapod = None if on is None else on.model.machine
     request = part.placed(origin_si(origin_mm_deg), ZERO if hexapod is None else hexapod.default_origin)
     return check_program(request, hexapod, m_from_mm(step_mm), speed)
+
+
+@checked
+def case_study(
+    program: Program | str | Path | None = None,
+    machine: Machine | str | Path = "nist",
+    regions: Mapping[str, Sequence[float]] | str | Path | None = None,
+    *,
+    step_mm: Step = 1.0,
+) -> CaseStudy:
+    r"""One tool path in several regions, at several heights, displaced and turned, as the paper's Figure 10.
+
+    Parameters
+    ----------
+    program
+        What runs; unless given, the packaged contour of a 200 mm square.
+    machine
+        A machine, its name or its file.
+    regions
+        Name -> x, y, z of program zero in mm and, if turned, the angle in degrees; or a table with the columns region,
+        x_mm, y_mm, z_mm, rotation_deg. Unless given, four of the reference machine.
+    step_mm
+        Distance of the samples.
+
+    Raises
+    ------
+    InputError
+        Regions or program cannot be read.
+    UnreachableError
+        The machine cannot reach a region.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.case_study(machine="nist")
+    <CaseStudy: nist, 3 of 3 conclusions of the paper hold>
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> tps.case_study(slot, "nist", {"left": (-200, 0, 800), "right": (200, 0, 800, 90)}, step_mm=10)
+    <CaseStudy: slot.nc on nist, 1 of 1 conclusion of the paper holds>
+    """
+    on = machine_from(machine)
+    part = None if program is None else program_from(program)
+    model = on.running(part)
+    read = None if part is None else lambda origin: part.moves(origin, model.machine.default_origin)
+    file = (str(regions),) if isinstance(regions, str | Path) else ()
+    inputs = (*(part.inputs if part else ()), *file, *on.inputs)
+    return run_case_study(model, m_from_mm(step_mm), read, None if regions is None else _regions(regions), inputs)
+
+
+def _regions(given: Mapping[str, Sequence[float]] | str | Path) -> dict[str, Region]:
+    """Regions by name in mm and degrees, checked."""
+    file = "" if isinstance(given, Mapping) else str(given)
+    named: Mapping[str, Sequence[float]] = given if isinstance(given, Mapping) else read_regions(file)
+    if not 0 < len(named) <= MOST_REGIONS:
+        raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}", file=file)
+    regions = {}
+    for name, numbers in named.items():
+        if len(numbers) not in (3, 4):
+            raise InputError(f"region {name} of {len(numbers)} numbers", expected="x, y, z in mm, and the turn")
+        x, y, z, turn = [*map(float, numbers), 0.0][:4]
+        pose_si(f"region {name}", (x, y, z, 0.0, 0.0, turn))
+        regions[str(name)] = (x, y, z, turn)
+    return regions

@@ -1,6 +1,6 @@
 """A case: a folder with a machine, measurements, a program, and all that was done with them, step by step.
 
-    case.toml       the steps, each with what it changed, its command line and its Python line
+    case.json       the steps: what each led to, its command line and its Python line
     machines/       every version of the machine, copied or fitted
     data/           copies of the measurement files
     used/           the same without the readings that were set aside: commented out, so that line numbers stay
@@ -8,7 +8,7 @@
     results/        a folder a result, as the commands write them
     exercise/       a blind exercise, if one was started
 
-The state is what the steps up to `done` have made of it; undo and redo move `done`, nothing is deleted.
+No file is written twice: a change is a new file and a step that names it, so to undo is to forget the last steps.
 """
 
 from __future__ import annotations
@@ -18,49 +18,45 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
 
+import toolpath_stiff as tps
 from toolpath_stiff.api.inputs import finite, pose_si
-from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.api.measurements import Measurements
-from toolpath_stiff.api.programs import analyze
 from toolpath_stiff.api.trust import agree
-from toolpath_stiff.case.contents import reading_arguments
-from toolpath_stiff.case.exercise import BlindExercise
+from toolpath_stiff.case.contents import Contents
 from toolpath_stiff.case.files import (
     copied,
-    drop,
-    first_name,
     free_name,
-    machine_bytes,
+    kept_if_read,
     measurements_csv,
-    used_name,
     without_lines,
-    write_files,
 )
-from toolpath_stiff.case.history import recorded
-from toolpath_stiff.case.reading import read_case
-from toolpath_stiff.case.steps import CASE_FILE, READING, TABLES
-from toolpath_stiff.correction.draft import EffectDraft
+from toolpath_stiff.case.findings import find
+from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, CaseState, Step, call, case_text, read_steps
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.documents import Document
-from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.files import read_bytes, writing_errors
-from toolpath_stiff.hints import command_line
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import read_bytes, write_atomically, writing_errors
+from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.machine.file import packaged_machines
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.nc.program import Program, Reading
+from toolpath_stiff.nc.program import Reading
 from toolpath_stiff.options import arguments_of
 from toolpath_stiff.report.words import counted
-from toolpath_stiff.results import Progress
+from toolpath_stiff.results import Progress, json_text
+from toolpath_stiff.rig.exercise import MACHINE as EXERCISE_MACHINE
+from toolpath_stiff.rig.exercise import MEASUREMENTS, blind_case, measured_again, new_exercise, reveal
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.parameters import read_parameters
 
 
-class Case(BlindExercise):
+class Case(Contents):
     r"""A folder that holds a machine, measurements, a program, and every step that was done with them.
 
     Attributes
     ----------
     folder
         Where it is.
+    history
+        The steps.
     plots
         Whether results are kept with pictures and pages, which take their time.
 
@@ -71,16 +67,14 @@ class Case(BlindExercise):
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     case = tps.Case.open(folder)
     ...     case.start_exercise(seed=9006)
-    ...     case.set_aside("data/measurements.csv", 5)
+    ...     case.set_aside("exercise/measurements.csv", 5)
     ...     _ = case.undo()
-    ...     [step.kind for step in tps.Case.open(folder).history], [step.kind for step in case.undone]
-    ...     _ = case.redo()
+    ...     [step.kind for step in tps.Case.open(folder).history]
     ...     _ = pathlib.Path(case.path("plan.csv")).write_text("x_mm,y_mm,z_mm,dx,dy,dz\n0,0,900,1,0,0\n")
     ...     case.measure(case.path("plan.csv"))
-    ...     case.check_files()  # raises InputError for a file that is gone or was changed
-    ...     case.state.data, case.claim("weak_strut")["verdict"], case.next_result("compare")
-    (['machine', 'exercise'], ['aside'])
-    (('data/measurements.csv', 'data/measured.csv'), 'right', 'results/006-compare')
+    ...     case.state.data, case.claim("weak_strut")["verdict"]
+    ['machine', 'exercise']
+    (('exercise/measurements.csv', 'data/measured.csv'), 'right')
     """
 
     @classmethod
@@ -102,8 +96,7 @@ class Case(BlindExercise):
         Raises
         ------
         InputError
-            case.toml is no case, a file of the case is missing or was changed by another program, or holds code that
-            you have not agreed to run.
+            case.json is no case, or the case holds code that you have not agreed to run.
 
         Examples
         --------
@@ -115,29 +108,50 @@ class Case(BlindExercise):
         ...     case.machine, len(case.history)
         (<Machine genhexkins: 6 struts, no effects>, 1)
         """
-        place = Path(folder)
+        file = Path(folder) / CASE_FILE
         with writing_errors(folder, "open the case"):  # a name that is too long, a circle of links
-            there = (place / CASE_FILE).is_file()
+            there = file.is_file()
+        case = cls(Path(folder), read_steps(file) if there else ())
         if not there:
-            case = cls(place, [], 0, "")
             case.set_machine(machine)
-            return case
-        case = cls(place, *read_case(place / CASE_FILE))
-        case.check_files()
         for name in trust:
-            if name not in case.state.effects:
-                raise InputError(
-                    f"{name!r} is no file of own effects of this case", expected=", ".join(case.state.effects)
-                )
+            case._check_effect(name)
             known_effects([case.path(name)])  # raises where it cannot be used
-            agree((place / name).read_bytes(), name)
+            agree((case.folder / name).read_bytes(), name)
         case.effect_files  # noqa: B018  (raises for one that is not agreed to)
         return case
 
     def __repr__(self) -> str:
-        return f"<Case {self.folder.name}: {self._done} steps>"
+        return f"<Case {self.folder.name}: {len(self.history)} steps>"
 
-    @recorded
+    def record(
+        self, kind: str, text: str, command: str, python: str, state: CaseState | None = None, result: str = ""
+    ) -> None:
+        """Add a step that leads to this state (default: it changes nothing) and write the case."""
+        self._write([*self.history, Step(kind, text, command, python, state or self.state, result)])
+
+    def undo(self) -> Step | None:
+        """Take back the last step that changed something, and what was found since; None where there is none."""
+        for number in range(len(self.history) - 1, 0, -1):
+            step = self.history[number]
+            if step.state != self.history[number - 1].state:
+                self._write(self.history[:number])
+                return step
+        return None
+
+    def _write(self, history: list[Step]) -> None:
+        file = self.folder / CASE_FILE
+        if file.is_file() and file.read_bytes() != case_text(self.history).encode():
+            raise InputError(
+                f"{CASE_FILE} was changed by another program since it was opened", hint="open the case again"
+            )
+        write_atomically(file, case_text(history))
+        self.history = history
+
+    def next_result(self, kind: str) -> str:
+        """A free folder for a result."""
+        return free_name(self.folder, f"results/{len(self.history) + 1:03d}-{kind}")
+
     def set_machine(self, machine: str | Path) -> None:
         """Use another machine: a name or a file, of which the case keeps a copy.
 
@@ -151,27 +165,22 @@ class Case(BlindExercise):
         ...     case.machine.name, case.state.machine
         ('genhexkins', 'machines/genhexkins.toml')
         """
-        text = machine_bytes(machine)
-        name = free_name(self.folder, f"machines/{Path(machine).stem}.toml")
-        write_files(self.folder, {name: text})
-        try:
+        name = copied(self.folder, packaged_machines().get(str(machine), machine), "machines")
+        with kept_if_read(self.folder, [name]):
             self.machine_of(name)
-        except TpsError:
-            drop(self.folder, name)
-            raise
         begun = f"case = tps.Case.open({self.folder.resolve().name!r}, {str(machine)!r})"
-        self.record(
-            "machine",
-            f"machine {Path(machine).name}",
-            command_line("machine", "check", name),
-            change={"machine": name, "on": {}},
-            files=[name],
-            python="" if self.history else begun,
-        )
+        python = call("set_machine", machine) if self.history else begun
+        state = replace(self.state, machine=name, on={})
+        self.record("machine", f"machine {Path(machine).name}", command_line("machine", "check", name), python, state)
 
-    @recorded
-    def add_effects(self, file: str | Path) -> None:
+    def _check_effect(self, name: str) -> None:
+        if name not in self.state.effects:
+            raise InputError(f"{name} is no file of own effects of this case", expected=", ".join(self.state.effects))
+
+    def add_effects(self, file: str | Path, instead_of: str = "") -> None:
         """Use a Python file with effects of one's own. Its code is run: to add it is to agree to that.
+
+        `instead_of`: the file of the case that it takes the place of.
 
         Examples
         --------
@@ -179,38 +188,28 @@ class Case(BlindExercise):
         >>> import toolpath_stiff as tps
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     case = tps.Case.open(folder)
-        ...     case.add_effects(tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py")))
-        ...     case.change_effects("effects/my_screw.py", pathlib.Path(folder, "my_screw.py"))
+        ...     file = tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py"))
+        ...     case.add_effects(file)
+        ...     case.add_effects(file, instead_of="effects/my_screw.py")
         ...     case.state.effects, len(case.effect_files)
         (('effects/my_screw-2.py',), 1)
         """
-        name = copied(self.folder, file, "effects")
-        self._take_effects(name, "", f"own effects of {Path(file).name}")
-
-    @recorded
-    def change_effects(self, name: str, file: str | Path) -> None:
-        """Use an edited file in place of a file of own effects of the case (its name there). Its code is run."""
-        if name not in self.state.effects:
-            raise InputError(f"{name} is no file of own effects of this case", expected=", ".join(self.state.effects))
-        new = copied(self.folder, first_name(name), "effects", read_bytes(file, "the file"))
-        self._take_effects(new, name, f"own effects of {Path(name).name}, edited")
-
-    def _take_effects(self, new: str, old: str, text: str) -> None:
-        """Put a file of the case among the effects, in place of `old` if there is one; drop it where it is at fault."""
         state = self.state
-        files = (*(file for file in state.effects if file != old), new)
-        paths = [self.path(file) for file in files]
-        try:
-            Machine.load(self.path(state.machine), effects=paths)
-        except TpsError:
-            drop(self.folder, new)
-            raise
+        if instead_of:
+            self._check_effect(instead_of)
+        new = copied(self.folder, file, "effects")
+        effects = (*(name for name in state.effects if name != instead_of), new)
+        paths = [*map(self.path, effects)]
+        with kept_if_read(self.folder, [new]):
+            tps.Machine.load(self.path(state.machine), effects=paths)
         agree((self.folder / new).read_bytes(), new)
         on = {name: keys for name, keys in state.on.items() if name in known_effects(paths)}
-        line = command_line("effects", "check", new)
-        self.record("effects", text, line, change={"effects": files, "on": on}, files=[new])
+        text = f"own effects of {Path(file).name}{', edited' if instead_of else ''}"
+        python = call("add_effects", file, instead_of=instead_of)
+        self.record(
+            "effects", text, command_line("effects", "check", new), python, replace(state, effects=effects, on=on)
+        )
 
-    @recorded
     def add_data(self, *files: str | Path) -> None:
         """Add measurement files; the case keeps copies, and nothing is kept of a file that cannot be used.
 
@@ -221,45 +220,33 @@ class Case(BlindExercise):
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     case = tps.Case.open(folder)
         ...     case.add_data("nist-table1")
-        ...     case.data_files, len(case.data.to_frame()), case.question("compare").split()[:2]
+        ...     case.state.data, len(case.data.to_frame()), case.state.question("compare").split()[:2]
         (('data/nist-table1.csv',), 42, ['tps', 'compare'])
         """
         names = [copied(self.folder, file, "data", measurements_csv(file, self.machine)) for file in files]
-        after = (*self.state.data, *names)
-        try:
-            count = len(Measurements([self.path(name) for name in after]).on(self.machine))
-        except TpsError:
-            drop(self.folder, *names)
-            raise
+        state = replace(self.state, data=(*self.state.data, *names))
+        with kept_if_read(self.folder, names):
+            count = len(tps.Measurements(list(map(self.path, state.data))).on(self.machine))
         text = f"{', '.join(Path(file).name for file in files)} added: {counted(count, 'reading')} in all"
-        self.record("data", text, self.question("compare", files=after), change={"data": after}, files=names)
+        self.record("data", text, state.question("compare"), call("add_data", *files), state)
 
-    @recorded
     def set_aside(self, file: str, line: int, back: bool = False) -> None:
         """Leave out the readings of a line of a measurement file of the case; `back`: use them again."""
         state, entry = self.state, f"{file}:{line}"
-        if file not in state.data or (entry in state.aside) is not back:
+        lines = {int(other.rpartition(":")[2]) for other in state.aside if other.rpartition(":")[0] == file}
+        known = tps.Measurements([self.path(file)]).on(self.machine).line if file in state.data else ()
+        if line not in known or (line in lines) is not back:
             raise InputError(f"{entry} is no reading that is {'set aside' if back else 'in use'}")
-        aside = tuple(other for other in state.aside if other != entry) if back else (*state.aside, entry)
-        lines = replace(state, aside=aside).lines_aside.get(file, [])
-        write_files(self.folder, {used_name(file): without_lines(self.folder / file, lines)})
-        left = self._lines(used_name(file))
-        if not back and (not left or line in left or line not in self._lines(file)):
-            self._rewrite_used(state)
-            raise InputError(f"{file} line {line} cannot be left out by itself")
-        words = " ".join(f"-e '{number}s/^/# /'" for number in lines)
-        command = f"sed {words} {file} > {used_name(file)}" if words else self.question("compare", files=state.data)
+        lines ^= {line}
+        used = {name: copy for name, copy in state.used.items() if name != file}
+        if lines:
+            used[file] = free_name(self.folder, f"used/{Path(file).name}")
+            write_atomically(self.folder / used[file], without_lines(self.folder / file, lines))
+        aside = (*(other for other in state.aside if other != entry), *([] if back else [entry]))
+        state = replace(state, aside=aside, used=used)
         text = f"{file} line {line} {'used again' if back else 'set aside'}"
-        self.record("aside", text, command, change={"aside": aside})
+        self.record("aside", text, state.question("compare"), call("set_aside", file, line, back=back), state)
 
-    def _lines(self, file: str) -> set[int]:
-        """The lines of the readings of a file; none where it cannot be read."""
-        try:
-            return set(Measurements([self.path(file)]).on(self.machine).line.tolist())
-        except TpsError:
-            return set()
-
-    @recorded
     def switch(self, effect: str, values: Document | None) -> None:
         """Switch an effect on with these values (keys as in a machine file), or off with None.
 
@@ -275,28 +262,21 @@ class Case(BlindExercise):
         ...     case.state.on
         {'weak_strut': {'strut': 4, 'factor': 0.8}}
         """
-        found = find_effect(effect, self.effect_files)
-        on = {name: dict(keys) for name, keys in self.state.on.items() if name != effect}
+        state, known, text = self.state, find_effect(effect, self.effect_files), f"{effect} off"
+        on = {name: keys for name, keys in state.on.items() if name != effect}
         if values is not None:
-            read_parameters(found, EffectEntry(effect, dict(values)), "by hand")
+            read_parameters(known, EffectEntry(effect, dict(values)), "by hand")
             if effect in self.machine.effects:
                 raise InputError(f"{effect} is in the machine already")
             on[effect] = dict(values)
-        name = self.state.machine
+            text = f"{effect} on: {', '.join(f'{key} {_short(value)}' for key, value in values.items())}"
+        name = state.machine
         if on:
             name = free_name(self.folder, "machines/by-hand.toml")
             self.machine_with(on).save(self.folder / name)
-        sizes = ", ".join(f"{key} {_short(value)}" for key, value in (values or {}).items())
-        command = self.question("compare", name) if self.state.data else command_line("machine", "check", name)
-        self.record(
-            "switch",
-            f"{effect} off" if values is None else f"{effect} on: {sizes}",
-            command,
-            change={"on": on},
-            files=[name] if on else [],
-        )
+        command = state.question("compare", name) if state.data else command_line("machine", "check", name)
+        self.record("switch", text, command, call("switch", effect, values), replace(state, on=on))
 
-    @recorded
     def accept(self, file: str | Path) -> None:
         """Go on with the machine file that an update of this case wrote.
 
@@ -311,14 +291,13 @@ class Case(BlindExercise):
         'machines/nist-updated.toml'
         """
         name = free_name(self.folder, f"machines/{Path(self.state.machine).stem.removesuffix('-updated')}-updated.toml")
-        write_files(self.folder, {name: read_bytes(file, "the machine file")})
-        command = next((step.command for step in reversed(self.history) if step.kind == "update"), "")
-        command = f"{command} -o {name}" if command else ""
-        self.record("accept", f"goes on with {name}", command, change={"machine": name, "on": {}}, files=[name])
+        write_atomically(self.folder / name, read_bytes(file, "the machine file"))
+        command = next((f"{step.command} -o {name}" for step in reversed(self.history) if step.kind == "update"), "")
+        state = replace(self.state, machine=name, on={})
+        self.record("accept", f"goes on with {name}", command, call("accept", file), state)
 
-    @recorded
-    def add_program(self, file: str | Path, **reading: Unpack[Reading]) -> None:
-        r"""Use an NC program or cutter-location file.
+    def add_program(self, file: str | Path | None = None, **reading: Unpack[Reading]) -> None:
+        r"""Use an NC program or cutter-location file; without one, read the present one otherwise.
 
         Further arguments as of `Program.read`: dialect, controller, offsets, tools, block_delete, feed_mm_per_min. They
         hold for later programs of the case too, until they are given anew; None takes one back.
@@ -332,90 +311,119 @@ class Case(BlindExercise):
         ...     file, tools = pathlib.Path(folder, "slot.nc"), pathlib.Path(folder, "my.tbl")
         ...     _ = file.write_text("G21 G90\nT1 M6\nG43 H1\nG1 X40 F300\nM2\n")
         ...     _ = tools.write_text("T1 P1 Z120\n")
-        ...     case.add_program(file, tools=tools)
+        ...     case.add_program(tools=tools)
+        ...     case.add_program(file)
         ...     case.place_at((0, 0, 850))
         ...     case.require(50000)
-        ...     analysis = case.analyze()
+        ...     analysis = case.find("analyze")
         ...     case.program, analysis.complete, case.latest("analyze"), case.history[-1].command[:30]
-        (<Program slot.nc>, True, 'results/005-analyze', 'tps analyze programs/slot.nc -')
+        (<Program slot.nc>, True, 'results/006-analyze', 'tps analyze programs/slot.nc -')
         """
-        name = copied(self.folder, file, "programs")
-        self._take_program(name, reading, [name], "program", f"program {Path(file).name}")
-
-    @recorded
-    def read_programs(self, **reading: Unpack[Reading]) -> None:
-        r"""Read the programs of the case with another tool table, offsets, controller file: arguments of `add_program`.
-
-        Examples
-        --------
-        >>> import pathlib, tempfile
-        >>> import toolpath_stiff as tps
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     case = tps.Case.open(folder)
-        ...     tools = pathlib.Path(folder, "my.tbl")
-        ...     _ = tools.write_text("T1 P1 Z120\n")
-        ...     case.read_programs(tools=tools)
-        ...     case.state.reading
-        {'tools': 'programs/my.tbl'}
-        """
-        text = ", ".join(f"{TABLES.get(name, name)} {Path(str(value)).name}" for name, value in reading.items())
-        self._take_program(self.state.program, reading, [], "reading", f"programs are read with {text}")
-
-    def _take_program(self, program: str, given: Document, files: list[str], kind: str, text: str) -> None:
-        """Read a program of the case with what it has and what is given; drop the files where it cannot be read."""
-        state, reading = self.state, dict(self.state.reading)
-        try:
-            for key, value in given.items():
+        state, files, kept = self.state, list[str](), dict(self.state.reading)
+        shown = (f"{TABLES.get(key, key)} {Path(str(value)).name}" for key, value in reading.items())
+        text = f"programs are read with {', '.join(shown)}"
+        with kept_if_read(self.folder, files):
+            for key, value in reading.items():
                 if key not in READING:
                     raise InputError(f"{key} is not kept in a case", expected=", ".join(READING))
-                reading[key] = value
+                kept[key] = sorted(value) if isinstance(value, set | frozenset) else value
                 if key in TABLES and value is not None:
-                    reading[key] = copied(self.folder, value, "programs")
-                    files.append(reading[key])
-                elif key == "block_delete" and not isinstance(value, bool | None):
-                    reading[key] = ",".join(map(str, sorted(value)))
-            reading = {key: value for key, value in reading.items() if value not in (None, False)}
-            if program:
-                self._program(program, reading).moves()
-            else:
-                Program.from_text("M2", **reading_arguments(self.folder, reading))
-        except TpsError:
-            drop(self.folder, *files)
-            raise
-        change: dict[str, Any] = {"reading": reading} if reading != state.reading else {}
-        if program != state.program:
-            change |= {"program": program, "origin": ()}
-        self.record(kind, text, self.program_line(change=change), change=change, files=files)
+                    kept[key] = copied(self.folder, str(value), "programs")
+                    files.append(kept[key])
+            if file is not None:
+                text = f"program {Path(file).name}"
+                files.append(copied(self.folder, file, "programs"))
+                state = replace(state, program=files[-1], origin=())
+            state = replace(state, reading={key: value for key, value in kept.items() if value not in (None, False)})
+            program = self._program(state)
+            if state.program:
+                program.moves()
+        words = [] if file is None else [file]
+        self.record("program", text, state.program_line(), call("add_program", *words, **reading), state)
 
-    @recorded
     def place_at(self, origin_mm_deg: Sequence[float]) -> None:
         """Put program zero somewhere: X, Y, Z, A, B, C in machine coordinates."""
         pose_si("origin", origin_mm_deg)
         origin = tuple(round(float(value), 6) for value in origin_mm_deg)
-        word = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", origin, strict=False))
-        change = {"origin": origin}
-        self.record("place_at", f"program zero at {word}", self.program_line(change=change), change=change)
+        text = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", origin, strict=False))
+        state = replace(self.state, origin=origin)
+        self.record("place_at", f"program zero at {text}", state.program_line(), call("place_at", origin), state)
 
-    @recorded
     def require(self, stiffness_N_per_mm: float) -> None:
         """Ask a stiffness of every cut; 0: none."""
         required = finite("required", stiffness_N_per_mm)
         if required:
-            arguments_of(analyze)["require_N_per_mm"].check(required)
-        change = {"require": required}
-        self.record("require", f"{required:g} N/mm required", self.program_line(change=change), change=change)
+            arguments_of(tps.analyze)["require_N_per_mm"].check(required)
+        state = replace(self.state, require=required)
+        text = f"{required:g} N/mm required"
+        self.record("require", text, state.program_line(), call("require", stiffness_N_per_mm), state)
 
-    @recorded
-    def draft(self, progress: Progress | None = None) -> EffectDraft:
-        """What a diagnosis leaves unexplained as an effect file, as `tps.draft_effect`; the case uses it from then on.
+    def find(self, kind: str, progress: Progress | None = None, **given: Any) -> Any:
+        """A result as a step, kept in results/: of analyze, compare, diagnose, update, plan, place, draft, set_up.
 
-        It competes like an effect of one's own; without new readings it is `described` at best.
+        What the public function of that name gives for the machine, readings and program of the case, with further
+        arguments of it; `draft_effect` for "draft", whose effect the case uses from then on. "set_up" is the program
+        where it sits now, for the shop floor: offsets, set-up sheet and the program written for it; not_written.txt
+        says why where that cannot be.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.add_data("nist-table1")
+        ...     comparison = case.find("compare")
+        ...     type(comparison).__name__, case.latest("compare"), case.history[-1].python
+        ('Comparison', 'results/003-compare', "case.find('compare')")
         """
-        draft = self._step("draft", EffectDraft, progress)
-        if draft.text:
-            self.add_effects(self.folder / self.latest("draft") / f"{draft.name}.toml")
-        return draft
+        result = self.next_result(kind)
+        kept, command = find(self, kind, result, progress, **given)
+        self.record(kind, repr(kept).strip("<>"), command, call("find", kind, **given), result=result)
+        if kind == "draft" and kept.text:
+            self.add_effects(self.folder / result / f"{kept.name}.toml")
+        return kept
+
+    def start_exercise(self, seed: int, hidden: str | None = None, layout: str = "tilted") -> None:
+        """Begin a blind exercise: a simulated machine that hides something, and what was measured on it.
+
+        `hidden` and `layout` as of `tps rig new`.
+        """
+        folder = free_name(self.folder, "exercise")
+        new_exercise(self.folder / folder, blind_case(seed, layout, hidden))
+        drawn = options(seed=seed, out=folder, hidden=hidden, layout=layout if layout != "tilted" else None)
+        state = replace(
+            self.state,
+            machine=f"{folder}/{EXERCISE_MACHINE}",
+            data=(f"{folder}/{MEASUREMENTS}",),
+            aside=(),
+            used={},
+            on={},
+            exercise=folder,
+        )
+        python = call("start_exercise", seed, hidden=hidden, layout=layout)
+        self.record("exercise", f"blind exercise, seed {seed}", command_line("rig", "new", *drawn), python, state)
+
+    def measure(self, plan_file: str | Path) -> None:
+        """Measure the exercise's machine at the poses of a plan; the readings are added."""
+        name = free_name(self.folder, "data/measured.csv")
+        visit = 1 + sum(step.kind == "measure" for step in self.history)
+        readings, count = measured_again(self.folder / self.state.exercise, str(plan_file), visit)
+        write_atomically(self.folder / name, readings)
+        line = command_line("rig", "measure", self.state.exercise, *options(at=plan_file, out=name, visit=visit))
+        state = replace(self.state, data=(*self.state.data, name))
+        text = f"{counted(count, 'reading')} measured"
+        self.record("measure", text, line, call("measure", plan_file), state)
+
+    def claim(self, effects: str) -> Document:
+        """Open the seal of the exercise and score a claim: names of effects with commas, "none" or "outside"."""
+        score = reveal(self.folder / self.state.exercise, effects)
+        result = self.next_result("reveal")
+        write_atomically(self.folder / result / "reveal.json", json_text(score))
+        line = command_line("rig", "reveal", self.state.exercise, *options(claim=effects))
+        self.record("reveal", f"claimed {effects}: {score['verdict']}", line, call("claim", effects), None, result)
+        return score
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     return f"{value:.5g}" if isinstance(value, float) else str(value)

@@ -1,15 +1,14 @@
-"""Files of a case: copies under names that are free, readings that are commented out, sums that tell a change."""
+"""Files of a case: copies under names that are free, readings that are commented out."""
 
-import hashlib
 import re
-from collections.abc import Mapping, Sequence
-from importlib import resources
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.measurements import Measurements
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import TpsError
 from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.readings.measurements import NIST_TABLE_1
 
@@ -20,28 +19,22 @@ LONGEST_NAME = 80
 def free_name(folder: Path, name: str) -> str:
     """The name, or the next one with a number that the folder does not have yet."""
     path, number = Path(name), 1
+    stem = re.sub(r"-[0-9]+$", "", path.stem)
     while (folder / name).exists():
         number += 1
-        name = str(path.with_name(f"{path.stem}-{number}{path.suffix}"))
+        name = str(path.with_name(f"{stem}-{number}{path.suffix}"))
     return name
 
 
-def drop(folder: Path, *names: str) -> None:
-    """Take files away again that turned out to be of no use."""
-    for name in names:
-        (folder / name).unlink()
-
-
-def first_name(name: str) -> str:
-    """A file's name without the room and the number that a case gave it: "effects/drag-2.py" came as drag.py."""
-    path = Path(name)
-    return re.sub(r"-\d+$", "", path.stem) + path.suffix
-
-
-def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> None:
-    """Write files of a folder, each whole or not at all."""
-    for name, content in contents.items():
-        write_atomically(folder / name, content)
+@contextmanager
+def kept_if_read(folder: Path, names: Sequence[str]) -> Iterator[None]:
+    """Take new files of the case away again where they cannot be read."""
+    try:
+        yield
+    except TpsError:
+        for name in names:
+            (folder / name).unlink()
+        raise
 
 
 def copied(folder: Path, file: str | Path, room: str, content: bytes | None = None) -> str:
@@ -50,7 +43,7 @@ def copied(folder: Path, file: str | Path, room: str, content: bytes | None = No
     source = Path(str(file).partition("#")[0])
     suffix = ".csv" if room == "data" else UNSAFE.sub("_", source.suffix)
     name = free_name(folder, f"{room}/{UNSAFE.sub('_', source.stem)[:LONGEST_NAME].lstrip('.') or 'file'}{suffix}")
-    write_files(folder, {name: content})
+    write_atomically(folder / name, content)
     return name
 
 
@@ -63,28 +56,7 @@ def measurements_csv(file: str | Path, machine: Machine) -> bytes:
     return csv_text(list(frame.columns), frame.astype(str).replace("nan", "").to_numpy().tolist()).encode()
 
 
-def machine_bytes(machine: str | Path) -> bytes:
-    """The content of a machine file, packaged or one's own."""
-    if str(machine) in Machine.names():
-        return (resources.files("toolpath_stiff") / "data" / "machines" / f"{machine}.toml").read_bytes()
-    return read_bytes(machine, "machine file")
-
-
-def used_name(name: str) -> str:
-    """Where a measurement file stands without the readings that were set aside."""
-    return f"used/{Path(name).name}"
-
-
-def without_lines(file: Path, lines: Sequence[int]) -> bytes:
-    """A file with these lines commented out."""
+def without_lines(file: Path, lines: Collection[int]) -> bytes:
+    """A file with these lines commented out: the others keep their numbers."""
     rows = file.read_bytes().split(b"\n")
-    for line in lines:
-        if not 1 <= line <= len(rows):
-            raise InputError(f"{file.name} has no line {line}")
-        rows[line - 1] = b"# " + rows[line - 1]
-    return b"\n".join(rows)
-
-
-def sha256(content: bytes) -> str:
-    """The sum under which a case knows a file again."""
-    return hashlib.sha256(content).hexdigest()
+    return b"\n".join(b"# " + row if number in lines else row for number, row in enumerate(rows, 1))

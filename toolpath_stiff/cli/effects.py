@@ -17,9 +17,8 @@ from typing import Annotated
 
 import toolpath_stiff as tps
 from toolpath_stiff.api.effects import effect_name
-from toolpath_stiff.cli.calls import call
-from toolpath_stiff.cli.outputs import check_new, check_single, show, write_single
 from toolpath_stiff.cli.parser import DATA, JSON, REPLACE, command
+from toolpath_stiff.cli.run import call, show, write_single
 from toolpath_stiff.hints import command_line, hint, options
 from toolpath_stiff.options import Option, arguments_of
 from toolpath_stiff.report.effects import describe_effect, effect_details
@@ -47,8 +46,7 @@ def show_effect(args: Namespace, name: Annotated[str, Option("NAME", help="name 
 def new_effect(args: Namespace, file: File) -> int:
     """Write a commented, working example of an effect."""
     name = effect_name(file)
-    check_new(args, file)
-    write_single(args, {Path(file): tps.effect_template(name).text})
+    write_single(args, {Path(file): tps.effect_template(name).text}, fresh=True)
     print(f"wrote {file}\n{hint('read it back', command_line('effects', 'show', name, *options(effects=file)))}")
     return 0
 
@@ -59,12 +57,10 @@ def draft_effect(
     output: Annotated[str, Option("-o --output", "FILE.toml", help="file to write")] = "missing.toml",
 ) -> int:
     """Write what a diagnosis leaves unexplained as an effect to edit."""
-    check_single(args, output)
-    check_new(args, output)
     draft = call(args, tps.draft_effect, file=output)
     if not draft.text:
         return show(args, draft)
-    write_single(args, {Path(output): draft.text})
+    write_single(args, {Path(output): draft.text}, fresh=True)
     lines = [draft.diagnosis.to_dict()["portrait"]["text"], f"wrote {output}", *draft.next]
     return show(args, "\n".join(lines), document=draft.to_dict)
 

@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Annotated
 
 import toolpath_stiff as tps
-from toolpath_stiff.api.inputs import pose_si
-from toolpath_stiff.cli.calls import call, given, run_to_folder
-from toolpath_stiff.cli.outputs import check_new, check_single, show, tell, write_single, written_text
 from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
+from toolpath_stiff.cli.run import call, given, run_to_folder, show, tell, write_single, written_text
+from toolpath_stiff.correction.geometry import recovery_text
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, hint
 from toolpath_stiff.options import Option, finite_number, numbers
@@ -62,17 +61,10 @@ def pose(
     return 0 if stiffness.reachable.all() else OUT_OF_REACH
 
 
-def _heights(text: str) -> list[float]:
-    heights = sorted(numbers(text))
-    if len(set(heights)) < len(heights):
-        raise ValueError("each height once")
-    return heights
-
-
 @command("map", "map_stiffness", "Machine.load", "Machine.under", *FOLDER)
 def map(
     args: Namespace,
-    slices: Annotated[Sequence[float], Option("--slices", "Z,Z,...", read=_heights, instead_of="z_mm")] = (),
+    slices: Annotated[Sequence[float], Option("--slices", "Z,Z,...", read=numbers, instead_of="z_mm")] = (),
 ) -> int:
     """Stiffness over planes of the workspace: picture, table, 3-D page.
 
@@ -101,13 +93,7 @@ def list_machines(args: Namespace) -> int:
     return show(args, text, document=lambda: listed)
 
 
-def _pose(text: str) -> Sequence[float]:
-    pose = numbers(text)
-    pose_si("--pose", pose)
-    return pose
-
-
-Picture = Annotated[str | None, Option("--out", "FILE.png|DIR", help="the picture, or its folder (default: reports)")]
+Picture = Annotated[str | None, Option("--out", "FILE.png", help="the picture (default: in reports)")]
 
 
 @command("machine show", REPLACE, JSON)
@@ -116,34 +102,31 @@ def show_machine(
     machine: Annotated[str, Option("NAME|FILE", count="?")] = "nist",
     pose: Annotated[
         Sequence[float] | None,
-        Option("--pose", "X,Y,Z[,A,B,C]", read=_pose, help="pose of the picture, mm and degrees"),
+        Option("--pose", "X,Y,Z[,A,B,C]", read=numbers, help="pose of the picture, mm and degrees"),
     ] = None,
     out: Picture = None,
 ) -> int:
     """Figures of a machine with their origin, and a picture of it."""
     shown = tps.Machine.load(machine)
-    drawn = {_picture_file(out, shown.name): shown.picture(pose)} if out or not args.json else {}
-    written = write_single(args, drawn)
+    written = write_single(args, {_picture_file(out, shown.name): shown.picture(pose)} if out or not args.json else {})
     show(args, shown.text(pose), written_text(written), document=lambda: shown.to_dict()["figures"])
     return 0 if shown.standing(pose)[2].reachable[0] else OUT_OF_REACH
 
 
 def _picture_file(out: str | None, name: str) -> Path:
-    """Where a picture goes: the file of --out, or the folder, as of every other command. Raises `InputError`."""
-    place = Path(out or "reports")
-    if place.is_dir() or not place.suffix:
-        return place / f"{name}.png"
-    if place.suffix.lower() != ".png":
-        raise InputError(f"--out {out}: {place.suffix} is no picture's ending here", expected="FILE.png or a folder")
-    return place
+    """The file of --out, or the default. Raises `InputError`."""
+    file = Path(out or f"reports/{name}.png")
+    if file.suffix.lower() != ".png":
+        raise InputError(f"--out {out}", expected="a name that ends in .png")
+    return file
 
 
 @command("machine check", "Machine.load", REPLACE, JSON, without=["machine"])
 def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Picture = None) -> int:
     """Check a machine file for mistakes, draw it; exit code 1 if it cannot be right."""
     if not Path(file).is_file():
-        new = command_line("machine", "new", file)
-        raise InputError(f"cannot read machine file {file!r}", hint=f"`{new}` writes a template")
+        template = command_line("machine", "new", file)
+        raise InputError(f"cannot read machine file {file!r}", hint=f"`{template}` writes a template")
     target = _picture_file(out, f"{Path(file).stem}_machine")
     check = tps.Machine.load(Path(file), **given(args, tps.Machine.load)).check()
     written = write_single(args, {target: check.picture()} if out or not args.json else {})
@@ -154,9 +137,8 @@ def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Pi
 @command("machine new", REPLACE)
 def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
-    check_new(args, file)
-    written = write_single(args, {Path(file): tps.machine_template(file).text})
-    print(f"{written_text(written)}\n{hint('edit it, then', command_line('machine', 'check', file))}")
+    written = write_single(args, {Path(file): tps.machine_template(file).text}, fresh=True)
+    print(written_text(written), hint("edit it, then", command_line("machine", "check", file)), sep="\n")
     return 0
 
 
@@ -169,11 +151,10 @@ def from_linuxcnc(
     ] = None,
 ) -> int:
     """Read the genhexkins pins of a LinuxCNC HAL file."""
-    check_single(args, out)
     machine_file = tps.machine_from_linuxcnc(file, args.units)
     if out:
-        print(written_text(write_single(args, {Path(out): machine_file.text})))
-        print(hint("next", command_line("machine", "check", out)))
+        written = write_single(args, {Path(out): machine_file.text})
+        print(written_text(written), hint("next", command_line("machine", "check", out)), sep="\n")
     else:
         sys.stdout.write(str(machine_file))
     tell("note", machine_file.notes)
@@ -183,4 +164,5 @@ def from_linuxcnc(
 @command("machine recover", "recover_geometry", JSON)
 def recover(args: Namespace) -> int:
     """Fit the NIST geometry to the paper's Table 1 anew."""
-    return show(args, call(args, tps.recover_geometry))
+    recovery = call(args, tps.recover_geometry)
+    return show(args, recovery_text(recovery), document=lambda: recovery)

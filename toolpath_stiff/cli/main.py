@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import redirect_stderr, redirect_stdout, suppress
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import Any, TextIO, cast
 
+from toolpath_stiff.cli.parser import COMMANDS, Command, nearest
 from toolpath_stiff.defaults import THREADS, VERSION
-from toolpath_stiff.errors import FileError, InputError, TpsError, harmless
-
-if TYPE_CHECKING:
-    from toolpath_stiff.cli.parser import Command
+from toolpath_stiff.errors import InputError, TpsError, harmless
 
 # Module -> its commands, each with its line in the help.
 GROUPS = {
@@ -47,7 +44,7 @@ GROUPS = {
     "rig": {"rig": "blind exercises: measurements of a simulated machine that hides an effect"},
     "studio": {"studio": "measure, see where the model fails, add what is missing: a case in the browser"},
 }
-COMMANDS = {name: module for module, commands in GROUPS.items() for name in commands}
+MODULES = {name: module for module, commands in GROUPS.items() for name in commands}
 
 DESCRIPTION = "Stiffness of a hexapod (Stewart-platform) mill along a real NC program."
 EPILOG = """\
@@ -70,47 +67,20 @@ def help_text() -> str:
 
 
 def actions_of(name: str) -> dict[str, Command]:
-    """The command under "", or its actions."""
-    importlib.import_module(f"toolpath_stiff.cli.{COMMANDS[name]}")
-    commands = importlib.import_module("toolpath_stiff.cli.parser").COMMANDS
-    return {title.removeprefix(name).strip(): commands[title] for title in commands if title.split()[0] == name}
+    """A command by its name, or its actions by theirs ("rig new")."""
+    importlib.import_module(f"toolpath_stiff.cli.{MODULES[name]}")
+    return {title: command for title, command in COMMANDS.items() if title.split()[0] == name}
 
 
 class Screen:
-    """Standard output or standard error, through which all text goes that a user sees.
+    """Standard output or standard error: control characters of a program or a file name do not reach the terminal."""
 
-    Control characters from a program or a file name do not reach the terminal. Where nobody reads any more (`| head`),
-    the command goes on to its end and its exit code, in silence.
-
-    Attributes
-    ----------
-    gone
-        Whether nobody reads any more.
-    """
-
-    def __init__(self, stream: TextIO, name: str) -> None:
-        self.stream, self.name, self.gone = stream, name, False
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
 
     def write(self, text: str) -> int:
-        """Write text, without what steers a terminal. Raises `InputError` where the disk behind it is full, say."""
-        self._do(lambda: self.stream.write(harmless(text)))
-        return len(text)
-
-    def flush(self) -> None:
-        """Hand on what is held back."""
-        self._do(self.stream.flush)
-
-    def _do(self, step: Callable[[], object]) -> None:
-        if self.gone:
-            return
-        try:
-            step()
-        except OSError as error:
-            self.gone = True
-            with suppress(OSError, ValueError):  # what Python itself still holds back goes nowhere
-                os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())
-            if not isinstance(error, BrokenPipeError):
-                raise FileError(f"cannot write to {self.name}: {error.strerror}") from None
+        """Write text, without what steers a terminal."""
+        return self.stream.write(harmless(text))
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.stream, name)
@@ -118,24 +88,24 @@ class Screen:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code (2 for wrong input and for whatever else went wrong, 130 for Ctrl-C)."""
+    code = 0
     with (
         Path(os.devnull).open("w", encoding="utf-8") as nothing,  # for one that is closed
-        redirect_stdout(cast("TextIO", Screen(sys.stdout or nothing, "standard output"))),
-        redirect_stderr(cast("TextIO", Screen(sys.stderr or nothing, "standard error"))),
+        redirect_stdout(cast("TextIO", Screen(sys.stdout or nothing))),
+        redirect_stderr(cast("TextIO", Screen(sys.stderr or nothing))),
     ):
         try:
-            try:
-                code = _run(list(sys.argv[1:] if argv is None else argv))
-            except SystemExit as stop:  # argparse: --help, --version, wrong usage
-                code = stop.code if isinstance(stop.code, int) else 2
+            code = _run(list(sys.argv[1:] if argv is None else argv))
             sys.stdout.flush()
             return code
+        except BrokenPipeError:  # nobody reads any more (`| head`)
+            return _ended("", code)
         except TpsError as error:
-            return _ended(str(error), error.exit_code)
+            return _ended(f"tps: error: {error}\n", error.exit_code)
         except KeyboardInterrupt:
-            return _ended("", 130)
+            return _ended("tps: interrupted; no file is half-written\n", 130)
         except Exception as error:
-            return _ended(last_resort(error), 2)
+            return _ended(f"tps: error: {last_resort(error)}\n", 2)
 
 
 def _run(words: list[str]) -> int:
@@ -144,44 +114,45 @@ def _run(words: list[str]) -> int:
     if not name:
         print(f"tps {VERSION}" if "--version" in words else help_text())
         return 0 if words else 2
-    if name not in COMMANDS:
-        raise InputError(f"unknown command {name!r}", hint=_nearest(name, COMMANDS, "tps "))
+    if name not in MODULES:
+        raise _unknown(name, MODULES)
     words.remove(name)
-    actions, title = actions_of(name), f"tps {name}"
-    action = words[0] if words and "" not in actions else ""
-    if action not in actions:
-        if action in ("-h", "--help"):
-            print(actions_help(title, actions))
-            return 0
-        raise InputError(f"{title} {action}".strip(), hint=_nearest(action, actions, f"{title} "))
-    if action:
-        title = f"{title} {words.pop(0)}"
-    return actions[action](title, words)
+    title, actions = name, actions_of(name)
+    if name not in actions:
+        if not words or words[0] in ("-h", "--help"):
+            print(actions_help(name, actions))
+            return 0 if words else 2
+        title = f"{name} {words.pop(0)}"
+        if title not in actions:
+            raise _unknown(title, actions)
+    return actions[title](f"tps {title}", words)
 
 
-def _nearest(word: str, known: Iterable[str], before: str) -> str:
-    """What may have been meant."""
-    near = difflib.get_close_matches(word, list(known), n=1)
-    return f"did you mean `{before}{near[0]}`?" if near else f"say one of {', '.join(known)}"
+def _unknown(title: str, known: Iterable[str]) -> InputError:
+    near = nearest(title, known)
+    hint = f"did you mean `tps {near}`?" if near else f"say one of {', '.join(known)}"
+    return InputError(f"unknown command {title!r}", hint=hint)
 
 
-def actions_help(title: str, actions: Mapping[str, Command]) -> str:
+def actions_help(name: str, actions: Mapping[str, Command]) -> str:
     """The actions of a command, a line each, and its examples."""
-    examples = (sys.modules[next(iter(actions.values())).run.__module__].__doc__ or "").partition("\n\n")[2]
-    about = [f"  {name:<14} {(command.run.__doc__ or '').partition(chr(10))[0]}" for name, command in actions.items()]
-    return "\n".join([f"usage: {title} ACTION ...", "", "actions:", *about, "", examples])
+    examples = (sys.modules[f"toolpath_stiff.cli.{MODULES[name]}"].__doc__ or "").partition("\n\n")[2]
+    about = [f"  {title:<22} {(action.run.__doc__ or '').splitlines()[0]}" for title, action in actions.items()]
+    return "\n".join([f"usage: tps {name} ACTION ...", "", "actions:", *about, "", examples])
 
 
-def _ended(error: str, code: int) -> int:
+def _ended(text: str, code: int) -> int:
     """Say why a run ended, if that can be said; the exit code."""
-    with suppress(TpsError):  # nobody hears it: standard error is full, or its terminal is gone
-        sys.stdout.flush()
-    with suppress(TpsError):
-        print(f"tps: error: {error}" if error else "tps: interrupted; no file is half-written", file=sys.stderr)
-        sys.stderr.flush()
+    for stream, rest in ((sys.stdout, ""), (sys.stderr, text)):
+        try:
+            stream.write(rest)
+            stream.flush()
+        except OSError:  # nobody hears it: what is still held back goes nowhere
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     return code
 
 
+SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 REPORT = "if that does not explain it, report this line"
 
 
@@ -195,17 +166,11 @@ def last_resort(error: Exception) -> str:
     return f"an error that should not be ({type(error).__name__}{place}): {words}; {REPORT}"
 
 
-def _stop(number: int, frame: FrameType | None) -> None:
+def stop(number: int, frame: FrameType | None) -> None:
     """A signal handler that ends the run as Ctrl-C does; no other signal of its kind disturbs the clearing up."""
-    _stop_at(signal.SIG_IGN, _stop)
+    for other in SIGNALS:
+        signal.signal(other, signal.SIG_IGN)
     raise KeyboardInterrupt
-
-
-def _stop_at(new: Any, *before: Any) -> None:
-    for name in ("SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) in before:
-            signal.signal(number, new)
 
 
 def entry() -> None:
@@ -213,7 +178,9 @@ def entry() -> None:
     os.environ.update(dict.fromkeys(THREADS, "1"))
     # Further processes would look for modules in the present folder first: in a case, or wherever programs came from.
     os.environ["PYTHONSAFEPATH"] = "1"
-    _stop_at(_stop, signal.SIG_DFL)  # one that is ignored (nohup) stays so
+    for number in SIGNALS:
+        if signal.getsignal(number) == signal.SIG_DFL:  # one that is ignored (nohup) stays so
+            signal.signal(number, stop)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a terminal that cannot show a letter shows a question mark
             stream.reconfigure(errors="replace")

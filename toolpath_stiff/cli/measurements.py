@@ -1,15 +1,22 @@
 """The commands on measurements: reduce, compare, diagnose, update, plan."""
 
-import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli.calls import call, run_to_folder
-from toolpath_stiff.cli.outputs import check_single, destination, show, tell, write_single
 from toolpath_stiff.cli.parser import DATA, FILES, FOLDER, JSON, NO_PLOTS, REPLACE, command
+from toolpath_stiff.cli.run import (
+    call,
+    check_single,
+    destination,
+    run_to_folder,
+    show,
+    tell,
+    write_single,
+    written_text,
+)
 from toolpath_stiff.options import Option
 from toolpath_stiff.workbooks import split_name
 
@@ -54,12 +61,10 @@ def reduce(
     name = first.stem if first.is_file() else first.resolve().name
     target = Path(out or f"{name or 'raw'}_measurements.csv")
     written = [str(file) for file in write_single(args, reduction.files(target, plots=not args.no_plots))]
-    for line in reduction.read_as:
-        print(f"tps: {line}", file=sys.stderr)
+    tell("read", reduction.read_as)
     tell("note", reduction.notes)
-    return show(
-        args, reduction, f"\nwrote {' and '.join(written)}", document=lambda: {**reduction.to_dict(), "files": written}
-    )
+    document = {**reduction.to_dict(), "files": written}
+    return show(args, reduction, f"\nwrote {' and '.join(written)}", document=lambda: document)
 
 
 @command("compare", DATA, "Machine.load", "compare", *FOLDER)
@@ -73,8 +78,8 @@ def compare(args: Namespace) -> int:
 
     The machine file is compared as it stands; `tps diagnose` asks which effect it lacks. A finding is a pattern in the
     residuals that fewer than 5 % of campaigns of mere scatter would show anywhere among all patterns looked for.
-    Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, strips.png, planes.png,
-    machine.png, variables.png, load_path.png.
+    Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, machine.png,
+    variables.png.
     """
     return run_to_folder(args, tps.compare, tps.Comparison, args.data)
 
@@ -113,17 +118,16 @@ def update(
 
     An effect that the data do not support is refused, with the reason, unless --force is given; the exit code is 0 all
     the same. Files written to --out: update.json, residuals.csv, machine.toml (unless refused or -o names another
-    place), ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
+    place), before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
     """
     args.replace |= args.force
     check_single(args, output)
-    target = destination(args, tps.Update, args.data, () if output is None else ("machine.toml",))
-    fitted = call(args, tps.update, machine_file=output or target.folder / "machine.toml")
-    after = [target.write(fitted, plots=not args.no_plots, machine=output is None)]
+    folder, rules = destination(args, tps.Update, args.data, () if output is None else ("machine.toml",))
+    fitted = call(args, tps.update, machine_file=output or folder / "machine.toml")
+    written = fitted.save(folder, plots=not args.no_plots, rules=rules, machine=output is None)
     if output and fitted.accepted:
-        write_single(args, {Path(output): fitted.machine_text()})
-        after.append(f"  {output}")
-    return show(args, fitted, *after, *(["", *fitted.next] if fitted.next else []))
+        written += write_single(args, {Path(output): fitted.machine_text()})
+    return show(args, fitted, written_text(written), *(["", *fitted.next] if fitted.next else []))
 
 
 @command("plan", "Machine.load", "plan", *FOLDER)

@@ -9,11 +9,11 @@ import re
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from operator import attrgetter
 from typing import Any, NoReturn
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli.outputs import tell_incomplete
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import PARAMETERS, SWITCHES, Argument, Option, arguments_of
 
@@ -56,37 +56,49 @@ class Command:
             arguments |= {name: argument for name, argument in taken.items() if name not in arguments}
         return {name: argument for name, argument in arguments.items() if name not in self.without}
 
-    def __call__(self, name: str, words: Sequence[str]) -> int:
-        """Run the command; the exit code. Raises `InputError`."""
-        args = self.read(name, words)
-        tell_incomplete(args)
-        return self.run(args, **{key: getattr(args, key) for key in arguments_of(self.run)})
+    def __call__(self, title: str, words: Sequence[str]) -> int:
+        """Run the command, or print its help; the exit code. Raises `InputError`."""
+        if "-h" in words or "--help" in words:
+            print(self.parser(title).format_help(), end="")
+            return 0
+        args = self.read(title, words)
+        return self.run(args, **{name: getattr(args, name) for name in arguments_of(self.run)})
 
-    def parser(self, name: str) -> Parser:
+    def parser(self, title: str) -> Parser:
         """The parser of its arguments."""
         about, _, examples = (inspect.getdoc(self.run) or "").partition(PARAMETERS)[0].partition("\n\n")
-        parser = Parser(name, about, examples.rstrip())
+        parser = Parser(title, None, about, examples.rstrip(), formatter_class=argparse.RawDescriptionHelpFormatter)
+        parser._negative_number_matcher = NEGATIVE_VALUE
         for argument in self.arguments.values():
             parser.add(argument)
         return parser
 
-    def read(self, name: str, words: Sequence[str]) -> Namespace:
+    def read(self, title: str, words: Sequence[str]) -> Namespace:
         """The values of its arguments. Raises `InputError`."""
-        typed, rest = self.parser(name).parse_known_args(whole_options(words))
+        # Before anything but switches `--block-delete` is the whole option: what follows is a program.
+        words = [
+            f"{word}=" if word == "--block-delete" and not SWITCHES.fullmatch(after) else word
+            for word, after in zip_longest(words, words[1:], fillvalue="")
+        ]
+        given, rest = self.parser(title).parse_known_args(words)
         arguments = self.arguments
         if rest:
-            known = [option for argument in arguments.values() for option in argument.option.name.split()]
-            near = difflib.get_close_matches(rest[0].partition("=")[0], known, n=1)
-            raise InputError(
-                f"{name} does not know {rest[0]!r}", hint=f"did you mean {near[0]}?" if near else f"see {name} --help"
+            near = nearest(
+                rest[0].partition("=")[0], [name for a in arguments.values() for name in a.option.name.split()]
             )
-        values = {key: arguments[key].value(word) for key, word in vars(typed).items()}
-        for key in values:
-            other = arguments[key].option.instead_of
-            if other in values:
-                names = (arguments[key].option.name, arguments[other].option.name)
-                raise InputError(" with ".join(names), expected="one of the two")
-        return Namespace(**{key: argument.default for key, argument in arguments.items()} | values)
+            hint = f"did you mean {near}?" if near else f"see {title} --help"
+            raise InputError(f"{title} does not know {rest[0]!r}", hint=hint)
+        for name in vars(given):
+            other = arguments[name].option.instead_of
+            if other in given:
+                both = f"{arguments[name].option.name} with {arguments[other].option.name}"
+                raise InputError(both, expected="one of the two")
+        return Namespace(**{name: argument.default for name, argument in arguments.items()} | vars(given))
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """What may have been meant; "" where nothing is near."""
+    return next(iter(difflib.get_close_matches(word, list(known), n=1)), "")
 
 
 COMMANDS: dict[str, Command] = {}  # "rig new": of the modules that are imported
@@ -105,13 +117,7 @@ def command(
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser of words: values may begin with a minus, a mistake is an `InputError`."""
-
-    def __init__(self, name: str, about: str, examples: str) -> None:
-        super().__init__(
-            prog=name, description=about, epilog=examples, formatter_class=argparse.RawDescriptionHelpFormatter
-        )
-        self._negative_number_matcher = NEGATIVE_VALUE
+    """A parser whose mistakes are `InputError`s."""
 
     def error(self, message: str) -> NoReturn:
         """Raise what is wrong."""
@@ -119,30 +125,18 @@ class Parser(argparse.ArgumentParser):
 
     def add(self, argument: Argument) -> None:
         """Take an argument as words."""
-        option, kinds = argument.option, dict[str, Any](default=argparse.SUPPRESS)
-        text = argument.help.rstrip(".")
+        option, text = argument.option, argument.help.rstrip(".")
         if argument.default and argument.kind is not bool and "default" not in text:
-            parts = argument.default if isinstance(argument.default, tuple) else (argument.default,)
-            text += f" (default: {':'.join(f'{part:g}' if isinstance(part, float) else str(part) for part in parts)})"
-        kinds["help"] = text.replace("%", "%%")
+            text += f" (default: {','.join(argument.words(argument.default))})"
+        form: dict[str, Any] = {"default": argparse.SUPPRESS, "help": text.replace("%", "%%")}
         if not option.name.startswith("-"):
-            count = option.count or (None if argument.required else "?")
-            self.add_argument(argument.name, nargs=count, metavar=option.name, **kinds)
+            nargs = option.count or (None if argument.required else "?")
+            self.add_argument(argument.name, type=argument.value, nargs=nargs, metavar=option.name, **form)
             return
-        kinds |= {"dest": argument.name, "required": argument.required}
+        form |= {"dest": argument.name, "required": argument.required}
         if argument.kind is bool:
-            kinds["action"] = "store_true"
+            form |= {"action": "store_true"}
         else:
-            number = argument.kind in (int, float)
-            unit = option.unit.upper().replace("%", "PERCENT") or "N" if number else option.unit
-            kinds["metavar"] = unit or (f"{{{','.join(option.choices)}}}" if option.choices else None)
-            kinds["action"] = option.count or "store"
-        self.add_argument(*option.name.split(), **kinds)
-
-
-def whole_options(words: Sequence[str]) -> list[str]:
-    """`--block-delete` before anything but switches is the whole option: what follows is a program."""
-    return [
-        f"{word}=" if word == "--block-delete" and not SWITCHES.fullmatch(after) else word
-        for word, after in zip(words, [*words[1:], ""], strict=False)
-    ]
+            choices = f"{{{','.join(option.choices)}}}" if option.choices else None
+            form |= {"action": option.count or "store", "type": argument.value, "metavar": option.unit or choices}
+        self.add_argument(*option.name.split(), **form)

@@ -6,14 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli.calls import call, run_to_folder
-from toolpath_stiff.cli.outputs import check_single, destination, show, tell, write_single
 from toolpath_stiff.cli.parser import FOLDER, PROGRAM, command
 from toolpath_stiff.cli.program import READ
+from toolpath_stiff.cli.run import call, check_single, destination, run_to_folder, show, write_single, written_text
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.options import Option, numbers
-from toolpath_stiff.results_folder import incomplete
 
 
 @command("place", PROGRAM, "place", *READ, *FOLDER)
@@ -31,23 +28,19 @@ def place(args: Namespace) -> int:
     found.
 
     A placement is where program zero sits and how the work is turned about it: the numbers of --origin. Files written
-    to --out: placements.csv (the front), placement.json, front.png, setup.pdf, report.html
+    to --out: placements.csv (the front), placement.json, setup.pdf, report.html
     (click a placement of the front, see the path there).
     """
     check_single(args, args.write)
-    target = destination(args, tps.Placement, [args.program])
-    if args.pick is not None:
-        tell("warning", filter(None, [incomplete(target.folder)]))
-    placement = call(args, tps.place, earlier=Path(target.folder, "placement.json"))
-    written = [target.write(placement, plots=not args.no_plots)]
+    folder, rules = destination(args, tps.Placement, [args.program])
+    placement = call(args, tps.place, earlier=folder / "placement.json")
+    written = placement.save(folder, plots=not args.no_plots, rules=rules)
     if args.write and not placement.refusal:
-        write_single(args, {Path(args.write): placement.program_bytes})
-        written.append(f"  {args.write}")
-    show(args, placement, *written)
+        written += write_single(args, {Path(args.write): placement.program_bytes})
+    show(args, placement, written_text(written))
     if placement.refusal:
         raise InputError(
-            f"{args.write} was not written; the search is kept in {target.folder} "
-            f"({both_names('--pick')} takes it up): {placement.refusal}"
+            f"{args.write} was not written; the search is kept in {folder} (--pick takes it up): {placement.refusal}"
         )
     return 0
 

@@ -2,22 +2,29 @@
 
 import sys
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
-from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any
 
 import toolpath_stiff as tps
 from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table
-from toolpath_stiff.cli.calls import call, given, machine_for
-from toolpath_stiff.cli.outputs import check_single, destination, show, tell, write_single, written_text
 from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, command
-from toolpath_stiff.cli.progress import say
+from toolpath_stiff.cli.run import (
+    call,
+    destination,
+    given,
+    machine_for,
+    progress_line,
+    show,
+    tell,
+    write_single,
+    written_text,
+)
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import Option
-from toolpath_stiff.report.batch.programs import FolderCount, Found, find_programs
+from toolpath_stiff.report.analysis import other_samples
+from toolpath_stiff.report.batch.programs import find_programs
 
 BELOW_REQUIRED = 3  # exit code
 INCOMPLETE = 1  # exit code: samples were left out, or of several programs one failed
@@ -85,73 +92,43 @@ def analyze(
         'toolpath-stiff[cluster]').
     """
     files, counts = find_programs(programs)
+    saving: dict[str, Any] = {"plots": not args.no_plots, "table": table, "show_plunges": show_plunges}
     if counts or len(files) > 1 or cluster:
-        return _analyze_many(args, files, counts)
-    return _analyze_one(args, files[0].file)
-
-
-def _analyze_one(args: Namespace, file: str) -> int:
-    from toolpath_stiff.report.analysis import other_samples
-
-    target = destination(args, tps.Analysis, [file], other_samples(args.table))
+        options = given(args, tps.analyze, tps.Program.read) | saving | {"jobs": jobs, "replace": args.replace}
+        executor = _executor(cluster) if cluster else None
+        with progress_line() as progress:
+            analyses = tps.analyze_many(
+                programs, machine_for(args), args.out or "reports", executor=executor, progress=progress, **options
+            )
+        if counts and not args.json:
+            print(*counts, sep="\n")
+        show(args, analyses, written_text(analyses.written))
+        if not analyses.complete:
+            return INCOMPLETE
+        return BELOW_REQUIRED if analyses.below_required else 0
+    file = files[0].file
+    folder, rules = destination(args, tps.Analysis, [file], other_samples(table))
     analysis = call(args, tps.analyze, program=tps.Program.read(file, **given(args, tps.Program.read)))
-    saving = {"plots": not args.no_plots, "table": args.table, "show_plunges": args.show_plunges}
-    show(args, analysis, target.write(analysis, **saving))
+    show(args, analysis, written_text(analysis.save(folder, rules=rules, **saving)))
     if analysis.below_required:
         return BELOW_REQUIRED
     return 0 if analysis.complete else INCOMPLETE
 
 
-def _analyze_many(args: Namespace, files: Sequence[Found], counts: Sequence[FolderCount]) -> int:
-    def progress(text: str, done: int, total: int) -> None:
-        if done == 0 and not args.json:  # all arguments have been found right
-            for count in counts:
-                print(count, flush=True)
-        say(f"{done}/{total} programs, {text}")
-
-    try:
-        with _executor(args) as executor:
-            analyses = tps.analyze_many(
-                files,
-                machine_for(args),
-                args.out or "reports",
-                executor=executor,
-                plots=not args.no_plots,
-                replace=args.replace,
-                progress=progress,
-                table=args.table,
-                show_plunges=args.show_plunges,
-                jobs=args.jobs,
-                **given(args, tps.analyze, tps.Program.read),
-            )
-    finally:
-        say("")
-    show(args, analyses, written_text(analyses.written))
-    if not analyses.complete:
-        return INCOMPLETE
-    return BELOW_REQUIRED if analyses.below_required else 0
-
-
-@contextmanager
-def _executor(args: Namespace) -> Iterator[Executor | None]:
-    """The executor of --cluster; None without it. Raises `InputError` where there is no scheduler."""
-    if args.cluster is None:
-        yield None
-        return
+def _executor(address: str) -> Executor:
+    """The executor of a Dask cluster. Raises `InputError` where there is no scheduler."""
     try:
         from distributed import Client
-    except ImportError:
-        hint = "run `pip install 'toolpath-stiff[cluster]'`"
-        raise InputError("--cluster needs the package distributed", hint=hint) from None
-    try:
-        client: Any = Client(args.cluster, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError, ImportError) as error:  # ImportError: a protocol that is not installed
+
+        client: Any = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
+        executor: Executor = client.get_executor(pure=False)
+    except (OSError, ValueError, ImportError) as error:  # ImportError: no such package, or no such protocol
         raise InputError(
-            f"--cluster {args.cluster}: {' '.join(str(error).split())}",
+            f"--cluster {address}: {' '.join(str(error).split())}",
             expected="the address of a Dask scheduler, as tcp://10.0.0.5:8786",
+            hint="run `pip install 'toolpath-stiff[cluster]'` if distributed is missing",
         ) from None
-    with client:
-        yield client.get_executor(pure=False)
+    return executor
 
 
 @command("path", PROGRAM, "sample_path", "Program.read", REPLACE)
@@ -169,13 +146,11 @@ def path(
     the rotary axes a_deg,b_deg,c_deg in machine coordinates, feed_mm_per_min (empty for rapids). Program zero lies at
     0,0,0 unless --origin or the program's own G10 says otherwise. Every move has samples at both of its ends.
     """
-    check_single(args, out)
     sampled = call(args, tps.sample_path)
     if out:
         write_single(args, {Path(out): sampled.csv()})
     else:
-        for piece in takewhile(lambda _: not getattr(sys.stdout, "gone", False), sampled.csv()):
-            sys.stdout.write(piece.decode())
+        sys.stdout.writelines(piece.decode() for piece in sampled.csv())
     tell("warning", (f"{sampled.name}: {warning}" for warning in sampled.warnings))
     tell("note", sampled.unsupported)
     return 0

@@ -13,11 +13,10 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Annotated, Any
 
-from toolpath_stiff.cli.outputs import inputs_of, show, tell_kept, write_single
 from toolpath_stiff.cli.parser import JSON, REPLACE, command
+from toolpath_stiff.cli.run import rules_of, show, write_single
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.options import Option
-from toolpath_stiff.results_folder import Rules
 from toolpath_stiff.rig.exercise import FILES, blind_case, measured_again, new_exercise, reveal
 
 LAYOUTS = ("paper", "tilted", "campaign")
@@ -55,8 +54,8 @@ def new(
     machine
         Nominal machine.
     """
-    rules = Rules(inputs=tuple(inputs_of(args)), fresh=True, replace=args.replace, kept=tell_kept)
-    count = new_exercise(out, blind_case(seed, layout, hidden, noise / 100.0, machine, at), rules)
+    case = blind_case(seed, layout, hidden, noise / 100.0, machine, at)
+    count = new_exercise(out, case, rules_of(args, fresh=True))
     print(f"{out}: {count} measurements, the nominal machine and the sealed truth")
     print(hint("next", _diagnose(out)))
     return 0

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import Annotated, cast
 
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.cli.calls import given
 from toolpath_stiff.cli.parser import FILES, command
+from toolpath_stiff.cli.run import given
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import Option, arguments_of
 from toolpath_stiff.studio.run import opened_case, serve
@@ -65,5 +65,5 @@ def studio(
     if program:
         opened.add_program(program, **cast("Reading", reading))
     elif reading:
-        opened.read_programs(**cast("Reading", reading))
+        opened.add_program(**cast("Reading", reading))
     return serve(opened, port, browser=not no_browser)

@@ -44,9 +44,8 @@ def load_path_shares(model: StiffnessModel, data: Readings) -> LinkShares:
 
 def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
     """(n, links) m/N along each row's direction."""
-    path, links, _, f = exact.under_load(model, measured_path(model, data), data.direction)
-    w = np.concatenate([data.direction, np.zeros((len(data), 3))], axis=1)
-    loads = np.concatenate([f, w], axis=1)
+    path, whole, _, f = exact.under_load(model, measured_path(model, data), data.direction)
+    loads = np.concatenate([f, data.direction, np.zeros((len(data), 3))], axis=1)  # [f; w]
     columns = [*(f**2 / path.machine.strut_law.stiffness(path.struts.lengths)).T]
     for active in model.effects:
         energy = np.zeros(len(data))
@@ -56,16 +55,9 @@ def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
             energy += (series * f**2).sum(axis=1)
         if form is not None:
             energy += np.einsum("ni,nij,nj->n", loads, form, loads)
-        if beside is not None:
-            motion = _platform_motion(path.struts.jacobian, links, f, w)
+        if beside is not None:  # its motion x is that of the platform: J x = Q_ff f + Q_fw w
+            stretch = np.einsum("nij,nj->ni", whole[:, :6], loads)
+            motion = np.linalg.solve(path.struts.jacobian, stretch[..., None])[..., 0]
             energy += np.einsum("ni,nij,nj->n", motion, beside, motion)
         columns.append(energy)
     return np.stack(columns, axis=1)
-
-
-def _platform_motion(jacobian: FloatArray, links: exact.AssembledLinks, f: FloatArray, w: FloatArray) -> FloatArray:
-    """(n, 6) x from J x = Q_ff f + Q_fw w."""
-    stretch = links.strut * f
-    if links.loads is not None:
-        stretch = stretch + np.einsum("nij,nj->ni", links.loads[:, :6], np.concatenate([f, w], axis=1))
-    return np.asarray(np.linalg.solve(jacobian, stretch[..., None])[..., 0])

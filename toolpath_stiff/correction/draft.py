@@ -19,9 +19,9 @@ from toolpath_stiff.machine.writer import value_text
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.portrait.words import portrait_text, size_words, term_words
 from toolpath_stiff.readings.measurements import reading_marks
-from toolpath_stiff.stiffness.effect_file import EffectFile
+from toolpath_stiff.results import TextFile
 from toolpath_stiff.stiffness.sizes import joined
-from toolpath_stiff.stiffness.term_effect import kind_of
+from toolpath_stiff.stiffness.term_effect import ENDINGS
 from toolpath_stiff.stiffness.term_file import entry_of
 from toolpath_stiff.stiffness.terms import PINS, Term, formula
 
@@ -30,7 +30,7 @@ WIDTH = 116  # columns of running text in the file
 MARKS_A_LINE = 10
 
 
-class EffectDraft(EffectFile):
+class EffectDraft(TextFile):
     """What a diagnosis leaves unexplained, as the text of an effect file.
 
     Attributes
@@ -104,7 +104,7 @@ def draft(diagnosis: Diagnosis, file: str) -> EffectDraft:
     }
     marks = sorted(set(reading_marks(diagnosis.data).tolist()))
     text = draft_text(name, portrait, source, f"Drawn by `{drawn}` from {source}.", list(commands.values()), marks)
-    endings = sorted({kind_of(sized.term).ending for sized in portrait.terms if sized.term.acts})
+    endings = sorted({ENDINGS.get(sized.term.action, "") for sized in portrait.terms if sized.term.acts})
     effects = [name] if len(endings) == 1 else [f"{name}{ending}" for ending in endings]
     return EffectDraft(name, diagnosis, text, effects, commands=[hint(*pair) for pair in commands.items()])
 

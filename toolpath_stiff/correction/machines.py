@@ -58,7 +58,7 @@ def fitted_machine(
     # The fitted law's factors to digits on which all processors agree.
     law = scaled_law(machine.strut_law, np.round(fit.law, 8))
     known = machine.setups
-    if any(SETUP in active.effect.conditions(active.values) for active in fit.effects):
+    if any(SETUP in active.waits_for for active in fit.effects):
         known = (*known, *sorted({*setups} - {"", *known}))
     carrying = machine.with_changes(
         effects=tuple(effects),

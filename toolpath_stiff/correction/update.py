@@ -41,7 +41,7 @@ from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import score_families, signatures, tables_of
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.stiffness.model import build_model, setup_of
+from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import json_number
 
 TRIED = 4  # candidates a step of `--auto`, the most likely first
@@ -98,7 +98,7 @@ def update(task: UpdateTask) -> Update:
     if result.corrected is None:
         return result
     # An effect that belongs to a set-up acts only where that is named.
-    setups = filter(None, map(setup_of, build_model(result.corrected, task.effect_files).effects))
+    setups = (active.setup for active in build_model(result.corrected, task.effect_files).effects if active.setup)
     shown = options(machine=task.machine_file, effects=list(task.effect_files), setup=next(setups, None))
     compare = hint("what is left", request.command("compare", machine=task.machine_file))
     also = "the stiffness over the workspace (analyze, place and pose take the same options)"

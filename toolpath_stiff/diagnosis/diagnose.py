@@ -36,7 +36,7 @@ from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import Conditions
-from toolpath_stiff.stiffness.model import build_model, setup_of
+from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import Pose
 
 Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise model; the one that is written out
@@ -243,7 +243,7 @@ def choice_on_path(
     fits = {name: fits[name] for name in diagnosis.explanations if name in fits}
     conditions = given or Conditions(diagnosis.machine.setup, diagnosis.machine.temperature)
     if conditions.setup is None:
-        setups = (setup_of(active) for fit in fits.values() for active in fit.effects)
+        setups = (active.setup for fit in fits.values() for active in fit.effects)
         conditions = replace(conditions, setup=next(filter(None, setups), None))
     shown = {}
     for name, fit in fits.items():

@@ -8,7 +8,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import NAMING, Examination
-from toolpath_stiff.hints import Asked, both_names, command_line, hint, options
+from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import seen_readings
@@ -180,7 +180,7 @@ def _not_told_apart(diagnosis: Examination) -> list[str]:
 def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str]:
     """What to do next, as hints: commands run as they stand."""
     request = request or diagnosis.asked or Asked(diagnosis.names)
-    repeat = f"repeat a few readings, re-clamped, or state {both_names('--noise')}"
+    repeat = "repeat a few readings, re-clamped, or state --noise"
     plan, verdict = request.command("plan"), diagnosis.verdict
     # Where there is no plan, the remark says why.
     unplanned = diagnosis.remarks[0] if diagnosis.remarks and not diagnosis.next_measurements else ""

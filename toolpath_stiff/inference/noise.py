@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats
@@ -184,7 +183,7 @@ def _noise_of_tip(
         both = stated if isinstance(stated, tuple) else _shared(stated)
         if not (0.0 < both[0] <= LARGEST and 0.0 <= both[1] <= LARGEST):
             raise InputError(f"a noise of {stated!r}", expected=f"more than 0 and at most {100 * LARGEST:g} %")
-        remark = "" if repeats is None else _disagreement(repeats, *both, f"noise stated with {both_names('--noise')}")
+        remark = "" if repeats is None else _disagreement(repeats, *both, "noise stated with --noise")
         if not remark:
             return (model("stated", *both, STATED_FREEDOM, f"stated: {_percent(*both)}"),)
     relative = data.sd / data.stiffness

@@ -174,9 +174,7 @@ class Predictor:
         """Whether these effects and the machine file's leave geometry, equilibrium and readings as they are."""
         hooks = ("geometry", "parallel_stiffness", "reading")
         mine = (active.effect for active in (*self.base.effects, *self.base.instruments))
-        return not any(
-            getattr(type(effect), hook) is not getattr(Effect, hook) for effect in (*effects, *mine) for hook in hooks
-        )
+        return not any(hook in effect.hooks for effect in (*effects, *mine) for hook in hooks)
 
     def law_columns(self, log_stiffness: FloatArray, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(n, 2) d ln k / d law where the model says `log_stiffness` (n,).
@@ -266,7 +264,7 @@ def _prepare(model: StiffnessModel, data: Readings, timed: bool) -> _Prepared:
     path = measured_path(model, distinct)
     wrenches = np.zeros((len(distinct), 6, 1))
     wrenches[:, :3, 0] = distinct.direction
-    _, forces = exact.respond(path, exact.assemble_links(model, path), wrenches)
+    _, forces = exact.respond(path, *exact.assemble_links(model, path), wrenches)
     products = forces[..., 0] ** 2
     if distinct.beside is not None:
         few = distinct.beside

@@ -15,7 +15,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
-from toolpath_stiff.errors import InputError, MachineFileError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
@@ -72,7 +72,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Hexapod:
     path = Path(name_or_file)
     if not is_file(path):
         template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")
-        raise MachineFileError(
+        raise InputError(
             f"machine {str(name_or_file)!r} is neither a packaged machine nor a file",
             expected=f"one of {', '.join(known)}, or a machine file",
             hint=f"`tps machine list` lists the machines, `{template}` writes a commented template",
@@ -81,7 +81,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Hexapod:
         text = read_bytes(path, "machine file", LARGEST_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         mistake = f"not a text file (byte {error.start})"
-        raise MachineFileError(mistake, expected="a machine file (TOML, UTF-8)", file=str(path)) from None
+        raise InputError(mistake, expected="a machine file (TOML, UTF-8)", file=str(path)) from None
     return parse_machine(text, file=str(path))
 
 
@@ -93,7 +93,7 @@ def _packaged(path: Path) -> Hexapod:
 
 def parse_machine(text: str, file: str = "machine.toml") -> Hexapod:
     """Parse the text of a machine file; `file` is only used in messages. Raises `InputError`."""
-    toml = MachineToml(text, file, kind=MachineFileError)
+    toml = MachineToml(text, file, kind=InputError)
     values = read_sections(toml)
     top = {"title": values[""]["name"], "source": "", **values[""]}
     setup = values.get("setup", {})
@@ -232,7 +232,7 @@ def _entries(toml: MachineToml, kind: str) -> tuple[EffectEntry, ...]:
             key, mistake, expected = "provenance", f" = {shortened(provenance)}", f"a table [{kind}.provenance]"
         if key:
             text, line = f"[[{kind}]] {key}{mistake}", lines.get(key, lines.get(""))
-            raise MachineFileError(text, expected=expected, file=toml.file, line=line)
+            raise InputError(text, expected=expected, file=toml.file, line=line)
         parameters = {key: value for key, value in row.items() if key not in ("name", "provenance")}
         entries.append(EffectEntry(name, parameters, provenance, toml.file, lines))
     return tuple(entries)

@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import PoseError
+from toolpath_stiff.arrays import ArrayColumns, FloatArray
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import mm_from_m
@@ -27,7 +27,7 @@ LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.3  # m, rad
 
 
 @dataclass(frozen=True)
-class Struts:
+class Struts(ArrayColumns):
     """The struts at n poses.
 
     Attributes
@@ -211,19 +211,19 @@ def forward_kinematics(
     if len(failed):
         row = int(failed[0])
         mistake = f"row {row + 1}: no pose near the start has struts of {_in_words(wanted[row])} mm"
-        raise PoseError(mistake, hint="check the lengths, or give a start nearer to the pose")
+        raise InputError(mistake, hint="check the lengths, or give a start nearer to the pose")
     return np.concatenate([position, roll_pitch_yaw(rotation)], axis=1)
 
 
 def _check_lengths(lengths: FloatArray) -> None:
     """One bad row must not be blamed on another: rows are solved together."""
     if lengths.ndim != 2 or lengths.shape[1] != 6:
-        raise PoseError(f"strut lengths of shape {lengths.shape}", expected="(n, 6) or (6,)")
+        raise InputError(f"strut lengths of shape {lengths.shape}", expected="(n, 6) or (6,)")
     bad = np.flatnonzero(~(np.isfinite(lengths) & (lengths > 0.0)).all(axis=1))
     if len(bad):
         row = int(bad[0])
         mistake = f"row {row + 1}: strut lengths {_in_words(lengths[row])} mm"
-        raise PoseError(mistake, expected="six finite lengths above 0")
+        raise InputError(mistake, expected="six finite lengths above 0")
 
 
 def _in_words(lengths: FloatArray) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import MachineFileError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Hexapod, Limits, StrutLaw
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
@@ -63,7 +63,7 @@ def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tup
     if missing:
         mistake = f"{len(missing)} joint pins are not set, first {missing[0]}"
         expected = "setp genhexkins.base.N.x|y|z and genhexkins.platform.N.x|y|z for N = 0 to 5"
-        raise MachineFileError(mistake, expected=expected, file=file)
+        raise InputError(mistake, expected=expected, file=file)
     scale = UNITS_MM[units]
     joints = m_from_mm(np.vectorize(values.__getitem__)(names) * scale)
     offset = m_from_mm((values.get("tool-offset", 0.0) + values.get("spindle-offset", 0.0)) * scale)
@@ -101,7 +101,7 @@ def _read_pins(text: str, file: str) -> dict[str, float]:
             continue
         else:
             expected = expected or "a finite number"
-        raise MachineFileError(mistake, expected=expected, file=file, line=number)
+        raise InputError(mistake, expected=expected, file=file, line=number)
     return values
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
-from toolpath_stiff.errors import InputError, MachineFileError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import ORIGINS
 from toolpath_stiff.toml_reader import TomlReader, is_number, is_text, shortened
 
@@ -20,7 +20,7 @@ class MachineToml(TomlReader):
         """An error at a key of a section, or at the section itself."""
         label = f"[{section}] {key}".strip() if section else key
         line = self.line_of(section, key)
-        return MachineFileError(f"{label}{mistake}", expected=expected, hint=hint, file=self.file, line=line)
+        return InputError(f"{label}{mistake}", expected=expected, hint=hint, file=self.file, line=line)
 
 
 @dataclass(frozen=True)
@@ -122,13 +122,13 @@ def read_sections(toml: MachineToml) -> Sections:
                 known = ", ".join(f"[{section}]" for section in SECTIONS if section)
                 expected = f"one of {known}, [[effect]], [[instrument]], [uncertainty]"
                 line = toml.line_at(full)
-                raise MachineFileError(f"unknown section [{full}]", expected=expected, file=toml.file, line=line)
+                raise InputError(f"unknown section [{full}]", expected=expected, file=toml.file, line=line)
             else:
                 top[full] = part
     for name in SECTIONS:
         if name not in sections and name not in OPTIONAL_SECTIONS:
             hint = "`tps machine new template.toml` writes a template with every section"
-            raise MachineFileError(f"section [{name}] is missing", hint=hint, file=toml.file)
+            raise InputError(f"section [{name}] is missing", hint=hint, file=toml.file)
     return {name: _section(toml, name, content) for name, content in sections.items()}
 
 

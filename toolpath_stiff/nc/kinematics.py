@@ -41,6 +41,8 @@ DIRECTIONS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 PLACE_KEYS = {TABLE: "point_mm", HEAD: "pivot_mm"}
 TOLERANCE_MM, LEAST_TOLERANCE_MM, LARGEST_TOLERANCE_MM = 1e-3, 1e-5, 1.0
 PARALLEL = 1e-6  # sine of the angle between two axes that are one
+UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
+Z = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -211,26 +213,14 @@ def _check_pair(toml: TomlReader, axes: tuple[RotaryAxis, ...], parts: tuple[tup
         raise toml.error(f"{first}.axis and {second}.axis are parallel", "two directions", where=f"{second}.axis")
 
 
-UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
-Z = np.array([0.0, 0.0, 1.0])
-
-
-@dataclass(frozen=True)
-class ToolPoses:
-    """Tips (n, 3) in m and unit vectors of the tool's axis (n, 3), tip to spindle, in part coordinates."""
-
-    tip: FloatArray
-    axis: FloatArray
-
-
 def tool_poses(
     kinematics: PostedKinematics,
     xyz: FloatArray,
     abc: FloatArray,
     tool_length: FloatArray | float = math.nan,
     tip_held: BoolArray | bool = False,
-) -> ToolPoses:
-    """Where the tool stands on the part: the forward kinematics of the machine that a program was posted for.
+) -> tuple[FloatArray, FloatArray]:
+    """Tips (n, 3) in m and tool axes (n, 3), tip to spindle, on the part: forward kinematics of the posted machine.
 
     Parameters
     ----------
@@ -250,8 +240,8 @@ def tool_poses(
     --------
     >>> tilting = RotaryAxis("A", TABLE, direction=(1.0, 0.0, 0.0), point=(0.0, 0.0, 0.0))
     >>> kinematics = PostedKinematics("table", (tilting,), tcp=False)
-    >>> poses = tool_poses(kinematics, np.array([[0.0, 0.0, 0.1]]), np.radians([[90.0, 0.0, 0.0]]))
-    >>> poses.tip.round(9).tolist(), poses.axis.round(9).tolist()
+    >>> tip, axis = tool_poses(kinematics, np.array([[0.0, 0.0, 0.1]]), np.radians([[90.0, 0.0, 0.0]]))
+    >>> tip.round(9).tolist(), axis.round(9).tolist()
     ([[0.0, -0.1, 0.0]], [[0.0, -1.0, 0.0]])
     """
     held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(xyz),))
@@ -265,18 +255,17 @@ def tool_poses(
             # Where nothing turns the numbers stay to their last digit, and a tool's unknown length does not matter.
             turns = ~held & (angle != 0.0)
             tip = np.where(turns[:, None], center + turned(tip - center, rotary, angle), tip)
-    return ToolPoses(tip, axis)
+    return tip, axis
 
 
-def roll_pitch(axis: FloatArray, pitch_before: float = 0.0) -> FloatArray:
+def roll_pitch(axis: FloatArray) -> FloatArray:
     """Roll and pitch (n, 2), rad, of tool axes (n, 3) in their order, at a yaw of 0; see `geometry.roll_pitch_of_axis`.
 
-    Pitch runs on from `pitch_before`, over half a turn too, and stays what it was where the axis lies along y and has
-    none.
+    Pitch runs on from 0, over half a turn too, and stays what it was where the axis lies along y and has none.
     """
     i, j, k = axis.T
     across = np.hypot(i, k)
-    pitch = np.concatenate([[pitch_before], np.arctan2(i, k)])
+    pitch = np.concatenate([[0.0], np.arctan2(i, k)])
     known = np.concatenate([[0], np.where(across > UPRIGHT, np.arange(1, len(pitch)), 0)])
     pitch = np.unwrap(pitch[np.maximum.accumulate(known)])[1:]
     return np.stack([np.arctan2(-j, across), pitch], axis=1) + 0.0

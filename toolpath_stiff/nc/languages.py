@@ -1,13 +1,17 @@
-"""Files that are not G code, recognised by their lines: cutter-location files; other languages, refused by name."""
+"""Files that are no G code of a mill, recognised by their lines.
+
+Cutter-location files have a reader of their own; other languages, and programs of lathes, are refused by name.
+"""
 
 import re
-from collections.abc import Iterable
-from functools import cache
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import Dialect
-from toolpath_stiff.nc.lathes import lathe_program
+from toolpath_stiff.nc.moves import Moves, Remark
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.state import LATHE_HINT
 
 # Of cutter-location files, which are not blocks of words: what tells them from G code is known here, their own
 # reader is loaded for them alone.
@@ -25,8 +29,6 @@ _SIEMENS = "Siemens' own language (Sinumerik)"
 _ISG = "ISG's own language (Beckhoff TwinCAT CNC)"
 _ACRAMATIC = "the language of Acramatic controls (Cincinnati, Vickers)"
 _SUB = "neither LinuxCNC's language (o<name> sub) nor Fanuc's"
-
-
 HINTS = {
     _HEIDENHAIN: "post it as ISO G code, in X, Y, Z, A, B, C of the tool tip",
     _SIEMENS: "post it as ISO G code: no frames (TRANS, ROT), no CYCLE calls, no variables, no X=... words",
@@ -34,11 +36,7 @@ HINTS = {
     _ACRAMATIC: "post it as ISO G code of Fanuc's or LinuxCNC's kind",
     _SUB: "post it as ISO G code, or write its subprograms as LinuxCNC's O words",
 }
-
-
 LONGEST_SIGN = 200  # characters of a line that are looked at
-
-
 # What no G code of the controls read here has at the beginning of a block, blanks and N words apart.
 _SIGNS = (
     (_HEIDENHAIN, r"BEGIN\s+PGM\b"),
@@ -56,11 +54,23 @@ _SIGNS = (
 )
 
 
-@cache
-def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    """Language and pattern of each sign: most programs need none of them."""
-    number = r"\s*(?:N\d+\s+|\d+\s+)?"
-    return tuple((what, re.compile(f"{number}(?:{sign})", re.IGNORECASE)) for what, sign in _SIGNS)
+_PATTERNS = [(what, re.compile(rf"\s*(?:N\d+\s+|\d+\s+)?(?:{sign})", re.IGNORECASE)) for what, sign in _SIGNS]
+
+LATHE_LINES = 2000  # lines: a lathe's program shows what it is at its beginning
+_NO_CODE = re.compile(r"\([^)]*\)?|;.*|<[^>]*>")  # comments, names
+_M6, _Y = r"M0*6(?![\d.])", r"(?<![A-Z])Y[-+]?[\d.#\[]"
+_CYCLE = r"G8[1-9](?![\d.])"  # of a mill, which G99 belongs to
+_OTHER_U = r"^(?!.*G(?:0*(?:28|30)|6[56])(?![\d.])).*"  # not homes, nor arguments of a macro
+# Fanuc, operator's manuals of lathes, G-code system A: T has the tool and its offset, U and W are X and Z in steps,
+# G98 and G99 the feed per minute and per revolution. A sign, its pattern, what the program then has not, and has too.
+LATHE_SIGNS = (
+    ("T with four digits and no M6", r"T\d{4}(?![\d.])", _M6, ""),
+    ("G18 and never Y", r"G18(?![\d.])", _Y, ""),
+    ("a U or W word", _OTHER_U + r"(?<![A-Z])[UW][-+]?[\d.#\[]", "", ""),
+    ("G28 with U or W", r"G0*(?:28|30)(?![\d.]).*[UW][-+]?[\d.]", "", ""),
+    ("G99 and a feed below 1 a revolution", r"(?<![A-Z])F0*\.\d*[1-9]", _CYCLE, r"G99(?![\d.])"),
+    ("G96 and never Y", r"G96(?![\d.])", _Y, ""),
+)
 
 
 def language_of(line: str) -> str | None:
@@ -73,7 +83,7 @@ def language_of(line: str) -> str | None:
     >>> language_of("G1 X10 Y20")
     """
     head = line.lstrip()[:LONGEST_SIGN]
-    return next((what for what, pattern in _patterns() if pattern.match(head)), None)
+    return next((what for what, pattern in _PATTERNS if pattern.match(head)), None)
 
 
 def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = None) -> InputError | None:
@@ -107,19 +117,51 @@ def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
     """
     if name.lower().endswith(EXTENSIONS):
         return True
-    seen = 0
-    for line in lines:
-        text = line.strip()
-        if not text or text.startswith("$$"):
-            continue
-        if STATEMENT.match(text):
-            return True
-        seen += 1
-        if seen >= HEAD_LINES:
-            break
-    return False
+    texts = (line for line in lines if line.strip() and not line.lstrip().startswith("$$"))
+    return any_statement(islice(texts, HEAD_LINES))
 
 
 def any_statement(lines: Iterable[str]) -> bool:
     """Whether any of these lines is a statement that no other text looks like."""
     return any(STATEMENT.match(line) for line in lines)
+
+
+def lathe_program(lines: Sequence[str], name: str) -> InputError | None:
+    """The error for a lathe's program; None where not two signs are there.
+
+    Examples
+    --------
+    >>> print(lathe_program(("G28 U0 W0", "T0101", "G1 X20. F200"), "shaft.nc"))  # doctest: +ELLIPSIS
+    shaft.nc:1: a lathe's program: G28 with U or W (line 1), T with four digits and no M6 (line 2); expected ...
+    >>> lathe_program(("G28 U0 W0", "T1 M6", "G1 X20. F200"), "plate.nc")
+    """
+    signs = _lathe_signs(lines[:LATHE_LINES])
+    if len(signs) > 1 and len(lines) > LATHE_LINES:
+        signs = _lathe_signs(lines)
+    if len(signs) < 2:
+        return None
+    return Place(name, signs[0][0]).fail(
+        f"a lathe's program: {', '.join(f'{what} (line {line})' for line, what in signs)}",
+        "a mill's: on a lathe X is a diameter",
+        f"{LATHE_HINT}; one of LinuxCNC's lathes, whose X is a radius (G8), is read with --dialect linuxcnc",
+    )
+
+
+def _lathe_signs(lines: Iterable[str]) -> list[tuple[int, str]]:
+    """Line (from 1) and name of each sign, in the order of lines."""
+    text = "\n".join("".join(_NO_CODE.sub(" ", line).split()).upper() for line in lines)
+    signs = []
+    for what, pattern, nowhere, beside in LATHE_SIGNS:
+        sign = re.search(pattern, text, re.MULTILINE)
+        if sign and not (nowhere and re.search(nowhere, text)) and re.search(beside, text):
+            signs.append((text.count("\n", 0, sign.start()) + 1, what))
+    return sorted(signs)
+
+
+def lathe_warning(signs: Mapping[str, int], moves: Moves | None) -> list[Remark]:
+    """What makes a program look like a lathe's (with its line), if nothing of it ever moves along Y."""
+    if moves is None or not signs or (moves.start[:, 1] != moves.end[:, 1]).any() or moves.arc_normal[:, 2].any():
+        return []
+    what, line = next(iter(signs.items()))
+    text = f"{what} and no move along Y: this looks like a lathe's program. X is read as a position; "
+    return [Remark(f"{text}where it is a diameter, the path is wrong", line)]

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolpath_stiff.arrays import IntArray
-from toolpath_stiff.nc.moves import RAPID, Jump, Moves, ReadProgram
+from toolpath_stiff.nc.moves import RAPID, ReadProgram
 
 NAMED, MARKED, TOOL = "named", "marked", "tool"
 
@@ -185,8 +185,7 @@ def operations(program: ReadProgram) -> Operations:
     title, heads = "", [Heading(*mark, MARKED) for mark in marks or ()]
     if marks is None:
         title, heads = _title_and_headings(program.source)
-    way = _Way(program.source, moves, program.jumps)
-    begins = _beginnings(way, moves, cuts, heads, MOST_OPERATIONS) or _beginnings(way, moves, cuts, [])
+    begins = _beginnings(program, cuts, heads)
     first = [begin.move for begin in begins]
     remarks = {tool.number: tool.remark for tool in program.tools}
     names = [_name(begin, title, remarks, alone=len(begins) == 1) or program.name for begin in begins]
@@ -237,79 +236,57 @@ def _title_and_headings(lines: Sequence[str]) -> tuple[str, list[Heading]]:
 
 
 class _Way:
-    """The lines that a run passes between two moves, as stretches: their first line left out, their last one in it."""
+    """What a run passes between two moves: lines, and headings."""
 
-    def __init__(self, lines: Sequence[str], moves: Moves, jumps: Sequence[Jump]) -> None:
-        self.lines, self.jumps = lines, jumps
-        self.line = np.concatenate([[0], moves.line])  # that of move i is at i + 1
-        self.jump_moves = np.array([jump.moves for jump in jumps], dtype=np.int64)
+    def __init__(self, program: ReadProgram, heads: Sequence[Heading]) -> None:
+        self.jumps = program.jumps
+        self.line = np.concatenate([[0], program.moves.line])  # that of move i is at i + 1
+        self.jump_moves = np.array([jump.moves for jump in self.jumps], dtype=np.int64)
+        self.head_lines = np.array([head.line for head in heads], dtype=np.int64)
 
-    def passed(self, last: int, move: int) -> list[tuple[int, int]]:
-        """From move `last` (-1: from the start of the file) to a later one."""
-        start, end = int(self.line[last + 1]), int(self.line[move + 1])
+    def stretches(self, last: int, move: int) -> list[tuple[int, int]]:
+        """Lines from move `last` (-1: the start of the file) to a later one: the first left out, the last in it."""
+        stretches, start = [], int(self.line[last + 1])
         first, stop = np.searchsorted(self.jump_moves, [last + 1, move + 1]).tolist()
-        stretches = []
         for jump in self.jumps[first:stop]:
             stretches.append((start, jump.left))
             start = jump.after
-        return [*stretches, (start, end)]
+        return [*stretches, (start, int(self.line[move + 1]))]
+
+    def headings(self, last: int, move: int) -> list[int]:
+        """Rows of the headings, in the order of the run."""
+        ends = np.searchsorted(self.head_lines, self.stretches(last, move), side="right").tolist()
+        return [row for low, high in ends for row in range(low, high)]
+
+    def events(self, moves: IntArray) -> IntArray:
+        """Headings above the lines of moves, jumps before them: where neither grows the run passes no heading."""
+        above = np.searchsorted(self.head_lines, self.line[moves + 1], side="right")
+        return np.stack([above, np.searchsorted(self.jump_moves, moves + 1)])
 
 
-def _beginnings(
-    way: _Way, moves: Moves, cuts: IntArray, heads: list[Heading], most: float = np.inf
-) -> list[_Beginning]:
-    """One for every cut before which a heading is passed or the tool changes, and one for the first cut.
-
-    None at all if there are more than `most`.
-    """
-    seen = _headings_passed(way, heads)
-    changes = set((np.flatnonzero(np.diff(moves.tool) != 0) + 1).tolist())
-    events = sorted(changes.union(seen))
-    next_cut = np.searchsorted(cuts, events)
-    tool = int(moves.tool[cuts[0]])
-    change = _tool_change(way.lines, way.passed(-1, int(cuts[0]))) if tool else None
-    begins = [_Beginning(0, [], tool, change)]
-    # Cuts (rows of `cuts`) that the running operation, and what stands before the next cut, begin with.
-    current = gap = 0
+def _beginnings(program: ReadProgram, cuts: IntArray, heads: list[Heading]) -> list[_Beginning]:
+    """One for every cut before which a heading is passed or the tool changes, and one for the first cut."""
+    way, tools, before_cuts = _Way(program, heads), program.moves.tool, np.array([-1, *cuts[:-1]])
+    eventful = (way.events(before_cuts) != way.events(cuts)).any(axis=0) | (tools[before_cuts] != tools[cuts])
+    eventful[0] = True
+    begins: list[_Beginning] = []
     known: set[int] = set()  # headings passed where the running operation began: passed again, they begin none
-    before, passed = known, set[int]()
-    for event, ordinal in zip(events, next_cut.tolist(), strict=True):
-        if ordinal == len(cuts):
-            break  # nothing is cut after it
-        if len(begins) > most:
-            return []
-        rows = seen.get(event, [])
-        if ordinal != gap:
-            gap, before, passed = ordinal, known, set()
-        passed.update(rows)
-        fresh = [heads[row] for row in rows if row not in before]
-        if ordinal == current:
-            begins[-1].heads += fresh
-            known = passed
+    for last, cut in zip(before_cuts[eventful].tolist(), cuts[eventful].tolist(), strict=True):
+        if heads and len(begins) > MOST_OPERATIONS:
+            return _beginnings(program, cuts, [])
+        passed, tool = way.headings(last, cut), int(tools[cut])
+        fresh = [row for row in dict.fromkeys(passed) if row not in known]
+        another = tool != (0 if last < 0 else tools[last])
+        if last >= 0 and not fresh and not another:
             continue
-        tool, last = int(moves.tool[cuts[ordinal]]), int(moves.tool[cuts[ordinal - 1]])
-        if not fresh and tool == last:
-            continue
-        stretches = [] if tool == last else way.passed(int(cuts[ordinal - 1]), int(cuts[ordinal]))
-        change = _tool_change(way.lines, stretches) if stretches else None
-        begins.append(_Beginning(event, fresh, tool, change))
-        current, known = ordinal, passed
-    return begins if len(begins) <= most else []
-
-
-def _headings_passed(way: _Way, heads: list[Heading]) -> dict[int, Sequence[int]]:
-    """Move -> headings (rows of `heads`) passed right before it."""
-    if not heads:
-        return {}
-    lines = np.array([head.line for head in heads], dtype=np.int64)
-    below = np.searchsorted(lines, way.line, side="right")
-    seen: dict[int, Sequence[int]] = {}
-    for move in np.flatnonzero(np.diff(below)).tolist():
-        seen[move] = range(below[move], below[move + 1])
-    for move in np.unique(way.jump_moves[way.jump_moves < len(below) - 1]).tolist():
-        spans = [np.searchsorted(lines, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
-        seen[move] = [row for low, high in spans for row in range(low, high)]
-    return seen
+        first = 0
+        if last >= 0:
+            gap = range(last + 1, cut + 1)
+            first = next(m for m in gap if tools[m] != tools[m - 1] or {*fresh} & {*way.headings(m - 1, m)})
+        change = _tool_change(program.source, way.stretches(last, cut)) if another else None
+        begins.append(_Beginning(first, [heads[row] for row in fresh], tool, change))
+        known = set(passed)
+    return begins
 
 
 def _tool_change(lines: Sequence[str], stretches: list[tuple[int, int]]) -> tuple[int, str]:
@@ -326,9 +303,7 @@ def _tool_change(lines: Sequence[str], stretches: list[tuple[int, int]]) -> tupl
 
 def _name(begin: _Beginning, title: str, remarks: dict[int, str], alone: bool) -> str:
     """The name: what the post marks, else the first heading, else the tool; of a lone one rather the title, or ""."""
-    names: dict[str, list[str]] = {MARKED: [], NAMED: [], TOOL: []}
-    for head in begin.heads:
-        names[head.kind].append(head.name)
+    names = {kind: [head.name for head in begin.heads if head.kind == kind] for kind in (MARKED, NAMED, TOOL)}
     if names[MARKED]:
         return names[MARKED][-1]
     if names[NAMED]:

@@ -106,7 +106,7 @@ def switched(frames: Frames, tool_length: float, hold: bool) -> list[float]:
     # The tip of four points of the linear axes: it moves with them as one body.
     corners = np.concatenate([np.zeros((1, 3)), np.eye(3)])
     abc = np.tile(rad_from_deg(np.array(frames.position[3:])), (4, 1))
-    tips = mm_from_m(tool_poses(frames.posted, m_from_mm(corners), abc, m_from_mm(tool_length)).tip)
+    tips = mm_from_m(tool_poses(frames.posted, m_from_mm(corners), abc, m_from_mm(tool_length))[0])
     turn = (tips[1:] - tips[0]).T
     moved = tips[0] + turn @ point if hold else turn.T @ (point - tips[0])
     return [*(float(m) + s for m, s in zip(moved, shift, strict=True)), *frames.position[3:]]

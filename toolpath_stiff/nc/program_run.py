@@ -49,8 +49,6 @@ class Subprogram:
         The local variables with which each of its runs begins; None: it has those of its caller.
     modal
         Whether G66 calls it.
-    counts
-        Repeats left of its loops, by line.
     """
 
     name: str
@@ -59,7 +57,6 @@ class Subprogram:
     again: int
     arguments: dict[int, float | None] | None = None
     modal: bool = False
-    counts: dict[int, int] = field(default_factory=dict)
 
 
 @dataclass

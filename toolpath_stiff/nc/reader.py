@@ -10,8 +10,12 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.increments import increments_hint
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
-from toolpath_stiff.nc.languages import foreign_program, looks_like_cutter_location, refused_program
-from toolpath_stiff.nc.lathes import lathe_warning
+from toolpath_stiff.nc.languages import (
+    foreign_program,
+    lathe_warning,
+    looks_like_cutter_location,
+    refused_program,
+)
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
 from toolpath_stiff.nc.moves import RAPID, ReadProgram, Remark

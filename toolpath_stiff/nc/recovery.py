@@ -6,7 +6,7 @@ axes.
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,17 +18,8 @@ from toolpath_stiff.nc.place import Place
 from toolpath_stiff.units import deg_from_rad, mm_from_m, rad_from_deg
 
 AXIS_STEP = rad_from_deg(1.0)  # largest turn of the rotary axes in one piece
-
-
 SAME_PLACE = 1e-12  # m and rad: rounding, not motion
-
-
 MOST_PIECES = 5_000_000
-
-
-MOVES_AT_A_TIME = 50_000  # the columns in between are several times those of the moves
-
-
 HALF_TURN = math.pi * (1.0 + 1e-9)
 
 
@@ -74,24 +65,7 @@ def recover_moves(
     moves = _shorter_way(moves, kinematics)
     held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(moves),))
     length = _lengths_at_heads(moves, kinematics, held, tool_lengths, name)
-    some = [slice(first, first + MOVES_AT_A_TIME) for first in range(0, len(moves), MOVES_AT_A_TIME)]
-    count = np.concatenate([_pieces(moves.take(rows), kinematics, held[rows], length[rows]) for rows in some])
-    _check_pieces(count, moves, kinematics, name)
-    lines, moves = moves.line, replace(moves, line=np.arange(len(moves)))
-    recovered, filled = _room(moves, int(count.sum())), 0
-    before: FloatArray | None = None
-    for rows in some:
-        part, before, waited = _divided(moves.take(rows), kinematics, held[rows], length[rows], count[rows], before)
-        if filled:  # a pause before the first move is none
-            recovered.dwell[filled - 1] += waited
-        for column in fields(Moves):
-            getattr(recovered, column.name)[filled : filled + len(part)] = getattr(part, column.name)
-        filled += len(part)
-    recovered = recovered.take(slice(0, filled))
-    return replace(recovered, line=lines[recovered.line]), recovered.line
-
-
-def _check_pieces(count: IntArray, moves: Moves, kinematics: PostedKinematics, name: str) -> None:
+    count = _pieces(moves, kinematics, held, length)
     if count.sum() > MOST_PIECES:
         raise Place(name, int(moves.line[np.argmax(count)])).fail(
             f"dividing moves with turning axes within {mm_from_m(kinematics.tolerance):g} mm gives "
@@ -99,34 +73,18 @@ def _check_pieces(count: IntArray, moves: Moves, kinematics: PostedKinematics, n
             f"at most {MOST_PIECES}",
             "give a larger kinematics.tolerance_mm in the controller file",
         )
-
-
-def _divided(
-    moves: Moves,
-    kinematics: PostedKinematics,
-    held: BoolArray,
-    length: FloatArray,
-    count: IntArray,
-    before: FloatArray | None,
-) -> tuple[Moves, FloatArray, float]:
-    """Some moves on the part; the pose at their end, `before` of the next ones; the time before the first one, s."""
     move = np.repeat(np.arange(len(moves)), count + 1)
     step = np.arange(len(move)) - np.repeat(np.cumsum(count + 1) - (count + 1), count + 1)
-    u = step / count[move]
-    last = step == count[move]
-    programmed = points_along(moves, move, u)[0]
-    angles = moves.start[move, 3:] + u[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
+    share, last = step / count[move], step == count[move]
+    angles = moves.start[move, 3:] + share[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
     angles[last] = moves.end[:, 3:]
-    tool = tool_poses(kinematics, programmed, angles, length[move], held[move])
+    tip, axis = tool_poses(kinematics, points_along(moves, move, share)[0], angles, length[move], held[move])
     pose = np.zeros((len(move), 6))
-    pose[:, :3] = _without_rounding(tool.tip, None if before is None else before[:3])
-    pitch = 0.0 if before is None else float(before[4])
-    pose[:, 3:5] = _without_rounding(roll_pitch(tool.axis, pitch), None if before is None else before[3:5])
+    pose[:, :3], pose[:, 3:5] = _without_rounding(tip), _without_rounding(roll_pitch(axis))
     start, end = np.flatnonzero(~last), np.flatnonzero(step > 0)
-    pieces = _on_the_part(moves, kinematics, held, length, move[start], u[start])
+    pieces = _on_the_part(moves, kinematics, held, length, move[start], share[start])
     pieces = replace(pieces, start=pose[start], end=pose[end])
-    part, waited = _with_times(pieces, moves, move[start], count, last[end])
-    return part, pose[-1], waited
+    return _with_times(pieces, moves, move[start], count, last[end])
 
 
 def turns_far(moves: Moves, kinematics: PostedKinematics) -> list[tuple[int, str, float]]:
@@ -153,11 +111,8 @@ def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> Non
 
 def _shorter_way(moves: Moves, kinematics: PostedKinematics) -> Moves:
     """Axes with roll-over go to their angle the shorter way; where they stand then is the same."""
-    rolling = [3 + axis.column for axis in kinematics.axes if axis.rollover]
-    if not rolling:
-        return moves
     end = moves.end.copy()
-    for column in rolling:
+    for column in (3 + axis.column for axis in kinematics.axes if axis.rollover):
         turn = end[:, column] - moves.start[:, column]
         far = np.abs(turn) > math.pi
         end[far, column] -= (2.0 * math.pi * np.round(turn / (2.0 * math.pi)))[far]
@@ -243,21 +198,19 @@ def _linear_bounds(moves: Moves) -> tuple[FloatArray, FloatArray]:
     """(n,) m, bounds of |X'| and |X''| of the linear axes over a move that runs from 0 to 1."""
     speed, bend = move_lengths(moves), np.zeros(len(moves))
     arcs = np.flatnonzero(moves.arc_sweep != 0.0)
-    if len(arcs):
-        frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
-        radius = np.maximum(frame.radius_start, frame.radius_end)
-        growth = np.abs(frame.radius_end - frame.radius_start)
-        bend[arcs] = radius * sweep**2 + 2.0 * growth * sweep
-        speed[arcs] = np.sqrt((radius * sweep) ** 2 + growth**2 + frame.climb**2)
+    frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
+    radius = np.maximum(frame.radius_start, frame.radius_end)
+    growth = np.abs(frame.radius_end - frame.radius_start)
+    bend[arcs] = radius * sweep**2 + 2.0 * growth * sweep
+    speed[arcs] = np.sqrt((radius * sweep) ** 2 + growth**2 + frame.climb**2)
     return speed, bend
 
 
-def _without_rounding(points: FloatArray, before: FloatArray | None) -> FloatArray:
+def _without_rounding(points: FloatArray) -> FloatArray:
     """Points (n, k) in which a step below `SAME_PLACE` is none: the point before stands in its place."""
-    points = np.concatenate([points[:1] if before is None else before[None], points])
     moved = np.ones(len(points), dtype=bool)
     moved[1:] = (np.abs(np.diff(points, axis=0)) > SAME_PLACE).any(axis=1)
-    return points[np.maximum.accumulate(np.where(moved, np.arange(len(points)), 0))[1:]]
+    return points[np.maximum.accumulate(np.where(moved, np.arange(len(points)), 0))]
 
 
 def _on_the_part(
@@ -272,16 +225,12 @@ def _on_the_part(
     arc = moves.arc_sweep != 0.0
     turning = (_turning(moves) > 0.0).any(axis=1)
     stays = arc & (~turning | held)
-    center, normal = moves.arc_center, moves.arc_normal
+    center, normal = moves.arc_center.copy(), moves.arc_normal.copy()
+    # Turned as a whole: the centre as a point of the linear axes, the normal as the way to another one.
     rows = np.flatnonzero(stays & ~held)
-    if len(rows):
-        # Turned as a whole: the centre as a point of the linear axes, the normal as the way to another one.
-        abc = moves.start[rows, 3:]
-        here, there = (
-            tool_poses(kinematics, center[rows] + along, abc, length[rows]).tip for along in (0.0, normal[rows])
-        )
-        center, normal = center.copy(), normal.copy()
-        center[rows], normal[rows] = here, (there - here) / np.linalg.norm(there - here, axis=1)[:, None]
+    abc = moves.start[rows, 3:]
+    here, there = (tool_poses(kinematics, center[rows] + along, abc, length[rows])[0] for along in (0.0, normal[rows]))
+    center[rows], normal[rows] = here, (there - here) / np.linalg.norm(there - here, axis=1)[:, None]
     rows, climb = np.flatnonzero(stays), np.zeros(len(moves))
     climb[rows] = arc_frame(moves, rows).climb
     risen = center[move] + (climb[move] * share)[:, None] * normal[move]  # the plane of the piece's start
@@ -296,10 +245,12 @@ def _on_the_part(
     )
 
 
-def _with_times(pieces: Moves, moves: Moves, move: IntArray, count: IntArray, last: BoolArray) -> tuple[Moves, float]:
-    """The pieces that move tip or tool axis, with feeds and dwells that keep the time of every move.
+def _with_times(
+    pieces: Moves, moves: Moves, move: IntArray, count: IntArray, last: BoolArray
+) -> tuple[Moves, IntArray]:
+    """The pieces that move tip or tool axis, and the moves that they are of.
 
-    And the time, s, before the first of them.
+    Feeds and dwells keep the time of every move; a pause before the first one is none.
     """
     length, turn = move_lengths(moves), _turning(moves).max(axis=1)
     share = (np.where(length > 0.0, length, turn) / moves.feed / count)[move]  # s; nan: a rapid
@@ -307,14 +258,7 @@ def _with_times(pieces: Moves, moves: Moves, move: IntArray, count: IntArray, la
     # Where the tip on the part runs as far as the axes do (tool centre point control, or none turns): as programmed.
     same = (way > 0.0) & np.isclose(way * count[move], length[move], rtol=1e-9, atol=0.0)
     way = np.where(way > 0.0, way, _turning(pieces).max(axis=1))
-    feed = np.where(same, pieces.feed, way / share)
-    kept = way > 0.0
+    feed, kept = np.where(same, pieces.feed, way / share), way > 0.0
     waits = np.where(last, moves.dwell[move], 0.0) + np.where(kept, 0.0, np.nan_to_num(share))
     dwell = np.bincount(np.cumsum(kept), waits, int(kept.sum()) + 1).astype(float)
-    return replace(replace(pieces, feed=feed).take(kept), dwell=dwell[1:]), float(dwell[0])
-
-
-def _room(like: Moves, n: int) -> Moves:
-    """Columns of n rows, to be filled."""
-    columns = {f.name: getattr(like, f.name) for f in fields(Moves)}
-    return Moves(**{name: np.empty((n, *column.shape[1:]), column.dtype) for name, column in columns.items()})
+    return replace(replace(pieces, feed=feed).take(kept), dwell=dwell[1:]), move[kept]

@@ -4,7 +4,6 @@ import copy
 from dataclasses import dataclass
 from functools import cached_property
 
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Remark
@@ -14,8 +13,7 @@ from toolpath_stiff.units import Pose, ShopPose, pose_in_mm
 
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 ORIGIN_WINS = Remark(
-    f"the program or the offsets file sets G54; {both_names('--origin')} overrides it, other offsets keep their "
-    "distance to it"
+    "the program or the offsets file sets G54; --origin overrides it, other offsets keep their distance to it"
 )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from toolpath_stiff.errors import FileError, InputError, ProgramError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.nc.place import Place
@@ -97,7 +97,7 @@ class Offsets:
 def _text(path: str | Path, what: str) -> str:
     try:
         text = read_bytes(path, what, LARGEST_BYTES).decode("utf-8-sig")
-    except FileError as error:
+    except InputError as error:
         raise ProgramError(error.found, hint=error.hint) from None
     except UnicodeDecodeError:
         raise ProgramError(f"{what} is not a text file", file=str(path)) from None

@@ -64,9 +64,7 @@ def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
     [[0.0, 10.0, 0.0]]
     """
     angles = np.asarray(origin, dtype=float)[3:]
-    if not angles.any():
+    if not angles.any() or not (angles[:2].any() or abc.any()):  # a vertical platform never yaws
         return abc
-    if not angles[:2].any() and not abc.any():
-        return abc  # a vertical platform never yaws
     turn, back = rotation_matrices(angles), rotation_about_z(-angles[2])
     return roll_pitch_yaw(product(product(turn, rotation_matrices(abc)), back))

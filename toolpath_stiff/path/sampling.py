@@ -6,16 +6,15 @@ Samples follow the true path: lines, arcs, helices, spirals; all moves at once.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves, held_once
 from toolpath_stiff.path.placing import place_orientations
@@ -31,7 +30,7 @@ MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mis
 
 
 @dataclass(frozen=True, repr=False)
-class Samples:
+class Samples(ArrayColumns):
     r"""Columns over n samples along the true path, in machine coordinates.
 
     Every move has samples at both of its ends, so a corner appears twice: once as the end of a move, with
@@ -97,10 +96,6 @@ class Samples:
         """(n,) samples that count in the statistics: not of a rapid."""
         return np.asarray(self.motion != 0)
 
-    def take(self, index: IntArray | BoolArray | slice) -> Samples:
-        """The samples at `index` (integers, a mask or a slice)."""
-        return Samples(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
-
 
 def move_durations(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> FloatArray:
     r"""(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s.
@@ -112,7 +107,11 @@ def move_durations(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Flo
     >>> move_durations(moves).round(3).tolist()  # s; the rapid at 10 m/min
     [0.03, 0.5, 4.0]
     """
-    return _durations(moves, move_lengths(moves), _turn(moves), rapid_feed)
+    length, rapid = move_lengths(moves), moves.motion == RAPID
+    feed = np.where(rapid, rapid_feed, moves.feed)
+    # A move of the rotary axes alone takes its turn over its feed (rad/s); rapid ones take no time.
+    distance = np.where(length > 0.0, length, np.where(rapid, 0.0, _turn(moves)))
+    return np.asarray(distance / np.where(feed > 0.0, feed, 1.0))
 
 
 def sample_moves(
@@ -154,29 +153,26 @@ def sample_moves(
     [0.0, 1.571, 3.142]
     """
     length = move_lengths(moves)
-    turn = _turn(moves)
-    pieces = _pieces(moves, length, turn, step)
+    pieces = _pieces(moves, length, step)
     border = _plunge_borders(moves, pieces, length, origin)
     counts = pieces.astype(np.int64) + 1 + np.bincount(border[0], minlength=len(moves))
-    duration = _durations(moves, length, turn, rapid_feed)
-    cutting = moves.motion != RAPID
+    duration = move_durations(moves, rapid_feed)
     columns = {
         "length": length,
         "duration": duration,
         "length_before": np.cumsum(length) - length,
         "time_before": np.cumsum(duration + moves.dwell) - (duration + moves.dwell),
-        "piece": np.where(cutting, length / pieces, 0.0),
+        "piece": np.where(moves.motion != RAPID, length / pieces, 0.0),
         "pieces": pieces,
     }
-    samples = _empty_samples(int(counts.sum()))
-    first_sample = 0
+    ends = np.cumsum(counts)
+    samples = _empty_samples(int(ends[-1]) if len(ends) else 0)
     for block in _blocks(counts):
-        rows = slice(first_sample, first_sample + int(counts[block].sum()))
+        rows = slice(ends[block.start] - counts[block.start], ends[block.stop - 1])
         some = {name: column[block] for name, column in columns.items()}
         put = slice(*np.searchsorted(border[0], (block.start, block.stop)))
         extra = border[0][put] - block.start, border[1][put]
         _sample_block(moves.take(block), counts[block], some, extra, block.start, origin, samples.take(rows))
-        first_sample = rows.stop
     return replace(samples, tool=held_once(samples.tool), tool_length=held_once(samples.tool_length))
 
 
@@ -206,33 +202,31 @@ def _plunge_borders(
     # A plunge within a small arc may be narrower than the step.
     finer = np.maximum(np.ceil(np.abs(moves.arc_sweep[rows]) / ANGULAR_STEP / pieces[rows]), 1.0).astype(np.int64)
     counts = finer * pieces[rows].astype(np.int64)
-    parts = [
-        _borders_of_block(moves.take(rows[block]), counts[block], finer[block], origin) for block in _blocks(counts + 1)
+    borders = [
+        _borders_of_block(moves, rows[block], counts[block], finer[block], origin) for block in _blocks(counts + 1)
     ]
-    which = [rows[block][part[0]] for block, part in zip(_blocks(counts + 1), parts, strict=True)]
     return (
-        np.concatenate([np.empty(0, dtype=np.int64), *which]),
-        np.concatenate([np.empty(0), *(part[1] for part in parts)]),
+        np.concatenate([np.empty(0, dtype=np.int64), *(move for move, _ in borders)]),
+        np.concatenate([np.empty(0), *(share for _, share in borders)]),
     )
 
 
 def _borders_of_block(
-    moves: Moves, counts: IntArray, finer: IntArray, origin: ArrayLike
+    moves: Moves, rows: IntArray, counts: IntArray, finer: IntArray, origin: ArrayLike
 ) -> tuple[IntArray, FloatArray]:
-    """The same of moves divided into `counts` pieces, of which `finer` lie between two samples."""
-    move = np.repeat(np.arange(len(moves)), counts + 1)
+    """The same of some moves divided into `counts` pieces, of which `finer` lie between two samples."""
+    moves, move = moves.take(rows), np.repeat(np.arange(len(rows)), counts + 1)
     index = np.arange(len(move)) - np.repeat(np.cumsum(counts + 1) - counts - 1, counts + 1)
     plunge = np.abs(_along(moves, move, index / counts[move], origin)) >= BORDER
     before = np.flatnonzero((plunge[1:] != plunge[:-1]) & (move[1:] == move[:-1]))
     move, cut = move[before], index[before + plunge[before]]
     inner, outer = index[before + ~plunge[before]] / counts[move], cut / counts[move]
-    first = outer.copy()
     for _ in range(HALVINGS):
         middle = 0.5 * (inner + outer)
         plunges = np.abs(_along(moves, move, middle, origin)) >= BORDER
         inner, outer = np.where(plunges, middle, inner), np.where(plunges, outer, middle)
-    new = (outer != first) | (cut % finer[move] != 0)  # else it is a sample anyway
-    return move[new], outer[new]
+    new = (outer != cut / counts[move]) | (cut % finer[move] != 0)  # else it is a sample anyway
+    return rows[move[new]], outer[new]
 
 
 def _along(moves: Moves, move: IntArray, u: FloatArray, origin: ArrayLike) -> FloatArray:
@@ -247,17 +241,17 @@ def _turn(moves: Moves) -> FloatArray:
     return np.asarray(np.maximum.reduce([np.abs(moves.end[:, axis] - moves.start[:, axis]) for axis in (3, 4, 5)]))
 
 
-def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> FloatArray:
+def _pieces(moves: Moves, length: FloatArray, step: float) -> FloatArray:
     """(n,) whole numbers from 1, into how many pieces the samples divide each move. Raises `InputError`."""
     # A length that is a whole number of steps up to rounding must not gain a step.
-    pieces = np.maximum(np.ceil(length * _fastest_part(moves) / step - 1e-9), np.ceil(turn / ANGULAR_STEP - 1e-9))
-    pieces = np.maximum(pieces, 1.0)
+    steps, turns = length * _fastest_part(moves) / step, _turn(moves) / ANGULAR_STEP
+    pieces = np.maximum(np.maximum(np.ceil(steps - 1e-9), np.ceil(turns - 1e-9)), 1.0)
     total = float(pieces.sum()) + len(moves)
     if total > MOST_SAMPLES:
         raise ProgramError(
             f"a step of {mm_from_m(step):g} mm gives {total:.0f} samples",
             expected=f"at most {MOST_SAMPLES}",
-            hint=f"use {both_names('--step', f'{mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g}')} or more",
+            hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",
         )
     return np.asarray(pieces)
 
@@ -300,8 +294,7 @@ def _sample_block(
         getattr(into, name)[:] = np.repeat(getattr(moves, name), counts)
     into.s[:] = np.repeat(columns["length_before"], counts) + u * np.repeat(columns["length"], counts)
     into.t[:] = np.repeat(columns["time_before"], counts) + u * np.repeat(columns["duration"], counts)
-    into.weight[:] = np.repeat(columns["piece"], counts)
-    into.weight[u == 0.0] *= 0.5
+    into.weight[:] = np.repeat(columns["piece"], counts) * np.where(u == 0.0, 0.5, 1.0)
     into.weight[last] *= 0.5
     if len(border[0]):
         before = np.maximum(np.diff(u, prepend=0.0), 0.0)  # 0 at the first sample of a move
@@ -315,19 +308,10 @@ def _sample_block(
 
 def _fastest_part(moves: Moves) -> FloatArray:
     """(n,) greatest speed along a move over its mean speed: above 1 only where the radii of an arc differ."""
-    ratio = np.ones(len(moves))
-    arcs = np.flatnonzero(moves.arc_sweep != 0.0)
-    if len(arcs):
-        frame = arc_frame(moves, arcs)
-        radii = np.stack([frame.radius_start, frame.radius_end])
-        # Equal radii differ by rounding only; they must not gain a step either.
-        spiral = np.abs(radii[1] - radii[0]) > 1e-9 * radii.max(axis=0)
-        ratio[arcs[spiral]] = (radii.max(axis=0) / radii.mean(axis=0))[spiral]
+    ratio, arcs = np.ones(len(moves)), np.flatnonzero(moves.arc_sweep != 0.0)
+    frame = arc_frame(moves, arcs)
+    radii = np.stack([frame.radius_start, frame.radius_end])
+    # Equal radii differ by rounding only; they must not gain a step either.
+    spiral = np.abs(radii[1] - radii[0]) > 1e-9 * radii.max(axis=0)
+    ratio[arcs[spiral]] = (radii.max(axis=0) / radii.mean(axis=0))[spiral]
     return ratio
-
-
-def _durations(moves: Moves, length: FloatArray, turn: FloatArray, rapid_feed: float) -> FloatArray:
-    """(n,) s. A move of the rotary axes alone takes its turn over its feed (rad/s); rapid ones take no time."""
-    feed = np.where(moves.motion == RAPID, rapid_feed, moves.feed)
-    distance = np.where(length > 0.0, length, np.where(moves.motion == RAPID, 0.0, turn))
-    return np.asarray(distance / np.where(feed > 0.0, feed, 1.0))

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.column_files import csv_pieces
+from toolpath_stiff.documents import to_dict, without_nan
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.path.sampling import Samples
-from toolpath_stiff.results import Result
+from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
 
 if TYPE_CHECKING:
@@ -93,19 +94,12 @@ class SampledPath(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
-        columns = self.to_frame()
-        return {
-            "program": self.name,
-            "warnings": self.warnings,
-            "unsupported": self.unsupported,
-            **{str(name): columns[name].astype(object).where(columns[name].notna(), None).tolist() for name in columns},
-        }
+        columns = without_nan(to_dict(path_columns(self.samples)))
+        return {"program": self.name, "warnings": self.warnings, "unsupported": self.unsupported, **columns}
 
     def to_frame(self) -> pd.DataFrame:
         """The samples, one a row."""
-        import pandas as pd
-
-        return pd.DataFrame(path_columns(self.samples))
+        return frame_of(path_columns(self.samples))
 
     def csv(self) -> Iterator[bytes]:
         """The table as the command writes it, in pieces."""

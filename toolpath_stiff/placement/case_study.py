@@ -21,8 +21,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.documents import Document
-from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
-from toolpath_stiff.hints import both_names
+from toolpath_stiff.errors import InputError, ProgramError, UnreachableError
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.results import FolderResult
@@ -175,7 +174,7 @@ def run_case_study(
         try:
             analyses[name] = at(place)
         except UnreachableError as error:
-            hint = f"give regions that the machine reaches: {both_names('--region', 'NAME:X,Y,Z[,TURN]')}"
+            hint = "give regions that the machine reaches: --region NAME:X,Y,Z[,TURN]"
             raise UnreachableError(
                 f"region {name}: {error.found}", hint=hint, file=error.file, line=error.line
             ) from None
@@ -236,7 +235,7 @@ def read_regions(file: str) -> dict[str, Region]:
             x = y = z = turn = math.nan
         if name in regions or not math.isfinite(x + y + z + turn):
             expected = f"a name once, and finite numbers: {', '.join(REGION_COLUMNS)}"
-            raise TableError(f"region {name}: {', '.join(cells)}", expected=expected, file=file, line=line)
+            raise InputError(f"region {name}: {', '.join(cells)}", expected=expected, file=file, line=line)
         regions[name] = (x, y, z, turn)
     return regions
 

@@ -13,7 +13,6 @@ from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
 from toolpath_stiff.placement.task import VARIED, PlacementTask, SearchRecord
@@ -170,7 +169,7 @@ class Placement(FolderResult):
         if least < margin:
             words.append(
                 f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
-                f"{100.0 * margin:g} % asked for with {both_names('--margin')}"
+                f"{100.0 * margin:g} % asked for with --margin"
             )
         depths = [-float(box.clearances(before.samples.position).min()) for box in self.task.rules.keepouts]
         if max(depths, default=0.0) > 0.0:

@@ -6,7 +6,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import UnreachableError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.path.placing import place_orientations
@@ -67,7 +66,7 @@ def infeasible(search: Search, placement: FloatArray) -> UnreachableError:
         fault = f"runs {depth:.1f} mm deep into the keep-out {search.wanted.keepouts[deepest].name}"
     elif margin < least:
         fault = f"has a margin of {100.0 * margin:.2f} % of the limit's span: {limits.describe(row)}"
-        hint = f"widen the bounds, or ask for less than {both_names('--margin', f'{100.0 * least:g}')}"
+        hint = f"widen the bounds, or ask for less than --margin {100.0 * least:g}"
     else:
         room = np.where(path.cutting, search.whole.rows(placement[None]).law[0], np.inf)
         row, hint = int(np.argmin(room)), "widen the bounds, or allow it with --allow-extrapolation"

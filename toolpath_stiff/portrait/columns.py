@@ -14,7 +14,7 @@ from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
-from toolpath_stiff.stiffness.term_loads import along_pins, carriers, coupled, pair_stiffness, reading_share
+from toolpath_stiff.stiffness.term_effect import along_pins, carriers, coupled, pair_stiffness, reading_share
 from toolpath_stiff.stiffness.terms import (
     AXES,
     IN_SERIES,
@@ -24,9 +24,8 @@ from toolpath_stiff.stiffness.terms import (
     VARIABLES,
     Constants,
     Term,
-    factor_values,
-    multiplied,
     shape_values,
+    shaped,
     variable_values,
 )
 
@@ -196,7 +195,7 @@ class Ground:
                 turns = np.einsum("nkai,nij,nj->nka", self._rotations, self._flexibility, self.forces[:, 6:])
                 each = -(turns**2).sum(axis=2) * self._seen[:, None]
             if term.action in PINS:
-                each = each * along_pins(term.action, term.direction, path) ** 2
+                each = each * along_pins(term, path) ** 2
             if term.action == "strut factor":
                 each = each * self.softness
             if term.where is not None:
@@ -212,7 +211,7 @@ class Ground:
         if term.action in ("reading factor", "reading shift"):
             share = reading_share(replace(term, variable="constant", shape="offset", times=None), path)
             return np.asarray(share * (self.compliance if term.action == "reading factor" else 1.0 / self.data.force))
-        rows = carriers(term.link, term.action, term.direction, term.where, path)
+        rows = carriers(term, path)
         return np.asarray((np.einsum("nkj,nj->nk", rows, self.forces) ** 2).sum(axis=1))
 
     @cached_property
@@ -226,7 +225,7 @@ class Ground:
         machine = machine.with_changes(strut_law=scaled_law(machine.strut_law, self.law))
         path = replace(self.path, machine=machine)
         links = exact.assemble_links(replace(self.predictor.base, machine=machine), path)
-        return exact.respond(path, links, np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
+        return exact.respond(path, *links, np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
 
     @cached_property
     def _seen(self) -> FloatArray:
@@ -262,11 +261,7 @@ class Ground:
 
     def shape(self, term: Term) -> FloatArray:
         """(n,) or (n, 6) of what a term depends on."""
-        values = self.values(term.variable, term.column)
-        first = shape_values(term.shape, values, term.constants, term.signed)
-        if term.times is None:
-            return first
-        return multiplied(first, factor_values(term.times, self.values(term.times.variable, term.times.column)))
+        return shaped(term, self.values)
 
     def shapes(self, variable: str, column: str, signed: bool, where: int | None) -> Shapes:
         """All shapes of a variable over these readings, worked out once; of strut `where` where each has its own."""

@@ -10,7 +10,7 @@ over the constants of a shape, so that no link is preferred for having many term
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.portrait.columns import Ground
-from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Factor, Term
+from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Term
 
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 ONCE = ("constant", "direction")  # variables whose every place stands in the dictionary as it is
@@ -52,7 +52,7 @@ class Local:
         return self.where is not None or (self.link == "instrument" and self.direction != "reading")
 
     def term(
-        self, variable: str, shape: str, constants: Constants, column: str = "", times: Factor | None = None
+        self, variable: str, shape: str, constants: Constants, column: str = "", times: Term | None = None
     ) -> Term:
         """With a variable and a shape, and a second one where there is one."""
         column, constants = column or self.column, (*self.constants, *constants)
@@ -238,7 +238,7 @@ def products(term: Term, ground: Ground) -> list[Term]:
         for column in columns_of(variable, ground, local.link == "joints"):
             for shape, constants in ground.shapes(variable, column, False, local.where)[0]:
                 if shape != "periodic":
-                    terms.append(replace(term, times=Factor(variable, shape, constants, column)))
+                    terms.append(term.with_second(variable, shape, constants, column))
     return terms
 
 

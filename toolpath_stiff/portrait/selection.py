@@ -19,7 +19,7 @@ from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.noise import Noise, Scatter
 from toolpath_stiff.portrait.columns import Ground, shapes_near
 from toolpath_stiff.portrait.dictionary import crossed, dictionary_of, products
-from toolpath_stiff.stiffness.terms import Factor, Term
+from toolpath_stiff.stiffness.terms import Term
 
 DRAWS = 200  # simulated campaigns
 JOINS = 0.02  # probability by chance below which a further term is taken for something
@@ -279,12 +279,11 @@ class Selection:
         best = self.extended(before, terms[int(np.argmax(self.together(others, terms).posterior))])
         for finer in FINER:
             term = best.terms[-1]
-            assert term.second is not None
-            near = shapes_near(term.second, self.ground, finer)
+            assert term.times is not None
+            near = shapes_near(term.times, self.ground, finer)
             if not near:
                 break
-            factors = [Factor(part.variable, part.shape, part.at, part.column) for part in near]
-            best = self._likeliest(before, best, [replace(term, times=factor) for factor in factors], others)
+            best = self._likeliest(before, best, [replace(term, times=factor) for factor in near], others)
         return best
 
     def _likeliest(

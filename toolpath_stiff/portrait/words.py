@@ -69,9 +69,9 @@ MOST_SAID = 3  # terms in a sentence on what else would look the same; a documen
 def term_words(term: Term) -> str:
     """What gives way and what it varies with: a clause, without its size."""
     clause = f"{_cause(term)}{_with(term, term.signed)}"
-    if term.second is None:
+    if term.times is None:
         return clause
-    return f"{clause}, and this {_with(term.second, signed=False).removeprefix(',').strip()}"
+    return f"{clause}, and this {_with(term.times, signed=False).removeprefix(',').strip()}"
 
 
 def _cause(term: Term) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.documents import to_dict
-from toolpath_stiff.errors import InputError, TableError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.loop_figures import LoopFigures, in_tension, reduce_loops
@@ -177,5 +177,5 @@ def _files(name: str) -> list[str]:
     paths = sorted(p for p in Path(name).rglob("*") if p.suffix.lower() in READ and not p.name.startswith((".", "~")))
     files = [str(path) for path in paths if path.is_file() and not path.name.endswith(OWN_OUTPUT)]
     if not files:
-        raise TableError("a folder without records", expected=f"files {', '.join(READ)}", file=name)
+        raise InputError("a folder without records", expected=f"files {', '.join(READ)}", file=name)
     return files

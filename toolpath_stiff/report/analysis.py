@@ -1,13 +1,13 @@
 """The results of an analysis: what a terminal shows, page and files."""
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
 from toolpath_stiff.column_files import check_parquet
 from toolpath_stiff.documents import Document
-from toolpath_stiff.report.analysis_page import page_pieces
+from toolpath_stiff.report import analysis_page
 from toolpath_stiff.report.analysis_tables import (
     TITLES,
     and_more,
@@ -32,13 +32,8 @@ def other_samples(table: str) -> tuple[str, ...]:
     return tuple(name for name in ("samples.csv", "samples.parquet") if not name.endswith(table))
 
 
-def page(analysis: Analysis, drawn: dict[str, bytes], *, show_plunges: bool = False) -> Iterator[str]:
-    """The page, in pieces."""
-    return page_pieces(analysis, show_plunges)
-
-
 DATA = {"samples.csv": samples_csv, "samples.parquet": samples_parquet, "summary.json": Analysis.to_json}
-PAGE = "report.html"
+PAGE, page = "report.html", analysis_page.page
 
 
 def text(analysis: Analysis) -> str:

@@ -7,7 +7,7 @@ content security policy lets only our own script run.
 """
 
 import base64
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from markupsafe import Markup
@@ -29,11 +29,10 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m,
 SCRIPTS = ("stage.js", "viewer.js", "profile.js", "analysis.js")
 
 
-def page_pieces(analysis: Analysis, show_plunges: bool = False) -> Iterator[str]:
+def page(analysis: Analysis, drawn: Mapping[str, bytes], *, show_plunges: bool = False) -> Iterator[str]:
     """The page in pieces of text; `show_plunges`: how the switch stands that lets plunges set axis and colour scale."""
     summary, data = analysis.to_dict(), page_data(analysis)
-    force = f"{summary['force_N']:g} N"
-    figures = words.headline_text(summary, " · ")
+    machine, load = f"machine {summary['machine']}", f"load {summary['load']}, {summary['force_N']:g} N"
     return render(
         "analysis.html",
         styles=["viewer.css", "analysis.css"],
@@ -41,7 +40,7 @@ def page_pieces(analysis: Analysis, show_plunges: bool = False) -> Iterator[str]
         data=data,
         title=f"{summary['program']}: stiffness along the path",
         program=summary["program"],
-        heading=f"machine {summary['machine']} · load {summary['load']}, {force} · {figures}",
+        heading=" · ".join([machine, load, words.headline_text(summary, " · ")]),
         plunges_shown=show_plunges,
         warnings=summary["warnings"],
         note=_thinned_note(data["count"], len(analysis.samples)),
@@ -120,7 +119,6 @@ def page_data(analysis: Analysis) -> Document:
     stiffness, stiffness_range = _fractions(n_per_mm_from_n_per_m(evaluation.stiffness[rows]))
     margin, margin_range = _fractions(evaluation.reach.margin[rows])
     kind = samples.motion + OUT_OF_REACH * ~evaluation.reachable[rows] + PLUNGE * analysis.set_aside[rows]
-    tool_starts = np.flatnonzero(np.diff(samples.tool, prepend=-1) != 0)
     return {
         "machine": plain(analysis.machine.name),
         "source": list(analysis.program.source),
@@ -138,7 +136,7 @@ def page_data(analysis: Analysis) -> Document:
         "line": _base64(samples.line.astype("<u4")),
         "s": _base64(mm_from_m(samples.s).astype("<f4")),
         "kind": _base64(kind.astype("u1")),
-        "tools": [[int(i), int(samples.tool[i])] for i in tool_starts],
+        "tools": [[int(i), int(samples.tool[i])] for i in np.flatnonzero(np.diff(samples.tool, prepend=-1))],
         "operations": _operation_starts(analysis, samples.move),
         "weakest": [int(np.searchsorted(rows, row)) for row in analysis.weakest_rows],
         "scale": _scale(analysis, False),

@@ -50,7 +50,6 @@ def facts(summary: Document) -> list[tuple[str, str]]:
 
 
 def _plunges(summary: Document) -> list[tuple[str, str]]:
-    """The plunges beside the headline figures, or that these are of plunges."""
     if only_plunges(summary):
         return [("plunges", "this program only plunges: every figure is of cuts along the tool axis")]
     if (plunges := beside(summary)) is None:
@@ -64,7 +63,6 @@ def _plunges(summary: Document) -> list[tuple[str, str]]:
 
 
 def _band(summary: Document) -> list[tuple[str, str]]:
-    """What the uncertainty of fitted parameters leaves open, where the machine file tells of it."""
     if not (band := summary.get("parameter_uncertainty")):
         return []
     mean, lowest = (" to ".join(map(number, band[f"{name}_95_N_per_mm"])) for name in ("mean", "min"))
@@ -94,8 +92,7 @@ def only_plunges(figures: Document) -> bool:
 
 def beside(figures: Document) -> Document | None:
     """The plunges that the headline figures leave out; None where there are none, or where there is nothing else."""
-    plunges: Document | None = figures["plunges"]
-    return None if only_plunges(figures) else plunges
+    return None if only_plunges(figures) else figures["plunges"]
 
 
 def headline_text(figures: Document, between: str) -> str:
@@ -108,12 +105,10 @@ def headline_text(figures: Document, between: str) -> str:
 
 
 def _figures(figures: Document) -> list[str]:
-    """Mean, smallest, largest, range and deflection."""
     return [number(figures[name], 2 if name.endswith("_um") else 0) for name in FIGURES]
 
 
 def _part_figures(row: Document) -> tuple[object, ...]:
-    """Length, time, stiffness, plunges beside it and weakest place of a tool or an operation."""
     place, plunges = row["weakest"] or {"line": "-", "text": ""}, beside(row) or {}
     return (
         number(row["cutting_length_mm"], 1),
@@ -189,8 +184,7 @@ def comparison(summary: Document, other: Document) -> ShownTable:
     shown = ["-" if change is None else f"{change:+.1f} %" for change in changes]
     rows = [list(row) for row in zip(TITLES, *map(_figures, sides), shown, strict=False)]
     if any(map(beside, sides)):
-        means = [number((beside(side) or {}).get("mean_N_per_mm")) for side in sides]
-        rows.append([PLUNGES, *means, shown[-1]])
+        rows.append([PLUNGES, *(number((beside(side) or {}).get("mean_N_per_mm")) for side in sides), shown[-1]])
     rows.append(["weakest line", *(str((side["weakest"] or {"line": "-"})["line"]) for side in sides), ""])
     rows.append(["extrapolated", *(f"{side['extrapolated_share']:.1%}" for side in sides), ""])
     if any(side["out_of_reach_samples"] for side in sides):

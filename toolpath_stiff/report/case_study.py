@@ -13,7 +13,6 @@ COLUMNS = ("region", *REGION_COLUMNS, *FIGURES)
 
 
 def _table(study: CaseStudy) -> str:
-    """The regions."""
     return csv_text(COLUMNS, ([str(row[key]) for key in COLUMNS] for row in study.summary["regions"]))
 
 

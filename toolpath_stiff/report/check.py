@@ -43,8 +43,9 @@ def _figures(row: Figures) -> list[str]:
 
 def text(check: ProgramCheck) -> str:
     """The document of `--json`, for people."""
-    posted = f", posted for {check.kinematics}" if check.kinematics else ""
-    lines = [f"{check.program}, read as {check.dialect}{posted}"]
+    lines = [f"{check.program}, read as {check.dialect}"]
+    if check.kinematics:
+        lines[0] += f", posted for {check.kinematics}"
     if check.interpreter != "builtin":
         lines.append("read by LinuxCNC's interpreter: codes are counted where they stand, modal states are not known")
     if not check.complete:

@@ -9,7 +9,6 @@ from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import Variable, directions, planes
 from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors
 from toolpath_stiff.inference.errors import deviation_percent
-from toolpath_stiff.report import history
 from toolpath_stiff.report.history import history_section, history_text
 from toolpath_stiff.report.loops import loops_section, loops_text
 from toolpath_stiff.report.pages import Section, page_of, readings_head
@@ -24,34 +23,23 @@ QUESTIONS = {
         "A cloud beside the line is a bias; as wide as its bars, scatter; one direction off alone points to a gauge, "
         "a table or a spindle.",
     ),
-    "planes.png": (
-        "Z against X and Y? Upper against lower plane?",
-        "Standard errors hold the scatter of readings, clampings and struts, and what scatters more than these from "
-        "place to place. They are taken one by one; the findings above are corrected for looking at many places.",
-    ),
     "machine.png": (
         "Where does the model fail? Alike all around, or on one side?",
         "Three times the same around the axis: geometry or the law of all struts. One side only: one strut, one joint, "
         "the table, or a cable.",
-    ),
-    history.PICTURE: history.QUESTION,
-    "strips.png": (
-        "Drift, a bad clamping, one bad reading?",
-        "A slope is drift, a step is a clamping, a lone bar is a reading to take again.",
     ),
     "variables.png": (
         "Which variable is missing?",
         "The strongest first. A trend in one direction of load alone says more than one in all: compare with what "
         "every effect of the catalogue would do with tps diagnose.",
     ),
-    "load_path.png": (
-        "Which link takes what share of the compliance?",
-        "A missing compliance must fit between the model's bar and the measured one; a link that takes little "
-        "cannot be the cause unless it is badly wrong.",
-    ),
 }
 
 PAGE = "report.html"
+LOAD_PATH_REMARK = (
+    "Of the machine file, mean over the measured poses. A missing compliance must fit between the model and what was "
+    "measured; a link that takes little cannot be the cause unless it is badly wrong."
+)
 MOST_FAR_OFF, MOST_NAMED = 20, 5  # readings far off, on the page and on the terminal
 BIAS = f"mean of {DEVIATION}, {MINUS_IS_SOFTER}"
 
@@ -75,15 +63,14 @@ def page(comparison: Comparison, drawn: Mapping[str, bytes]) -> str:
     sections: list[Section] = [
         ("Findings", _findings(summary)),
         "measured_modelled.png",
-        ("Errors by direction, plane and set-up", errors(summary), f"Machine file as given. Bias: {BIAS}."),
-        *("planes.png", "machine.png", "strips.png"),
+        ("Errors by direction, plane and set-up", errors(summary, True), f"Machine file as given. Bias: {BIAS}."),
+        "machine.png",
         ("Readings far off", far_off(summary, MOST_FAR_OFF)),
         loops_section(summary.loops),
         history_section(summary.history),
-        history.PICTURE,
         "variables.png",
         ("Checks without a model", _model_free(summary)),
-        "load_path.png",
+        ("Which link takes what share of the compliance?", _load_path(comparison), LOAD_PATH_REMARK),
         ("How much readings scatter", _noise(summary)),
         ("Not tested", summary.not_tested),
         ("Assumptions", [*summary.assumptions, *summary.notes]),
@@ -96,7 +83,6 @@ def _by_noise(figures: Mapping[str, float], form: str) -> str:
 
 
 def _findings(summary: ComparisonSummary) -> ShownTable:
-    """Findings with their probabilities."""
     rows = [
         (row.text, f"{row.statistic:+.1f}", f"{row.p_adjusted:.2g}", ", ".join(row.indistinguishable_from) or "-")
         for row in summary.findings
@@ -106,12 +92,37 @@ def _findings(summary: ComparisonSummary) -> ShownTable:
     return ShownTable(("finding", ">t", ">p, corrected", "looks the same in these data"), rows or none, kinds)
 
 
-def groups(summary: ComparisonSummary) -> list[tuple[str, GroupErrors]]:
-    """All readings, and those by direction, plane and set-up where there are several; planes need no title."""
+def _load_path(comparison: Comparison) -> ShownTable:
+    nm_per_N = 1e9 * comparison.shares.compliance.T  # a row a link, a column an axis
+    sums = nm_per_N.sum(axis=0)
+    links = (zip(parts, sums, strict=True) for parts in nm_per_N)
+    rows = [[f"{part:.1f} nm/N, {part / whole:.0%}" for part, whole in parts] for parts in links]
+    rows.append([f"{whole:.1f} nm/N" for whole in sums])
+    rows.append([_measured(comparison, axis, whole) for axis, whole in zip("XYZ", sums, strict=True)])
+    names = (*comparison.shares.links, "the model in all", "measured")
+    shown = [[name, *row] for name, row in zip(names, rows, strict=True)]
+    return ShownTable(("link", ">along X", ">along Y", ">along Z"), shown)
+
+
+def _measured(comparison: Comparison, axis: str, modelled: float) -> str:
+    """The mean compliance along an axis at the readings along it, as far from the model's as there."""
+    rows = directions(comparison.data) == axis
+    if not rows.any():
+        return "-"
+    ratio = np.mean(1.0 / comparison.data.stiffness[rows]) / np.mean(np.exp(-comparison.log_model[rows]))
+    return f"{ratio * modelled:.1f} nm/N"
+
+
+def groups(summary: ComparisonSummary, each: bool = False) -> list[tuple[str, GroupErrors]]:
+    """All readings, and those by direction, plane and set-up where there are several; planes need no title.
+
+    With `each`, every plane direction by direction too.
+    """
     rows: list[tuple[str, GroupErrors]] = [("all readings", summary.baseline)]
     levels: list[tuple[str, Mapping[str, GroupErrors]]] = [
         ("direction", summary.by_direction),
         ("", summary.by_plane),
+        ("", summary.by_plane_and_direction if each else {}),
         ("set-up", summary.by_setup),
     ]
     for title, by in levels:
@@ -120,7 +131,7 @@ def groups(summary: ComparisonSummary) -> list[tuple[str, GroupErrors]]:
     return rows
 
 
-def errors(summary: ComparisonSummary) -> ShownTable:
+def errors(summary: ComparisonSummary, each: bool = False) -> ShownTable:
     """Errors by direction, plane and set-up, beside those of scatter alone."""
     rows = [
         (
@@ -131,7 +142,7 @@ def errors(summary: ComparisonSummary) -> ShownTable:
             f"{group.rms_percent:.1f} %",
             *(f"{group.scatter_rms_percent[noise.name]:.1f} %" for noise in summary.noise),
         )
-        for name, group in groups(summary)
+        for name, group in groups(summary, each)
     ]
     scatter = (f">scatter alone, {noise.name}" for noise in summary.noise)
     return ShownTable(("", ">readings", ">mean error", ">bias", ">rms", *scatter), rows)
@@ -153,7 +164,6 @@ def far_off(summary: ComparisonSummary, most: int) -> ShownTable:
 
 
 def _model_free(summary: ComparisonSummary) -> ShownTable:
-    """Checks that need no stiffness model, and why others cannot be made."""
     checks, cannot = summary.model_free.checks, summary.model_free.cannot_check
     rows = [(check.check, check.text, f"{check.statistic:+.1f}", f"{check.p_adjusted:.2g}") for check in checks]
     rows += [(check.check, f"not checked: {check.reason}", "", "") for check in cannot]

@@ -48,8 +48,7 @@ def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
     highest = np.flatnonzero(y == np.maximum.reduceat(y, first)[run])
     lowest = lowest[np.diff(run[lowest], prepend=-1) != 0]  # the first of equals
     highest = highest[np.diff(run[highest], append=-1) != 0]  # the last of equals
-    kept = np.concatenate([first, last, lowest, highest])
-    rows = np.unique(kept)
+    rows = np.unique(np.concatenate([first, last, lowest, highest]))
     return np.asarray(rows[~missing[rows] | fresh[rows]])
 
 

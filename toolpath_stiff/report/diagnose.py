@@ -76,7 +76,6 @@ def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
 
 
 def _figures(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """The few figures that say it all."""
     rows, standing = diagnosis.rows, diagnosis.explanations
     figures = [
         (percent(rows.as_given.mean_abs_error_percent, 2), "mean error as given"),
@@ -93,7 +92,6 @@ def _figures(diagnosis: Diagnosis) -> list[tuple[str, str]]:
 
 
 def _candidates(diagnosis: Diagnosis) -> ShownTable:
-    """As given, strut law refitted, pairs and all candidates."""
     every, rows, kinds = diagnosis.rows, [], []
     for row in (every.as_given, every.refitted, *every.pairs, *every.candidates):
         sizes = Markup("<br>").join(markup('<span class="whole">{}</span>', size) for size in words.size_texts(row))
@@ -116,7 +114,6 @@ def _candidates(diagnosis: Diagnosis) -> ShownTable:
 
 
 def _portrait(portrait: Portrait | None) -> list[Part]:
-    """The portrait in words, its terms, and what else would look the same; nothing where there is none."""
     if portrait is None:
         return []
     rows = [_sized(sized, "beside it" if place else "leading") for place, sized in enumerate(portrait.terms)]
@@ -138,7 +135,6 @@ def _sized(sized: Sized, part: str) -> list[str]:
 
 
 def _alike(diagnosis: Diagnosis) -> list[Part]:
-    """Sets of effects that no fit can tell apart, and the pairs that are most alike."""
     given = diagnosis.confounding
     pairs = sorted(
         (
@@ -158,7 +154,6 @@ def _alike(diagnosis: Diagnosis) -> list[Part]:
 
 
 def _unseen(diagnosis: Diagnosis) -> list[Part]:
-    """The smallest size of each effect that these data would show, and the change of stiffness that it makes."""
     rows = [
         (
             words.hidden_name(smallest),
@@ -172,7 +167,6 @@ def _unseen(diagnosis: Diagnosis) -> list[Part]:
 
 
 def _next_readings(diagnosis: Diagnosis) -> ShownTable:
-    """The readings that tell most."""
     readings = diagnosis.next_measurements
     keys = list(dict.fromkeys(key for reading in readings for key in reading if key != "why"))
     keys = [key for key in keys if any(reading.get(key) not in ("", None) for reading in readings)]
@@ -194,7 +188,6 @@ def _cannot_test(diagnosis: Diagnosis) -> ShownTable:
 
 
 def _path(diagnosis: Diagnosis) -> list[Part]:
-    """What the plausible explanations predict on the path."""
     text = words.path_text(diagnosis.path)
     if diagnosis.path is None or not text:
         return []
@@ -206,7 +199,6 @@ def _path(diagnosis: Diagnosis) -> list[Part]:
 
 
 def _noise(diagnosis: Diagnosis) -> list[Part]:
-    """Where the noise comes from, and the verdict under each guess."""
     noise = diagnosis.noise
     names, shares = ("repeats", "clamping", "struts among themselves"), (
         noise.typical_repeat, noise.clamping, noise.strut_spread

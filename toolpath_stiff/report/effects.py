@@ -39,16 +39,12 @@ def _plain(value: object) -> object:
 
 
 def text(catalogue: EffectCatalogue) -> str:
-    """One line an effect: link, name, title, parameters with their units; then the plug-ins that do not load."""
+    """One line an effect: link, name, title, parameters with their units."""
     rows = []
     for effect in catalogue.effects:
         parameters = ", ".join(f"{p.name} ({p.unit})" if p.unit else p.name for p in effect.parameters)
         rows.append((effect.link, effect.name, effect.title, parameters or "-"))
-    lines = ShownTable(("link", "name", "title", "parameters"), rows).lines(least=0, width=WIDE)
-    if catalogue.broken:
-        lines += ["", "plug-ins that do not load:"]
-        lines += [f"  {name}: {reason}" for name, reason in catalogue.broken.items()]
-    return "\n".join(lines)
+    return "\n".join(ShownTable(("link", "name", "title", "parameters"), rows).lines(least=0, width=WIDE))
 
 
 def effect_details(effect: Effect) -> str:

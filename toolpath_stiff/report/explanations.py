@@ -66,8 +66,8 @@ def hidden_name(smallest: Detectable) -> str:
 
 def smallest_text(smallest: Detectable) -> str:
     """The smallest size of an effect that would have been seen."""
-    value = json_number(smallest.value / smallest.parameter.si)
-    return plain(f"{significant(value)} {smallest.parameter.unit}".rstrip())
+    size = significant(json_number(smallest.value / smallest.parameter.si))
+    return plain(f"{size} {smallest.parameter.unit}".rstrip())
 
 
 def floor_text(diagnosis: Diagnosis) -> str:
@@ -176,7 +176,6 @@ def _hints(label: str, hints: Sequence[str]) -> list[str]:
 
 
 def _error(diagnosis: Diagnosis) -> str:
-    """The fall of the error in one sentence: in sample, at left-out points, against the noise floor."""
     rows, floor = diagnosis.rows, json_number(diagnosis.noise.floor_percent) or 0.0
     steps = [f"{percent(rows.as_given.mean_abs_error_percent, 2)} as given"]
     best = None if diagnosis.verdict == "adequate" else rows.best
@@ -212,7 +211,6 @@ def _table(diagnosis: Diagnosis) -> list[str]:
 
 
 def _would_show(diagnosis: Diagnosis) -> str:
-    """Of an adequate model: the smallest sizes that these data would have shown, and what they never show."""
     if diagnosis.verdict != "adequate":
         return ""
     never = ", ".join(hidden_name(smallest) for smallest in diagnosis.detectable if not smallest.seen)
@@ -222,7 +220,6 @@ def _would_show(diagnosis: Diagnosis) -> str:
 
 
 def _next_readings(diagnosis: Diagnosis) -> list[str]:
-    """How many readings are proposed, and what they would settle."""
     if not diagnosis.next_measurements:
         return []
     reasons = list(dict.fromkeys(str(reading["why"]) for reading in diagnosis.next_measurements))

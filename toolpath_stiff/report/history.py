@@ -5,22 +5,12 @@ from toolpath_stiff.report.pages import Section
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 
-PICTURE = "history.png"
-QUESTION = (
-    "Did a strut change, and when?",
-    "Points: means of a date. Orange: a change, in the span in which a step lies (95 %), or along a drift.",
-)
 TITLE = "Struts measured alone, over their dates"
 HEAD = ("strut", ">readings", ">dates", ">N/mm", ">scatter %", ">drift, % a year", ">tension", ">compression")
 
 
-def dated(history: StrutHistory) -> bool:
-    """Whether some strut was measured on several dates."""
-    return any(len(strut.dates) > 1 for strut in history.struts)
-
-
 def _shown(history: StrutHistory) -> bool:
-    return dated(history) or any(strut.sides for strut in history.struts)
+    return any(len(strut.dates) > 1 or strut.sides for strut in history.struts)
 
 
 def _row(strut: StrutOverTime) -> tuple[str, ...]:
@@ -41,7 +31,6 @@ def _table(history: StrutHistory) -> ShownTable:
 
 
 def _remark(history: StrutHistory) -> str:
-    """How far readings scatter from date to date."""
     scatter = history.scatter_percent
     return "" if scatter is None else f"scatter from date to date {scatter:.2g} %: {history.scatter_from}"
 

@@ -19,7 +19,6 @@ class MachineFigure(NamedTuple):
 
 
 def _law_figures(law: StrutLaw) -> tuple[str, str]:
-    """Value and unit of a strut law."""
     if law.constant:
         return f"{n_per_um_from_n_per_m(law.stiffness_1):g}", "N/um at every length"
     first, *rest = [

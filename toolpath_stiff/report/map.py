@@ -34,14 +34,14 @@ def page(planes: StiffnessMap, drawn: dict[str, bytes]) -> Iterator[str]:
         **page_colours(),
         "values": [[None if np.isnan(v) else round(float(v)) for v in layer.ravel()] for layer in stiffness],
     }
-    slices = f"slices at z = {', '.join(f'{z:g}' for z in mm_from_m(planes.z))} mm"
+    slices = ", ".join(f"{z:g}" for z in mm_from_m(planes.z))
     return render(
         "map.html",
         styles=["viewer.css", "map.css"],
         scripts=["stage.js", "viewer.js", "map.js"],
         data=data,
         title=f"Stiffness map, load {planes.load}",
-        about=" · ".join([*heading(planes), slices]),
+        about=" · ".join([*heading(planes), f"slices at z = {slices} mm"]),
         warnings=[f"Warning: {text}" for text in planes.to_dict()["warnings"]],
     )
 

@@ -7,7 +7,7 @@ from toolpath_stiff.files import Content
 from toolpath_stiff.readings.raw import Reduction
 from toolpath_stiff.readings.raw_rows import loop_entry
 from toolpath_stiff.report import folder
-from toolpath_stiff.report.history import dated, history_text
+from toolpath_stiff.report.history import history_text
 from toolpath_stiff.report.tables import ShownTable
 
 DATA: Mapping[str, Callable[[Reduction], Content]] = {}
@@ -16,20 +16,17 @@ HEAD = ("loop", ">N/mm", ">force N", ">deflection um", ">lost motion um", ">widt
 
 def pictures(reduction: Reduction) -> dict[str, Content]:
     """The loops drawn, and dated struts over their dates."""
-    there = {"loops.png": bool(reduction.recorded), "history.png": dated(reduction.history)}
-    drawn = folder.files(reduction, omit=[name for name in there if not there[name]])
-    return {name: content() if callable(content) else content for name, content in drawn.items()}
+    drawn = {name: draw() if callable(draw) else draw for name, draw in folder.files(reduction).items()}
+    return {name: content for name, content in drawn.items() if content}
 
 
 def text(reduction: Reduction) -> str:
     """The figures of the loops and the struts' histories; rows of a table of stiffnesses say nothing themselves."""
     recorded = [loop_entry(figures) for figures in reduction.recorded]
-    history = history_text(reduction.history, undated=not recorded)
-    return "\n".join([*_loops(recorded), *history]).lstrip("\n")
+    return "\n".join([*_loops(recorded), *history_text(reduction.history, undated=not recorded)]).lstrip("\n")
 
 
 def _loops(entries: Sequence[Document]) -> list[str]:
-    """A line a loop."""
     if not entries:
         return []
     names = ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")

@@ -110,8 +110,7 @@ def _section(title: str, parts: Iterable[Part]) -> Markup:
 def part(content: Part) -> Markup:
     """A part of a section; nothing where it has nothing to show."""
     if isinstance(content, ShownTable):
-        kinds = content.kinds or [""] * len(content.rows)
-        rows = [*zip(kinds, content.rows, strict=True)]
+        rows = [*zip(content.kinds or [""] * len(content.rows), content.rows, strict=True)]
         return _macro("table", content.titles, rows, content.right) if rows else Markup()
     if isinstance(content, Hints):
         return _macro("hints", [parted(str(text)) for text in content.texts]) if content.texts else Markup()
@@ -180,7 +179,6 @@ def _shown(value: object) -> object:
 
 
 def _macro(name: str, *values: object) -> Markup:
-    """What a macro of `parts.html` makes."""
     html: Markup = getattr(_templates().get_template("parts.html").module, name)(*values)
     return html
 

@@ -2,12 +2,17 @@
 
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.placement.result import Placement, Written
 from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
-from toolpath_stiff.report.place_page import page_pieces
-from toolpath_stiff.report.words import machine_text
-from toolpath_stiff.units import number
+from toolpath_stiff.report.colours import page_colours
+from toolpath_stiff.report.pages import render
+from toolpath_stiff.report.place_path import drawn_path
+from toolpath_stiff.report.words import machine_text, plain
+from toolpath_stiff.units import mm_from_m, number
 
 COSTS = ("best_on_front_N_per_mm", "chosen_N_per_mm")
 
@@ -61,7 +66,6 @@ def _figures_words(row: PlacementRow) -> str:
 
 
 def _written(written: Written) -> list[tuple[str, str]]:
-    """What became of the transformed program."""
     if written.refused:
         return [("not rewritten", f"{written.file}: {written.refused}")]
     zero, apart = written.analysed_at, written.relative_difference
@@ -72,12 +76,10 @@ def _written(written: Written) -> list[tuple[str, str]]:
 
 
 def _table(placed: Placement) -> str:
-    """The front."""
     return csv_text(COLUMNS, ([_cell(value) for value in vars(row).values()] for row in placed.front))
 
 
 def _cell(value: float | None) -> str:
-    """A number of placements.csv; nothing where there is none."""
     if value is None:
         return ""
     return str(value) if isinstance(value, int) else f"{value:.6f}"
@@ -85,7 +87,39 @@ def _cell(value: float | None) -> str:
 
 def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
     """The page, in pieces."""
-    return page_pieces(placed)
+    best, present = placed.best, placed.present
+    path, note = drawn_path(placed, [*placed.front, *([present] if present else [])])
+    data = {
+        "front": [vars(row) for row in placed.front],
+        "chosen": (placed.chosen.number or 0) - 1,
+        "recommended": placed.search.recommended - 1,
+        "before": vars(present) if present else None,
+        "before_reason": plain(placed.present_reason),
+        "force": best.force,
+        "keepouts": [
+            {"name": plain(box.name), "box": _corners(mm_from_m(box.corners))} for box in placed.task.rules.keepouts
+        ],
+        "workspace": _corners(mm_from_m(best.machine.limits.workspace)),
+        **path,
+        **page_colours(),
+    }
+    return render(
+        "place.html",
+        styles=["viewer.css", "place.css"],
+        scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
+        data=data,
+        title=f"Placements of {placed.best.program.name}",
+        about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
+        objective=placed.task.rules.objective,
+        load=str(best.load),
+        note=note,
+        warnings=placed.warnings,
+    )
+
+
+def _corners(corners: FloatArray) -> list[list[float | None]]:
+    """Lower and upper corner in mm; None where the machine file sets no bound."""
+    return [[round(v, 3) if np.isfinite(v) else None for v in corner] for corner in corners.tolist()]
 
 
 DATA = {"placements.csv": _table, "placement.json": Placement.to_json}

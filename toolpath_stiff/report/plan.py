@@ -25,7 +25,6 @@ def text(plan: Plan) -> str:
 
 
 def _rows(plan: Plan) -> str:
-    """The measurement file to fill in."""
     return plan_csv(plan.rows)
 
 

@@ -19,15 +19,14 @@ VERDICTS = {
     NOTHING: "Nothing to add",
 }
 PAGE = "report.html"
+LADDER_REMARK = (
+    "From the machine file as given over its refitted strut law to the last model. What counts is the error at "
+    "left-out points, which the fit has not seen. A fit weighs readings by their scatter, so that a step can raise "
+    "this mean. "
+    "Effects that only together lower it are one step. An error below the noise floor is chance."
+)
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
-    "ladder.png": (
-        "What does each step do to the error?",
-        "From the machine file as given over its refitted strut law to the last model. What counts is the error at "
-        "left-out points, which the fit has not seen. A fit weighs readings by their scatter, so that a step can raise "
-        "this mean. Effects that only together lower it are one step. Bars: standard error of the step; an error below "
-        "the noise floor is chance.",
-    ),
     "before_after.png": (
         "Did the error fall, and what remains?",
         f"{DEVIATION}, {MINUS_IS_SOFTER} (red); blue: stiffer; both halves on one colour scale. A pattern that remains "
@@ -50,6 +49,7 @@ def page(update: Update, drawn: Mapping[str, bytes]) -> str:
         f"machine file: {document['machine_file'] or 'none written'}",
     ]
     sections: list[Section] = [
+        ("What does each step do to the error?", _ladder(update), LADDER_REMARK),
         *QUESTIONS,
         ("Errors by direction", _by_direction(update), f"Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."),
         ("What was fitted", _fitted(update)),
@@ -145,7 +145,6 @@ def _support(update: Update) -> ShownTable:
 
 
 def _ladder(update: Update) -> ShownTable:
-    """The error of each step, and what scatter alone would leave."""
     rows = [
         (
             step["name"],

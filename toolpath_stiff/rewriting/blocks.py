@@ -4,24 +4,20 @@ import math
 import re
 from collections.abc import Sequence
 
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.arc import ARCS
 from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
-from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.nc.state import Flow
+from toolpath_stiff.nc.moves import RAPID, Arc
+from toolpath_stiff.nc.state import Flow, Segment
 from toolpath_stiff.nc.words import AXES, CORNERS, POLAR, Block
 from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
-from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, points_between
+from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, point_at
 
 Piece = tuple[str, list[float], float]  # G0 or G1, end in the set-up frame, dwell after it in s
-SLASH = re.compile(r"\s*/\d*")
-LINEARISE = (
-    f"give {both_names('--linearise', 'MM')} to have straight moves within MM of it, "
-    "or place the work without that turn"
-)
+SLASH = re.compile(r"^\s*/\d*")
+LINEARISE = "give --linearise MM to have straight moves within MM of it, or place the work without that turn"
 
 
 def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str], bool]:
@@ -29,7 +25,7 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     if not block.words:
         return [text], True
     source, out = controls.source, controls.out
-    controls.block = block
+    controls.edit = LineEdit(text, block)
     controls.trace.clear()
     first, first_out = len(source.recorder.recent), len(out.recorder.recent)
     controls.current = current = begin(source, block)
@@ -44,94 +40,82 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
         "a block with a slash in its middle": block.rest is not None,
     }
     for what, holds in refused.items():
-        if holds:
-            raise controls.refusal(f"{what} cannot be rewritten", "post the moves of the tool centre, one a block")
+        controls.refuse_if(holds, f"{what} cannot be rewritten", "post the moves of the tool centre, one a block")
     controls.axes = [letter for letter in AXES if current.has(letter)]
     plane_before = out.plane
     begin(out, block)
     goes_on = finish(source, current) is Flow.NEXT
-    controls.edit = LineEdit(text, block, controls.digits)
-    plane = controls.plane_word(plane_before)
-    lines, pieces = _lines(controls, current.groups.get("non-modal"), plane, first)
-    controls.check(first, first_out, pieces)
+    lines = _lines(controls, current.groups.get("non-modal"), controls.plane_word(plane_before), first)
+    controls.check(first, first_out, pieces=len(lines) > 1)
     return lines, goes_on
 
 
-def _lines(controls: Controls, once: str | None, plane: str, first: int) -> tuple[list[str], bool]:
-    """The lines, and whether they are one move cut into pieces."""
-    source = controls.source
-    if not controls.trace:
-        return [controls.emit()], False
-    last = controls.trace[-1]
-    if once is not None and once != "G53" and CODES[once].takes_axes:
+def _lines(controls: Controls, once: str | None, plane: str, first: int) -> list[str]:
+    source, last = controls.source, controls.trace[-1] if controls.trace else None
+    if last is None or once == "G53":
+        return [controls.emit()]
+    if once is not None and CODES[once].takes_axes:
         _home(controls)
-    elif once != "G53" and source.motion in CYCLES:
-        if controls.matrix[geometry.PLANES[source.plane][2], geometry.PLANES[source.plane][2]] != 1.0:
-            return _one_by_one(controls, _cycle_in_moves(controls, first)), False
+    elif source.motion in CYCLES:
+        normal = geometry.PLANES[source.plane][2]
+        if controls.matrix[normal, normal] != 1.0:
+            out_of_it = f"{source.motion} drills along {AXES[normal]}, and the placement turns the work out of it"
+            controls.refuse_if(controls.linearise is None, out_of_it, LINEARISE)
+            moves = source.recorder.recent[first:]
+            return _one_by_one(controls, [("G0" if m.motion == RAPID else "G1", m.end, m.dwell) for m in moves])
         _cycle(controls, plane)
-    elif once != "G53":
-        count = _piece_count(controls)
+    else:
+        count = _piece_count(controls, last)
         if count > 1:
             start, end = (source.frames.to_setup(point) for point in (last.start, last.end))
-            points = points_between(start, end, last.arc, count)
-            return _one_by_one(controls, [("G1", point, 0.0) for point in points]), True
+            points = [point_at(start, end, last.arc, part / count) for part in range(1, count)]
+            return _one_by_one(controls, [("G1", point, 0.0) for point in (*points, end)])
         if last.arc is None:
             controls.motion_word(source.motion or "")
             controls.go(controls.target(last.end), controls.axes)
         else:
-            _arc(controls, plane)
-    return [controls.emit()], False
+            _arc(controls, plane, last, last.arc)
+    return [controls.emit()]
 
 
 def _home(controls: Controls) -> None:
     """G28, G30: the intermediate point moves with the work, the reference point does not."""
     axes = controls.axes
-    if not axes:
-        return
-    named, mixed = [AXES.index(letter) for letter in axes], controls.matrix != 0.0
+    named = [AXES.index(letter) for letter in axes]
+    mixed = (controls.matrix != 0.0) | (controls.matrix.T != 0.0)
     linear = [axis for axis in named if axis < 3]
-    others = (axis for axis in range(3) if axis not in named)
-    missing = [AXES[axis] for axis in others if mixed[axis, linear].any() or mixed[linear, axis].any()]
-    if missing:
-        raise controls.refusal(
-            f"G28 or G30 of {', '.join(axes)} without {', '.join(missing)}: the turned work has no such axis alone",
-            f"name {', '.join(missing)} too",
-        )
+    missing = [AXES[axis] for axis in range(3) if axis not in named and mixed[axis, linear].any()]
+    controls.refuse_if(
+        missing,
+        f"G28 or G30 of {', '.join(axes)} without {', '.join(missing)}: the turned work has no such axis alone",
+        f"name {', '.join(missing)} too",
+    )
     controls.go(controls.target(controls.trace[0].end), axes, only=named)
 
 
-def _arc(controls: Controls, plane: str) -> None:
-    source, edit, axes = controls.source, controls.edit, controls.axes
-    image, last = controls.image(source.plane), controls.trace[-1]
-    assert image is not None
-    assert last.arc is not None
-    name, sign = image
+def _arc(controls: Controls, plane: str, move: Segment, arc: Arc) -> None:
+    source, out, edit, axes = controls.source, controls.out, controls.edit, controls.axes
+    name, sign = controls.image(source.plane) or (source.plane, 1.0)
     if name != plane:
-        edit.add_code(name)
+        edit.write_code(name)
     code = source.motion or ""
-    code = code if sign > 0.0 else ARCS[1 - ARCS.index(code)]
-    controls.motion_word(code)
+    controls.motion_word(code if sign > 0.0 else ARCS[1 - ARCS.index(code)])
     first, second, normal = geometry.PLANES[name]
-    start, end = (source.frames.to_program(point)[:3] for point in (last.start, last.end))
-    only = list(range(6))
+    start, end = (source.frames.to_program(point) for point in (move.start, move.end))
+    only: Sequence[int] = range(6)
     if max(abs(start[axis] - end[axis]) for axis in geometry.PLANES[source.plane][:2]) < SAME:
         edit.remove((AXES[first], AXES[second]))  # a circle ends where it begins, whatever is rounded
-        only = [normal, 3, 4, 5]
-    controls.go(controls.target(last.end), [letter for letter in axes if AXES.index(letter) in only], only=only)
-    _center(controls, last.arc.center, (first, second))
-
-
-def _center(controls: Controls, center: Sequence[float], plane: tuple[int, int]) -> None:
-    """I, J, K of a centre (set-up frame of the untouched program), in place of R too."""
-    out, edit = controls.out, controls.edit
-    there = out.frames.to_program(controls.of_setup([*center, 0.0, 0.0, 0.0]))
+        only = (normal, 3, 4, 5)
+    controls.go(controls.target(move.end), axes, only=only)
+    # I, J, K of the centre, in place of R too.
     here = out.frames.to_program(out.frames.position)
-    letters = [geometry.CENTER_WORDS[axis] for axis in plane]
-    edit.remove(("R", *(letter for letter in geometry.CENTER_WORDS if letter not in letters)))
-    for axis, letter in zip(plane, letters, strict=True):
+    there = out.frames.to_program(controls.of_setup([*arc.center, 0.0, 0.0, 0.0]))
+    edit.remove(("R", geometry.CENTER_WORDS[normal]))
+    for axis in (first, second):
+        letter = geometry.CENTER_WORDS[axis]
         value = (there[axis] if out.arc_absolute else there[axis] - here[axis]) / controls.scale(axis)
         if edit.word(letter) is not None or out.arc_absolute or abs(value) > OFF * 10.0**-controls.digits:
-            edit.write(letter, value)
+            edit.write(letter, value, controls.digits)
 
 
 def _cycle(controls: Controls, plane: str) -> None:
@@ -139,7 +123,7 @@ def _cycle(controls: Controls, plane: str) -> None:
     source, out, edit = controls.source, controls.out, controls.edit
     first, second, normal = geometry.PLANES[source.plane]
     if source.plane != plane:
-        edit.add_code(source.plane)
+        edit.write_code(source.plane)
     controls.motion_word(source.motion or "")
     repeats = edit.word("L")
     holes = [letter for letter in controls.axes if AXES.index(letter) != normal]
@@ -152,42 +136,28 @@ def _cycle(controls: Controls, plane: str) -> None:
             place[normal] = height
             height = out.frames.to_program(controls.target(source.frames.to_control(place)))[normal]
         if edit.word(letter) or abs(height - out.sticky.get(key, math.inf)) > OFF * controls.unit:
-            edit.write(letter, height / controls.scale(normal))
+            edit.write(letter, height / controls.scale(normal), controls.digits)
 
 
-def _cycle_in_moves(controls: Controls, first: int) -> list[Piece]:
-    """The moves, rapids and dwells of a cycle along an axis that is none any more."""
-    source = controls.source
-    if controls.linearise is None:
-        axis = AXES[geometry.PLANES[source.plane][2]]
-        raise controls.refusal(
-            f"{source.motion} drills along {axis}, and the placement turns the work out of it", LINEARISE
-        )
-    moves = source.recorder.recent[first:]
-    return [("G0" if move.motion == RAPID else "G1", move.end, move.dwell) for move in moves]
-
-
-def _piece_count(controls: Controls) -> int:
+def _piece_count(controls: Controls, move: Segment) -> int:
     """Number of pieces into which a move must be cut; those that must be are refused, unless it was asked for."""
-    motion, start, end, arc = controls.trace[-1]
-    plane, leaning, problem = controls.source.plane, 0.0, ""
+    motion, start, end, arc = move
+    plane, leaning = controls.source.plane, 0.0
     off_plane = arc is not None and controls.image(plane) is None
     if motion != RAPID and controls.turn.turns and start[3:] != end[3:]:
         written = controls.out.frames.position[3:], controls.target(end)[3:]
         leaning = lean(controls.turn, (start[3:], end[3:]), written)
-    if off_plane:
-        problem = f"an arc of {plane}, turned with the work, lies in none of the planes G17, G18, G19"
-    elif leaning > LEAN:
-        problem = f"as a control interpolates A, B and C, the tool would lean {leaning:.3g} degrees between its ends"
-    if problem and controls.linearise is None:
-        raise controls.refusal(problem, LINEARISE)
+    if controls.linearise is None:
+        off = f"an arc of {plane}, turned with the work, lies in none of the planes G17, G18, G19"
+        controls.refuse_if(off_plane, off, LINEARISE)
+        leans = f"as a control interpolates A, B and C, the tool would lean {leaning:.3g} degrees between its ends"
+        controls.refuse_if(leaning > LEAN, leans, LINEARISE)
     if controls.linearise is None or (not off_plane and leaning == 0.0):
         return 1
     tolerance = controls.linearise - controls.unit
-    if tolerance < controls.unit:
-        option = both_names("--linearise", f"{controls.linearise:g}")
-        problem = f"{option} is no more than the rounding to {controls.digits} decimals"
-        raise controls.refusal(problem, "give more of it, or more --decimals")
+    option = f"--linearise {controls.linearise:g}"
+    rounding = f"{option} is no more than the rounding to {controls.digits} decimals"
+    controls.refuse_if(tolerance < controls.unit, rounding, "give more of it, or more --decimals")
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
     if arc is not None and (off_plane or count > 1):
         controls.note(
@@ -201,12 +171,11 @@ def _piece_count(controls: Controls) -> int:
 def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
     """Straight moves, the first in the block's own line."""
     stop, edit = controls.current and controls.current.code("M stop"), controls.edit
-    if stop or controls.out.feed_mode == "G93":
-        what = stop[0] if stop else "inverse-time feed (G93)"
-        raise controls.refusal(f"{what} in a block that is written as several", "give it a block of its own, or G94")
+    what = stop[0] if stop else "inverse-time feed (G93)"
+    several = f"{what} in a block that is written as several"
+    controls.refuse_if(stop or controls.out.feed_mode == "G93", several, "give it a block of its own, or G94")
     edit.remove("IJKRPLQ")
-    slash = SLASH.match(edit.render()) if edit.block.optional else None
-    lead = slash[0] if slash else ""
+    lead = "".join(SLASH.findall(edit.render())) if edit.block.optional else ""
     lines = []
     for number, (code, point, dwell) in enumerate(pieces):
         if number:
@@ -217,7 +186,7 @@ def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
             lines.append(controls.emit())
         if dwell:
             controls.edit = edit.next_line(lead)
-            controls.edit.add_code("G4")
+            controls.edit.write_code("G4")
             controls.edit.write("P", dwell, FEED_DECIMALS)
             lines.append(controls.emit())
     return lines

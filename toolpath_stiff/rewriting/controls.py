@@ -10,14 +10,16 @@ Edits replace, add and take out words of one line; everything else of it stays a
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.interpreter import execute
+from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import CurrentBlock, Segment, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
-from toolpath_stiff.rewriting.turn import Turn, cutting_rows, differences
+from toolpath_stiff.rewriting.turn import Turn, differences
 from toolpath_stiff.units import MM_PER_INCH
 
 SAME = 1e-9  # mm, inch or degrees: a word whose number changes by less keeps its text
@@ -36,12 +38,10 @@ class LineEdit:
     ----------
     text, block
         The line without its end, and the words read from it.
-    decimals
-        Of the numbers written.
     """
 
-    def __init__(self, text: str, block: Block, decimals: int) -> None:
-        self.block, self.decimals = block, decimals
+    def __init__(self, text: str, block: Block) -> None:
+        self.block = block
         self._words = list(block.words)
         self._parts, end = list[str](), 0  # what stands before the first word, that, what stands before the next...
         for word in block.words:
@@ -57,26 +57,29 @@ class LineEdit:
         """The block's word of a letter other than G and M; None if it has none."""
         return next((word for word in self._words if word.letter == letter), None)
 
-    def write(self, letter: str, value: float, decimals: int | None = None) -> None:
+    def write(self, letter: str, value: float, decimals: int) -> None:
         """Give a word another number, or add the word."""
         # Fixed digits without idle zeros; a whole number keeps its point where the block writes points: a control that
         # counts `X9` in its least increment reads `X9.` right.
-        text = f"{value:.{self.decimals if decimals is None else decimals}f}"
+        text = f"{value:.{decimals}f}"
         text = (text.rstrip("0") if "." in text else text) if text.strip("-0.") else "0."
         text = text if self._points else text.removesuffix(".")
         word = self.word(letter)
         if word is None:
             self._add(letter, (letter.lower() if self._lower else letter) + text)
         elif abs(value - word.value) > SAME:
-            self.replace(word, word.text[0] + text)
+            self._put(word, text)
 
-    def replace(self, word: Word, text: str) -> None:
-        """Put other text in a word's place."""
-        self._parts[2 * self._words.index(word) + 1] = text
+    def write_code(self, code: str, word: Word | None = None) -> None:
+        """Add a G code, `G1` say, before the other words, or put it in a word's place."""
+        if word is None:
+            self._add("G", code.lower() if self._lower else code)
+        else:
+            self._put(word, code[1:])
 
-    def add_code(self, code: str) -> None:
-        """Add a G code, `G1` say, before the other words."""
-        self._add("G", code.lower() if self._lower else code)
+    def _put(self, word: Word, text: str) -> None:
+        """Another number in a word."""
+        self._parts[2 * self._words.index(word) + 1] = word.text[0] + text
 
     def remove(self, letters: Iterable[str]) -> None:
         """Take out the words of these letters, and the blanks beside them that are then one too many."""
@@ -94,7 +97,7 @@ class LineEdit:
 
     def next_line(self, lead: str) -> LineEdit:
         """A further line in this one's style, with no words yet; `lead` stands before them."""
-        line = LineEdit(lead, Block(self.block.line, ()), self.decimals)
+        line = LineEdit(lead, Block(self.block.line, ()))
         line._between, line._points, line._lower = self._between, self._points, self._lower
         return line
 
@@ -126,8 +129,8 @@ class Controls:
     ----------
     known
         Axes that the program has put somewhere; of the others only the control knows where they stand.
-    block, edit, axes
-        The current one, its line as it will be, the letters of the axes that it names.
+    edit, axes
+        The line of the current block as it will be, the letters of the axes that it names.
     current
         The words of the block by what they do; None for a further line in its place.
     trace
@@ -141,7 +144,7 @@ class Controls:
         self.decimals, self.linearise = decimals, linearise
         self.known = [False, False, False, True, True, True]
         self.notes: list[str] = []
-        self.block, self.edit = Block(0, ()), LineEdit("", Block(0, ()), 0)
+        self.edit = LineEdit("", Block(0, ()))
         self.current: CurrentBlock | None = None
         self.axes: list[str] = []
         self.trace: list[Segment] = []
@@ -155,7 +158,12 @@ class Controls:
 
     def refusal(self, problem: str, hint: str = "") -> InputError:
         """The error for the current block, which cannot be rewritten."""
-        return ProgramError(problem, hint=hint, file=self.source.name, line=self.block.line)
+        return ProgramError(problem, hint=hint, file=self.source.name, line=self.edit.block.line)
+
+    def refuse_if(self, refused: object, problem: str, hint: str) -> None:
+        """Raise the error for the current block, if it is to be refused."""
+        if refused:
+            raise self.refusal(problem, hint)
 
     @property
     def digits(self) -> int:
@@ -189,20 +197,16 @@ class Controls:
         given = self.current.code("plane") if self.current else None
         if given is None:
             return before
-        image = self.image(given[0])
-        plane = image[0] if image else given[0]
+        plane = (self.image(given[0]) or given)[0]
         if plane != given[0]:
-            self.edit.replace(given[1], given[1].text[0] + plane[1:])
+            self.edit.write_code(plane, given[1])
         return plane
 
     def motion_word(self, wanted: str) -> None:
         """Make sure that the block is executed in the motion mode wanted."""
-        given = self.current.code("motion") if self.current else None
-        if given is None:
-            if self.out.motion != wanted:
-                self.edit.add_code(wanted)
-        elif given[0] != wanted:
-            self.edit.replace(given[1], given[1].text[0] + wanted[1:])
+        mode, word = (self.current.code("motion") if self.current else None) or (self.out.motion, None)
+        if mode != wanted:
+            self.edit.write_code(wanted, word)
 
     def target(self, control: Sequence[float]) -> list[float]:
         """Control coordinates of `out` for a point of `source` in its control coordinates."""
@@ -231,13 +235,13 @@ class Controls:
                 if not off or not (self.known[axis] or coupled):
                     continue
             goal = there[axis] if out.absolute else (there[axis] - here[axis]) / parts
-            self.edit.write(letter, goal / scale)
+            self.edit.write(letter, goal / scale, self.digits)
 
     def emit(self) -> str:
         """Have `out` execute the edited line; its text."""
         text = self.edit.render()
         try:
-            block = read_block(text, self.block.line, self.source.name)
+            block = read_block(text, self.edit.block.line, self.source.name)
             execute(self.out, block)
         except InputError as error:
             raise self.refusal(
@@ -249,19 +253,17 @@ class Controls:
         return text
 
     def check(self, first: int, first_out: int, pieces: bool) -> None:
-        """Every cutting move of the block must be the placed one to within the rounding; of `pieces` the two ends."""
-        self._coarsest = unit = max(self._coarsest, self.unit)
-        wanted = cutting_rows(self.source.recorder, first)
-        written = cutting_rows(self.out.recorder, first_out)
-        if pieces and wanted and written:
-            wanted = [wanted[0]._replace(end=wanted[-1].end, arc=None)]
-            written = [written[0]._replace(end=written[-1].end)]
+        """Every cutting move of the block must be the placed one within the rounding; of one in `pieces` the ends."""
+        self._coarsest = max(self._coarsest, self.unit)
+        source, out = self.source.recorder.recent[first:], self.out.recorder.recent[first_out:]
+        wanted, written = ([move for move in moves if move.motion != RAPID] for moves in (source, out))
+        if pieces and len(wanted) == 1 and written:
+            wanted = [replace(wanted[0], arc=None)]
+            written = [replace(written[0], end=written[-1].end)]
         # The steps of a cycle with L in G91 repeat one rounding.
-        repeats = next((word.value for word in self.block.words if word.letter == "L"), 1.0)
-        difference = differences(self.turn, wanted, written, unit * max(repeats, 1.0))
-        if difference:
-            unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
-            hint = "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
-            if unknown:
-                hint = f"position {unknown} in rapid before the first cutting move"
-            raise self.refusal(f"the block cannot be rewritten: its cutting move {difference}", hint)
+        repeats = next((word.value for word in self.edit.block.words if word.letter == "L"), 1.0)
+        difference = differences(self.turn, wanted, written, self._coarsest * max(repeats, 1.0))
+        unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
+        hint = "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
+        hint = f"position {unknown} in rapid before the first cutting move" if unknown else hint
+        self.refuse_if(difference, f"the block cannot be rewritten: its cutting move {difference}", hint)

@@ -62,15 +62,12 @@ def offset_blocks(program: ReadProgram, placement: Pose, *, decimals: int = 4) -
     G54: X100 Y0 Z800
     G17 G54 G68 X0 Y0 R90
     """
-    if program.dialect == CUTTER_LOCATION:
-        reason = NOT_POSTED
-    elif program.kinematics:
-        reason = (
-            f"the program is posted for another kinematics ({program.kinematics}), whose control its G54 belongs to: "
-            "post it for this machine"
-        )
-    else:
-        reason = _not_about_z(program, placement) or _not_g54_alone(program)
+    posted = (
+        f"the program is posted for another kinematics ({program.kinematics}), whose control its G54 belongs to: "
+        "post it for this machine"
+    )
+    reason = NOT_POSTED if program.dialect == CUTTER_LOCATION else posted if program.kinematics else ""
+    reason = reason or _not_about_z(program, placement) or _not_g54_alone(program)
     if reason:
         return OffsetBlocks("", "", reason, reason)
     x, y, z = (_number(mm_from_m(v), decimals) for v in placement[:3])
@@ -100,10 +97,10 @@ def _not_g54_alone(program: ReadProgram) -> str:
     for number, text in enumerate(program.source, 1):
         for digits in G_WORD.findall("".join(COMMENTS.sub("", text).split())):
             code = code_name("G", float(digits))
-            if code in OTHER_OFFSETS:
-                return f"the program uses {code} beside G54 (line {number}), which would stay where it is: {USE_WRITE}"
             if code == "G10":
                 return f"the program sets offsets itself (G10, line {number}): {USE_WRITE}"
+            if code in OTHER_OFFSETS:
+                return f"the program uses {code} beside G54 (line {number}), which would stay where it is: {USE_WRITE}"
     return ""
 
 

@@ -148,18 +148,25 @@ def rewrite_program(
 
 def check_rewritable(program: ReadProgram) -> None:
     """Raise `InputError` for a program whose blocks are not what a control of this machine executes."""
-    what, hint = "", "place it without --write"
-    if program.kinematics:
-        what = f"posted for another kinematics ({program.kinematics})"
-        hint += ", set the work so in the CAM system, and post it for this machine"
-    elif program.parametric:
-        what, hint = "with variables", f"{hint}, and set the work offset that is printed (G10)"
-    elif program.dialect == CUTTER_LOCATION:
-        what, hint = "for a post processor (a cutter-location file)", f"{hint}, or place the posted program"
-    elif program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
-        what = f"read by {program.interpreter!r} as {program.dialect!r}, not as one of {', '.join(PLAIN_DIALECTS)},"
-    if what:
-        raise ProgramError(f"a program {what} cannot be rewritten", hint=hint, file=program.name)
+    control = f"read by {program.interpreter!r} as {program.dialect!r}, not as one of {', '.join(PLAIN_DIALECTS)},"
+    refused = (
+        (
+            bool(program.kinematics),
+            f"posted for another kinematics ({program.kinematics})",
+            ", set the work so in the CAM system, and post it for this machine",
+        ),
+        (program.parametric, "with variables", ", and set the work offset that is printed (G10)"),
+        (
+            program.dialect == CUTTER_LOCATION,
+            "for a post processor (a cutter-location file)",
+            ", or place the posted program",
+        ),
+        (program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS, control, ""),
+    )
+    for holds, what, instead in refused:
+        if holds:
+            hint = f"place it without --write{instead}"
+            raise ProgramError(f"a program {what} cannot be rewritten", hint=hint, file=program.name)
 
 
 def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
@@ -168,20 +175,18 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
     ends += [""] * (len(lines) - len(ends))
     running, started = True, False
     for number, (line, raw, end) in enumerate(zip(lines, raw_lines, ends, strict=False), 1):
-        if not running:
-            yield raw + end
-            continue
-        block = read_block(line, number, name)
-        left_out = block.optional and block.switch in switches
         written = [line]
-        if left_out and block.words and not block.percent:  # it would be wrong once the switch is off
-            problem = "a block that --block-delete leaves out cannot be rewritten"
-            raise Place(name, number).fail(problem, hint="take it out of the program, or do without --block-delete")
-        if block.percent:
-            running, started = not started, True
-        elif not left_out:
-            started = started or bool(block.words)
-            written, running = rewrite_block(controls, block, line)
+        if running:
+            block = read_block(line, number, name)
+            left_out = block.optional and block.switch in switches
+            if block.percent:
+                running, started = not started, True
+            elif not left_out:
+                started = started or bool(block.words)
+                written, running = rewrite_block(controls, block, line)
+            elif block.words:  # it would be wrong once the switch is off
+                problem = "a block that --block-delete leaves out cannot be rewritten"
+                raise Place(name, number).fail(problem, hint="take it out of the program, or do without --block-delete")
             if block.optional and written != [line]:
                 controls.note(SLASHED)
         yield raw + end if written == [line] else (end or ends[0] or "\n").join(written) + end

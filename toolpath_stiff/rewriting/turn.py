@@ -11,13 +11,12 @@ are in the set-up frame of the untouched program.
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.courses import frame_of, point_on_arc
-from toolpath_stiff.nc.moves import RAPID, Arc, Recorder
+from toolpath_stiff.nc.moves import Arc, Move
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.units import ShopPose
 
@@ -43,21 +42,15 @@ class Turn:
     def __init__(self, placement: ShopPose, original: ShopPose) -> None:
         new, old = (rotation_matrices(np.radians(origin[3:])) for origin in (placement, original))
         self.turn: FloatArray = _clean(old.T @ new)
-        shift = np.array(placement[:3]) - np.array(original[:3])
-        self.shift = shift if not any(original[3:]) else old.T @ shift
-        self._yaw = rotation_about_z(np.radians(original[5] - placement[5]))
+        self.shift: FloatArray = old.T @ (np.array(placement[:3]) - np.array(original[:3]))
         self.turns = not np.array_equal(self.turn, np.eye(3))
-        still = _clean(self.turn @ self._yaw)
-        self._never_yaws = np.array_equal(still, np.eye(3))  # a turn about the vertical alone
-        self._rows = [[float(v) for v in row] for row in self.turn]
-        self._shift = [float(v) for v in self.shift]
+        self._yaw = rotation_about_z(np.radians(original[5] - placement[5]))
+        self._never_yaws = np.array_equal(_clean(self.turn @ self._yaw), np.eye(3))  # a turn about the vertical alone
 
     def point(self, point: Sequence[float]) -> list[float]:
         """The placed point of a point of the set-up frame, x, y, z in mm."""
         x, y, z = point
-        if not self.turns:
-            return [x + self._shift[0], y + self._shift[1], z + self._shift[2]]
-        return [a * x + b * y + c * z + s for (a, b, c), s in zip(self._rows, self._shift, strict=True)]
+        return [a * x + b * y + c * z + s for (a, b, c), s in zip(self.turn.tolist(), self.shift.tolist(), strict=True)]
 
     def rotations(self, abc: FloatArray) -> FloatArray:
         """(n, 3, 3) rotations R_new of programmed roll, pitch, yaw (n, 3) in degrees."""
@@ -79,8 +72,6 @@ class Turn:
 
     def in_program(self, rotation: float) -> FloatArray:
         """(3, 3) turn as it looks in program axes that a work offset's rotation (degrees) turned already."""
-        if not rotation or not self.turns:
-            return self.turn
         inner = rotation_about_z(np.radians(rotation))
         return _clean(inner.T @ self.turn @ inner)
 
@@ -99,15 +90,10 @@ def chords(arc: Arc, start: Sequence[float], end: Sequence[float], tolerance: fl
     return math.ceil(abs(arc.sweep) / min(step, LARGEST_CHORD) - 1e-9)
 
 
-def points_between(start: Sequence[float], end: Sequence[float], arc: Arc | None, count: int) -> list[list[float]]:
-    """Ends (6) of `count` equal pieces of a move; the last one is its end to the last digit."""
-    points = []
-    for share in (i / count for i in range(1, count)):
-        point = [first + share * (last - first) for first, last in zip(start, end, strict=True)]
-        if arc is not None:
-            point[:3] = point_on_arc(arc, start, end, share)
-        points.append(point)
-    return [*points, list(end)]
+def point_at(start: Sequence[float], end: Sequence[float], arc: Arc | None, share: float) -> list[float]:
+    """The point (6) at a share of a move."""
+    point = [first + share * (last - first) for first, last in zip(start, end, strict=True)]
+    return point if arc is None else [*point_on_arc(arc, start, end, share), *point[3:]]
 
 
 def lean(turn: Turn, programmed: Sequence[Sequence[float]], written: Sequence[Sequence[float]]) -> float:
@@ -133,58 +119,38 @@ END_UNITS, MIDDLE_UNITS = 2.0, 24.0
 SHORTEST_UNITS = 4.0
 
 
-class CuttingMove(NamedTuple):
-    """A recorded cutting move: ends (6), arc."""
-
-    start: list[float]
-    end: list[float]
-    arc: Arc | None
-
-    def short(self, unit: float) -> bool:
-        """True where rounding to `unit` may make it vanish."""
-        moved = max(abs(e - s) for s, e in zip(self.start, self.end, strict=True))
-        return self.arc is None and moved < SHORTEST_UNITS * unit
-
-    def point(self, share: float) -> Sequence[float]:
-        """The point at a share of it, x, y, z in mm."""
-        if self.arc is not None:
-            return point_on_arc(self.arc, self.start, self.end, share)
-        return [s + share * (e - s) for s, e in zip(self.start[:3], self.end[:3], strict=True)]
-
-
-def cutting_rows(recorder: Recorder, first: int) -> list[CuttingMove]:
-    """Cutting moves recorded from `first` on."""
-    moves = recorder.recent[first:]
-    return [CuttingMove(move.start, move.end, move.arc) for move in moves if move.motion != RAPID]
-
-
-def differences(turn: Turn, wanted: list[CuttingMove], written: list[CuttingMove], unit: float) -> str:
+def differences(turn: Turn, wanted: list[Move], written: list[Move], unit: float) -> str:
     """How a block's written cutting moves differ from the placed ones beyond the rounding to `unit` mm; "" if nowhere.
 
     Straight moves of a few units may vanish by rounding, or come to be.
     """
     if len(wanted) != len(written):
-        wanted, written = ([row for row in rows if not row.short(unit)] for rows in (wanted, written))
+        wanted, written = ([move for move in moves if not _short(move, unit)] for moves in (wanted, written))
     if len(wanted) != len(written):
         return f"would be {len(written)} moves and not {len(wanted)}"
     pairs = zip(wanted, written, strict=True)
-    return next((what for placed, row in pairs if (what := _difference(turn, placed, row, unit))), "")
+    return next((what for placed, move in pairs if (what := _difference(turn, placed, move, unit))), "")
 
 
-def _difference(turn: Turn, wanted: CuttingMove, written: CuttingMove, unit: float) -> str:
+def _short(move: Move, unit: float) -> bool:
+    """Whether rounding to `unit` may make a move vanish."""
+    longest = max(abs(e - s) for s, e in zip(move.start, move.end, strict=True))
+    return move.arc is None and longest < SHORTEST_UNITS * unit
+
+
+def _difference(turn: Turn, wanted: Move, written: Move, unit: float) -> str:
     """For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them."""
-    ends = (("starts", wanted.start, written.start), ("ends", wanted.end, written.end))
-    for what, placed, point in ends:
+    for what, placed, point in (("starts", wanted.start, written.start), ("ends", wanted.end, written.end)):
         apart = math.dist(turn.point(placed[:3]), point[:3])
         if apart > END_UNITS * unit:
             return f"{what} {apart:.4g} mm off"
         if placed[3:] != point[3:] or not turn.keeps(placed[3:]):
-            goal = turn.rotations(np.array([placed[3:]]))[0]
-            angle = angle_between(goal, rotation_matrices(np.radians(point[3:])))
+            angle = angle_between(turn.rotations(np.array([placed[3:]]))[0], rotation_matrices(np.radians(point[3:])))
             if angle > END_UNITS * unit:
                 return f"has its tool axis {angle:.4g} degrees off"
     for share in BETWEEN.tolist() if wanted.arc or written.arc else ():
-        apart = math.dist(turn.point(wanted.point(share)), written.point(share))
+        placed, point = (point_at(move.start, move.end, move.arc, share)[:3] for move in (wanted, written))
+        apart = math.dist(turn.point(placed), point)
         if apart > MIDDLE_UNITS * unit:
             return f"is {apart:.4g} mm off on its way"
     return ""

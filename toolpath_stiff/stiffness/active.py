@@ -4,7 +4,7 @@ Each fault is one `EffectFault` with file and line of the effect's code. The pac
 contract by the tests and go through unchecked.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,8 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import EffectFault
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values
+from toolpath_stiff.stiffness.contract import SETUP, Effect, LoadPath, Values, at_pose
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign, line_in, line_of
-from toolpath_stiff.stiffness.possible import at_pose
 
 # What each hook that adds to the compliance returns for n poses: shape beyond n.
 ADDING: dict[str, tuple[int, ...]] = {
@@ -33,22 +32,32 @@ class ActiveEffect:
     effect: Effect
     values: Values
 
+    @property
+    def waits_for(self) -> tuple[str, ...]:
+        """The conditions without which it adds nothing."""
+        return self.effect.conditions(self.values)
+
+    @property
+    def setup(self) -> str:
+        """The set-up that it belongs to, "" if it names none."""
+        named = any(p.name == SETUP and p.kind == "text" for p in self.effect.parameters)
+        return str(self.values[SETUP]) if named else ""
+
     def adds(self, hook: str, path: LoadPath) -> FloatArray | None:
         """What one of `ADDING` adds at n poses; None adds nothing, and so does an effect that does not act there."""
         if not self.effect.acts_on(path, self.values):
             return None
         added: FloatArray | None = self._called(hook, path)
-        if added is None or not is_foreign(self.effect):
-            return added
-        self._check_shape(hook, added, (len(path), *ADDING[hook]))
-        unsound = ~(np.abs(added) <= LARGEST)
-        if path.strut_forces is not None:  # nan at a singular pose, where nothing can be asked
-            unsound[~np.isfinite(path.strut_forces).all(axis=1)] = False
-        self._refuse(hook, path, added, unsound, f"finite numbers within +-{LARGEST:g}")
-        if added.ndim == 3:
-            gap = np.abs(added - np.swapaxes(added, 1, 2))
-            uneven = gap > ASYMMETRY * np.abs(added).max(axis=(1, 2), keepdims=True)
-            self._refuse(hook, path, added, uneven, "a symmetric matrix")
+        if added is not None and is_foreign(self.effect):
+            self._check_shape(hook, added, (len(path), *ADDING[hook]))
+            unsound = ~(np.abs(added) <= LARGEST)
+            if path.strut_forces is not None:  # nan at a singular pose, where nothing can be asked
+                unsound[~np.isfinite(path.strut_forces).all(axis=1)] = False
+            self._refuse(hook, path, added, unsound, f"finite numbers within +-{LARGEST:g}")
+            if added.ndim == 3:
+                gap = np.abs(added - np.swapaxes(added, 1, 2))
+                uneven = gap > ASYMMETRY * np.abs(added).max(axis=(1, 2), keepdims=True)
+                self._refuse(hook, path, added, uneven, "a symmetric matrix")
         return added
 
     def geometry(self, machine: Hexapod) -> Hexapod:
@@ -76,13 +85,16 @@ class ActiveEffect:
 
     def _called(self, hook: str, *arguments: Any) -> Any:
         """What a hook returns. Its own errors become faults; what it is shown is not to be written to."""
+        method = getattr(self.effect, hook)
         if not is_foreign(self.effect):
-            return getattr(self.effect, hook)(*arguments, self.values)
+            return method(*arguments, self.values)
         for path in (argument for argument in arguments if isinstance(argument, LoadPath)):
-            _protect(path)
+            for array in (*vars(path).values(), *vars(path.struts).values()):
+                if isinstance(array, np.ndarray):
+                    array.flags.writeable = False  # an effect that writes there would falsify the others
         try:
             with np.errstate(all="ignore"):  # what it divides by zero shows in the result
-                return getattr(self.effect, hook)(*arguments, self.values)
+                return method(*arguments, self.values)
         except (Exception, SystemExit) as error:  # whatever a user's code does
             what = f"{type(error).__name__}: {error}".rstrip(": ")
             raise self._fault(hook, f"ends in {what}", line=line_in(error, file_of(self.effect))) from None
@@ -99,15 +111,6 @@ class ActiveEffect:
     def _fault(self, hook: str, mistake: str, expected: str = "", line: int | None = None) -> EffectFault:
         text, line = f"effect {self.effect.name}: {hook} {mistake}", line or line_of(type(self.effect), hook)
         return EffectFault(text, expected=expected, file=file_of(self.effect), line=line)
-
-
-def _protect(path: LoadPath) -> None:
-    """An effect that writes into what it is shown would falsify the others."""
-    for owner in (path, path.struts):
-        for field in fields(owner):
-            array = getattr(owner, field.name)
-            if isinstance(array, np.ndarray):
-                array.flags.writeable = False
 
 
 def _kind(value: object) -> str:

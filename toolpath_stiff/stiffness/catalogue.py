@@ -1,17 +1,17 @@
 """Physical effects along the load path, one flat file each; `contract` says what an effect is.
 
-Which effects there are: the packaged ones, installed ones (entry points), and those of a user's file.
+Which effects there are: the packaged ones and those of a user's files.
 """
 
 from __future__ import annotations
 
 import difflib
-import importlib.metadata
 import pkgutil
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -28,7 +28,6 @@ from toolpath_stiff.stiffness.term_file import effects_of_terms
 if TYPE_CHECKING:
     import pandas as pd
 
-ENTRY_POINTS = "toolpath_stiff.effects"
 MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
 
 
@@ -37,37 +36,19 @@ def packaged_effects() -> dict[str, Effect]:
     """Name -> effect of the packaged files, one an effect."""
     packaged: dict[str, Effect] = {}
     for name in sorted(module.name for module in pkgutil.iter_modules(effects.__path__)):
-        packaged |= _effects_in(importlib.import_module(f"toolpath_stiff.stiffness.effects.{name}"), name)
+        packaged |= _effects_in(import_module(f"toolpath_stiff.stiffness.effects.{name}"), name)
     return packaged
 
 
-@cache
-def installed_effects() -> tuple[dict[str, Effect], dict[str, str]]:
-    """Effects that other packages offer as entry points, and name -> reason of those that fail to load."""
-    installed: dict[str, Effect] = {}
-    broken: dict[str, str] = {}
-    for point in importlib.metadata.entry_points(group=ENTRY_POINTS):
-        try:
-            loaded = point.load()
-            effect = loaded() if isinstance(loaded, type) else loaded
-            check_declarations(effect, point.name)
-            if effect.name in packaged_effects() or effect.name in installed:
-                raise EffectError(f"effect {effect.name} exists already")
-            installed[effect.name] = effect
-        except Exception as error:  # a broken plug-in is listed with its reason; the rest still works
-            broken[point.name] = f"{type(error).__name__}: {error}"
-    return installed, broken
-
-
 def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
-    """Name -> effect: packaged, installed, and those of the given files, sorted along the load path.
+    """Name -> effect: packaged, and those of the given files, sorted along the load path.
 
     Raises
     ------
     InputError
         A file cannot be loaded, holds no effect, or names one that exists already.
     """
-    known = packaged_effects() | installed_effects()[0]
+    known = dict(packaged_effects())
     for file in files:
         for name, effect in effects_from_file(file).items():
             if name in known:
@@ -81,14 +62,11 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
     """The effect of that name. Raises `InputError` with the nearest name if there is none."""
     files = list(files)
     known = known_effects(files)
-    if name in known:
-        return known[name]
-    broken = installed_effects()[1]
-    if name in broken:
-        raise EffectError(f"effect {name} does not load: {broken[name]}", hint="repair or uninstall its package")
-    near = difflib.get_close_matches(name, known, n=1)
-    listed = f"`{command_line('effects', 'list', *options(effects=list(files)))}` lists them"
-    raise EffectError(f"unknown effect {name!r}", hint=f"did you mean {near[0]}?" if near else listed)
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1)
+        listed = f"`{command_line('effects', 'list', *options(effects=files))}` lists them"
+        raise EffectError(f"unknown effect {name!r}", hint=f"did you mean {near[0]}?" if near else listed)
+    return known[name]
 
 
 def effects_from_file(file: str | Path) -> dict[str, Effect]:
@@ -124,19 +102,14 @@ def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]
     except InputError:
         raise
     except (Exception, SystemExit) as error:  # whatever a user's file does
-        raise _failure(error, file) from None
+        what, line = f"{type(error).__name__}: {error}".rstrip(": "), line_in(error, file)
+        if isinstance(error, SyntaxError) and error.filename == str(path):
+            what, line = f"{type(error).__name__}: {error.msg}", error.lineno
+        raise EffectError(f"{what}, when the file is run", file=file, line=line) from None
     if not effects_there:
         expected = "a class derived from toolpath_stiff.stiffness.effects.Effect"
         raise EffectError("defines no effect", expected=expected, file=file)
     return effects_there
-
-
-def _failure(error: BaseException, file: str) -> InputError:
-    """Where a file failed when it was run, and of what."""
-    what, line = f"{type(error).__name__}: {error}".rstrip(": "), line_in(error, file)
-    if isinstance(error, SyntaxError) and error.filename and Path(error.filename).resolve() == Path(file).resolve():
-        what, line = f"{type(error).__name__}: {error.msg}", error.lineno
-    return EffectError(f"{what}, when the file is run", file=file, line=line)
 
 
 def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
@@ -160,15 +133,13 @@ class EffectCatalogue(Result):
     ----------
     effects
         The effects themselves.
-    broken
-        Plug-ins that do not load -> why.
 
     Examples
     --------
     >>> import toolpath_stiff as tps
     >>> catalogue = tps.effects()
-    >>> catalogue["weak_strut"].link, catalogue.broken
-    ('struts', {})
+    >>> catalogue["weak_strut"].link
+    'struts'
     >>> catalogue.to_frame().columns.tolist()
     ['link', 'name', 'title', 'equation', 'source', 'load_dependent']
     >>> len(catalogue.to_dict()["effects"]) == len(catalogue.effects)
@@ -179,7 +150,6 @@ class EffectCatalogue(Result):
     shown_by: ClassVar[str] = "effects"
 
     effects: list[Effect]
-    broken: dict[str, str]
 
     def __getitem__(self, name: str) -> Effect:
         """An effect by its name."""
@@ -187,7 +157,7 @@ class EffectCatalogue(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """What each effect declares, in its own units."""
-        return {"effects": [self.view.describe_effect(effect) for effect in self.effects], "broken": self.broken}
+        return {"effects": [self.view.describe_effect(effect) for effect in self.effects]}
 
     def to_frame(self) -> pd.DataFrame:
         """One row an effect: link of the load path, name, title, equation, source."""

@@ -14,32 +14,29 @@ Everything is SI and batched over n poses. A method that an effect does not impl
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.sizes import about
-
-if TYPE_CHECKING:
-    from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
-
+from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
+from toolpath_stiff.stiffness.sizes import about, sizes_in_words
+from toolpath_stiff.units import mm_from_m
 
 Values = Mapping[str, Any]  # name of a parameter -> SI value, or what is chosen: a number, a name
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
-
-
 HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading")
 
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
-
-
 SETUP = "setup"  # the condition, and the name of every parameter that names a set-up
+EXPERIENCE = "engineering experience, no source"
+IDLE = 1e-3  # N in a strut: below, powers of the force would diverge, and the strut adds nothing that shows
 
 
 @dataclass(frozen=True)
@@ -131,21 +128,8 @@ def choice(
     return Parameter(name, "", 1.0, bounds, (low, high), source, neutral, meaning, kind="integer")
 
 
-class Size(float):
-    """A size in a sentence: without words to two digits, with two of them the first above zero, else the second.
-
-    Examples
-    --------
-    >>> "{0} mm too {0:long/short}".format(Size(-0.123))
-    '0.12 mm too short'
-    """
-
-    def __format__(self, words: str) -> str:
-        return words.split("/")[not self > 0.0] if words else about(self)
-
-
 @dataclass(frozen=True)
-class LoadPath:
+class LoadPath(ArrayColumns):
     """What an effect sees of n poses under load. SI, base axes.
 
     Attributes
@@ -186,11 +170,15 @@ class LoadPath:
     def __len__(self) -> int:
         return len(self.position)
 
-    def take(self, rows: IntArray) -> LoadPath:
-        """Some of the poses, by index; repeated as the index says."""
-        struts = Struts(*(getattr(self.struts, field.name)[rows] for field in fields(self.struts)))
-        arrays: Any = {name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return replace(self, struts=struts, **arrays)
+    def take(self, rows: IntArray | BoolArray | slice) -> LoadPath:
+        """Some of the poses; repeated as an index says."""
+        return replace(super().take(rows), struts=self.struts.take(rows))
+
+
+def at_pose(path: LoadPath, i: int) -> str:
+    """Pose i in words, as " at X0 Y0 Z800 mm" with the space before it."""
+    x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[i])
+    return f" at X{x:g} Y{y:g} Z{z:g} mm"
 
 
 def at_the_tip(path: LoadPath, compliances: FloatArray) -> FloatArray:
@@ -222,10 +210,26 @@ class Conditions:
 
     def columns(self, n: int) -> dict[str, Any]:
         """The same for n poses, as `LoadPath` holds it."""
-        return {
-            "setup": None if self.setup is None else np.full(n, self.setup),
-            "temperature": None if self.temperature is None else np.full(n, self.temperature),
-        }
+        given = {"setup": self.setup, "temperature": self.temperature}
+        return {name: np.full(n, value) for name, value in given.items() if value is not None}
+
+
+def _told(clause: str, values: Values) -> str:
+    """A clause with its values: numbers to two digits; of two words the first where the number is above zero.
+
+    Examples
+    --------
+    >>> _told("{error} mm too {error:long/short}", {"error": -0.123})
+    '0.12 mm too short'
+    """
+
+    def word(place: re.Match[str]) -> str:
+        value, words = values[place[1]], place[2]
+        if words:
+            return str(words.split("/")[not value > 0.0])
+        return about(value) if isinstance(value, float) else str(value)
+
+    return re.sub(r"\{(\w+)(?::(.*?))?\}", word, clause)
 
 
 class Effect:
@@ -280,6 +284,7 @@ class Effect:
     load_dependent: bool = False
     unknown_to_control: bool = False
     clause: str = ""  # what a fit has found, parameters by name: "the tool is {error} mm {error:longer/shorter}"
+    parts: tuple[tuple[str, str], ...] = ()  # parameter, words after its size, where the clause says {sizes}
     described_from: tuple[str, ...] = ()
     file: str = ""  # that declares it without code
 
@@ -402,7 +407,7 @@ class Effect:
         >>> setup.conditions(values), setup.acts_on(path, values), setup.is_instrument  # the path names no set-up
         (('setup',), False, False)
         """
-        if type(self).geometry is not Effect.geometry:
+        if "geometry" in self.hooks:
             return ()
         named = (q.name for q in self.parameters if q.kind == "text" and p.get(q.name))
         return tuple(dict.fromkeys(name for name in (*self.needs, *named) if name in CONDITIONS))
@@ -417,12 +422,13 @@ class Effect:
         `p`: parameter name -> value in the units of files, choices as they are.
         """
         if self.clause:
-            return self.clause.format(**{q.name: p[q.name] if q.discrete else Size(p[q.name]) for q in self.parameters})
-        sizes = []
+            sizes = sizes_in_words([(p[name], words) for name, words in self.parts])
+            return _told(self.clause, {"sizes": sizes, **{q.name: p[q.name] for q in self.parameters}})
+        named = []
         for q in self.parameters:
             value = p[q.name] if q.discrete else f"{float(f'{p[q.name]:.3g}'):g} {q.unit}".rstrip()
-            sizes.append(f"{q.name.replace('_', ' ')} {value}")
-        return f"{self.title}, {', '.join(sizes)}"
+            named.append(f"{q.name.replace('_', ' ')} {value}")
+        return f"{self.title}, {', '.join(named)}"
 
     @property
     def hooks(self) -> list[str]:

@@ -10,10 +10,9 @@ from typing import Any
 from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.contract import HOOKS, LINKS, Effect, Parameter
 from toolpath_stiff.stiffness.effect_source import line_of
-from toolpath_stiff.toml_reader import is_text
+from toolpath_stiff.toml_reader import is_number, is_text
 
 TEXTS = ("name", "title", "link", "equation", "source")
-FLAGS, LISTS = ("load_dependent", "unknown_to_control"), ("needs", "described_from")
 NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)  # of an effect or a parameter; a bare key of a machine file
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 KINDS = ("real", "integer", "text")
@@ -28,45 +27,40 @@ RULES: list[tuple[str, Callable[[Any], object], str]] = [
     *((attribute, is_text, "a text that is not empty") for attribute in TEXTS),
     ("name", NAME.fullmatch, "letters, digits and underscores, such as my_screw"),
     ("link", LINKS.__contains__, f"one of {', '.join(LINKS)}"),
-    *((attribute, (False, True).__contains__, "True or False") for attribute in FLAGS),
-    *((attribute, _are_texts, 'texts in brackets, such as ("time_min",)') for attribute in LISTS),
+    *((flag, (False, True).__contains__, "True or False") for flag in ("load_dependent", "unknown_to_control")),
+    *((names, _are_texts, 'texts in brackets, such as ("time_min",)') for names in ("needs", "described_from")),
     ("parameters", lambda value: isinstance(value, tuple | list), "(Parameter(...), ...), with a comma"),
 ]
 
 
-def check_declarations(effect: object, where: str) -> None:
-    """Refuse what is not a complete effect; `where` is its file, or the name of its entry point.
+def check_declarations(effect: Effect, where: str) -> None:
+    """Refuse what is not a complete effect; `where` is its file.
 
     Raises
     ------
     InputError
         Something is missing, of the wrong kind, or contradicts itself; with the line of the declaration.
     """
-    if not isinstance(effect, Effect):
-        raise EffectError(f"{effect!r} is not an effect", file=where)
-    if fault := next(_faults(effect), None):
-        attribute, mistake, expected = fault
+    for attribute, mistake, expected in _faults(effect):
         kind = type(effect)
         line = line_of(kind, attribute)
         raise EffectError(f"effect {kind.__name__}: {mistake}", expected=expected, file=where, line=line)
 
 
 def _faults(effect: Any) -> Iterator[tuple[str, str, str]]:
-    """Attribute, mistake, what was expected."""
-    for attribute in (*TEXTS, "parameters"):
+    """Attribute, mistake, what was expected; only the first is sure to be one."""
+    for attribute, holds, expected in RULES:
         if not hasattr(effect, attribute):
             yield "", f"`{attribute}` is missing", ""
-    for attribute, holds, expected in RULES:
-        value = getattr(effect, attribute)
-        if not holds(value):
+        if not holds(value := getattr(effect, attribute)):
             yield attribute, f"{attribute} = {value!r:.60}", expected
     names = []
     for parameter in effect.parameters:
         if not isinstance(parameter, Parameter):
             yield "parameters", f"parameters hold {parameter!r:.60}", "Parameter(...)"
-        elif wrong := wrong_in(parameter):
+        if wrong := wrong_in(parameter):
             yield "parameters", f"parameter {parameter.name}: {wrong[0]}", wrong[1]
-        elif parameter.name in names:
+        if parameter.name in names:
             yield "parameters", f"parameter {parameter.name} is declared twice", ""
         names.append(parameter.name)
     for name, value in vars(type(effect)).items():
@@ -90,13 +84,13 @@ def wrong_in(parameter: Parameter) -> tuple[str, str] | None:
         return f"kind = {parameter.kind!r}", f"one of {', '.join(KINDS)}"
     if not BARE_KEY.fullmatch(parameter.key):
         return f"unit = {parameter.unit!r} makes the key {parameter.key!r}", "a unit in plain letters, such as um, N/um"
-    if not _is_number(parameter.si) or not 0.0 < parameter.si < math.inf:
+    if not _are_numbers([parameter.si], 1) or not 0.0 < parameter.si < math.inf:
         return "si is no number above 0", f"the SI value of one {parameter.unit or 'unit'}, such as 1e-9"
     if parameter.kind == "text":
         return None
-    for name, pair in (("bounds", parameter.bounds), ("typical", parameter.typical), ("neutral", [parameter.neutral])):
-        numbers = isinstance(pair, tuple | list) and all(map(_is_number, pair))
-        if not numbers or len(pair) != (1 if name == "neutral" else 2):
+    counts = {"bounds": parameter.bounds, "typical": parameter.typical, "neutral": [parameter.neutral]}
+    for name, pair in counts.items():
+        if not _are_numbers(pair, 1 if name == "neutral" else 2):
             return f"{name} is not of numbers", "bounds and typical = (low, high), neutral a number"
     (low, high), typical = parameter.bounds, parameter.typical
     if not low < high or not low <= parameter.neutral <= high:
@@ -106,9 +100,11 @@ def wrong_in(parameter: Parameter) -> tuple[str, str] | None:
     return None
 
 
-def _is_number(value: object) -> bool:
-    """Whether it is a number that a float holds: Python's whole numbers may be larger."""
+def _are_numbers(values: object, count: int) -> bool:
+    """So many numbers that a float holds: Python's whole numbers may be larger."""
+    if not isinstance(values, tuple | list) or len(values) != count or not all(map(is_number, values)):
+        return False
     try:
-        return isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(float(value))
+        return not any(math.isnan(float(value)) for value in values)
     except OverflowError:
         return False

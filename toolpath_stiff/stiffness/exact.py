@@ -22,98 +22,33 @@ Whole steps of Newton's method settle most poses; where they cycle between the k
 """
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.errors import EffectError, PoseError
-from toolpath_stiff.stiffness.contract import Effect, LoadPath
+from toolpath_stiff.errors import EffectError, InputError
+from toolpath_stiff.stiffness.contract import LoadPath, at_pose
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.stiffness.possible import at_pose, possible, refuse_struts_without_stiffness
+from toolpath_stiff.stiffness.possible import possible, refuse_struts_without_stiffness
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
+LEAST_STIFFNESS = 1e-6  # N/m; what a strut law gives below is no stiffness, and its inverse may be no number
 SHARES = (1.0, 0.5, 0.25, 0.1, 1.0)  # of a step: where whole ones cycle between the kinks, parts of them do not
 WHOLE_STEPS, PART_STEPS = 25, 200
-
-
-LEAST_STIFFNESS = 1e-6  # N/m; what a strut law gives below is no stiffness, and its inverse may be no number
-
-
 SETTLED = 1e-8  # of the load: the tip's compliance is then certain to some 1e-8 of itself
-
-
 DIFFERENCE = 1e-9  # of the load, for the tangent: well below what settles, or the edge of a gap would be straddled
-
-
 LEAST_TANGENT = 1e-3  # of the secant: a strut whose stretch does not grow with its force would be infinitely stiff
 
 
-def _newton_steps(
-    model: StiffnessModel, path: LoadPath, parallel: FloatArray, wrench: FloatArray, rows: IntArray, share: float
-) -> IntArray:
-    """Newton's method for the strut forces of some poses, in place, by a share of each step; the rows left unsettled.
-
-    With e_i = t_i F_i + o_i, t the tangent and o_i = (s_i - t_i) F_i from the last forces, the system is linear. Where
-    its forces stay e_i = s_i F_i holds, whatever the tangent was.
-    """
-    forces, load = path.strut_forces, path.force
-    assert forces is not None
-    for _ in range(WHOLE_STEPS if share == 1.0 else PART_STEPS):
-        if not len(rows):
-            break
-        before, jacobian, part = forces[rows], path.struts.jacobian[rows], path.take(rows)
-        transposed = np.swapaxes(jacobian, 1, 2)
-        here, form = _secant(model, part, before)
-        beyond = before + np.where(before < 0.0, -DIFFERENCE, DIFFERENCE) * load[rows, None]
-        slope = (_secant(model, part, beyond)[0] * beyond - here * before) / (beyond - before)
-        tangent = np.maximum(slope, LEAST_TANGENT * here)
-        longer = _times(form[..., 6:], wrench[rows]) + (here - tangent) * before
-        struts = tangent[..., None] * np.eye(6) + form[..., :6]
-        stiffened = np.linalg.solve(struts, np.concatenate([jacobian, longer[..., None]], axis=-1))
-        system = transposed @ stiffened[..., :6] + parallel[rows]
-        right = wrench[rows] + _times(transposed, stiffened[..., 6])
-        motion = np.asarray(np.linalg.solve(system, right[..., None])[..., 0])
-        settled = _times(stiffened[..., :6], motion) - stiffened[..., 6]
-        moved = np.abs(settled - before).max(axis=1) / load[rows]
-        # Between tension and compression of a strut lies its gap, where it is idle.
-        crossing = (settled * before < 0.0) & (moved > SETTLED)[:, None]
-        forces[rows] = before + share * (np.where(crossing, 0.0, settled) - before)
-        rows = rows[moved > SETTLED]
-    return rows
-
-
-def _secant(model: StiffnessModel, path: LoadPath, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n, 6) m/N of the struts under forces in them, and (n, 6, 12) what couples these and the wrench, [Q_ff, Q_fw]."""
-    links = assemble_links(model, replace(path, strut_forces=forces))
-    return links.strut, np.zeros((len(path), 6, 12)) if links.loads is None else links.loads[:, :6]
-
-
-def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
-    return np.asarray(np.einsum("nij,nj->ni", matrix, vector))
-
-
-@dataclass(frozen=True)
-class AssembledLinks:
-    """What the load path is made of at n poses.
-
-    Attributes
-    ----------
-    strut
-        (n, 6) m/N, compliance of each strut.
-    loads
-        (n, 12, 12) quadratic form in the strut forces and the tip wrench, or None.
-    parallel
-        (n, 6, 6) stiffness parallel to the struts, or None.
-    """
-
-    strut: FloatArray
-    loads: FloatArray | None
-    parallel: FloatArray | None
-
-
-def assemble_links(model: StiffnessModel, path: LoadPath) -> AssembledLinks:
+def assemble_links(model: StiffnessModel, path: LoadPath) -> tuple[FloatArray, FloatArray | None]:
     """Add up what the strut law and the effects contribute at n poses.
+
+    Returns
+    -------
+    form, parallel
+        (n, 12, 12) Q, quadratic form in the six strut forces and the tip wrench; (n, 6, 6) stiffness parallel to the
+        struts, or None.
 
     Raises
     ------
@@ -123,20 +58,20 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> AssembledLinks:
     with np.errstate(invalid="ignore"):  # a law of absurd slope; refused with what it gives
         stiffness = path.machine.strut_law.stiffness(path.struts.lengths)
     refuse_law_beyond_zero(path, stiffness)
-    strut = 1.0 / stiffness
-    loads: FloatArray | None = None
+    strut, form = 1.0 / stiffness, np.zeros((len(path), 12, 12))
     parallel: FloatArray | None = None
     for active in model.effects:
         if active.effect.load_dependent and path.strut_forces is None:
             continue
         series = active.adds("strut_compliance", path)
-        form = active.adds("load_compliance", path)
+        loads = active.adds("load_compliance", path)
         beside = active.adds("parallel_stiffness", path)
         strut = strut if series is None else strut + series
-        loads = form if loads is None else loads if form is None else loads + form
+        form = form if loads is None else form + loads
         parallel = beside if parallel is None else parallel if beside is None else parallel + beside
-    refuse_struts_without_stiffness(_acting(model), path, strut)
-    return AssembledLinks(strut, loads, parallel)
+    refuse_struts_without_stiffness(model, path, strut)
+    form[:, np.arange(6), np.arange(6)] += strut
+    return form, parallel
 
 
 def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
@@ -147,7 +82,7 @@ def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
     if holds.all():
         return
     worst = np.unravel_index(np.argmin(np.where(holds, np.inf, stiffness)), stiffness.shape)
-    raise PoseError(
+    raise InputError(
         f"strut {worst[1] + 1} would be {mm_from_m(float(lengths[worst])):.1f} mm long, where the machine's strut law "
         f"gives {n_per_um_from_n_per_m(float(stiffness[worst])):.4g} N/um{at_pose(path, int(worst[0]))}",
         expected="a finite stiffness above 0",
@@ -155,13 +90,15 @@ def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
     )
 
 
-def respond(path: LoadPath, links: AssembledLinks, wrenches: FloatArray) -> tuple[FloatArray, FloatArray]:
+def respond(
+    path: LoadPath, form: FloatArray, parallel: FloatArray | None, wrenches: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Tip twists and strut forces under wrenches at the tip.
 
     Parameters
     ----------
-    path, links
-        n poses and what they are made of.
+    path, form, parallel
+        n poses and what they are made of, as of `assemble_links`.
     wrenches
         (n, 6, m) N and N m about the tip, base axes.
 
@@ -172,22 +109,15 @@ def respond(path: LoadPath, links: AssembledLinks, wrenches: FloatArray) -> tupl
         (`machine.limits` refuses such poses).
     """
     jacobian = path.struts.jacobian
-    transposed = np.swapaxes(jacobian, 1, 2)
-    if links.parallel is None:
+    transposed, by_wrench = np.swapaxes(jacobian, 1, 2), form[:, :6, 6:] @ wrenches
+    if parallel is None:
         forces = _solve(transposed, wrenches)
-        stretch = links.strut[..., None] * forces
-        if links.loads is None:
-            return _solve(jacobian, stretch), forces
-        form = links.loads
-        stretch = stretch + form[:, :6, :6] @ forces + form[:, :6, 6:] @ wrenches
-        twists = _solve(jacobian, stretch)
-        return twists + form[:, 6:, :6] @ forces + form[:, 6:, 6:] @ wrenches, forces
-    form = np.zeros((len(path), 12, 12)) if links.loads is None else links.loads
-    struts = form[:, :6, :6] + links.strut[..., None] * np.eye(6)
-    stiffened = _solve(struts, np.concatenate([jacobian, form[:, :6, 6:] @ wrenches], axis=-1))
-    system = transposed @ stiffened[..., :6] + links.parallel
-    motion = _solve(system, wrenches + transposed @ stiffened[..., 6:])
-    forces = stiffened[..., :6] @ motion - stiffened[..., 6:]
+        motion = _solve(jacobian, form[:, :6, :6] @ forces + by_wrench)
+    else:
+        stiffened = _solve(form[:, :6, :6], np.concatenate([jacobian, by_wrench], axis=-1))
+        system = transposed @ stiffened[..., :6] + parallel
+        motion = _solve(system, wrenches + transposed @ stiffened[..., 6:])
+        forces = stiffened[..., :6] @ motion - stiffened[..., 6:]
     return motion + form[:, 6:, :6] @ forces + form[:, 6:, 6:] @ wrenches, forces
 
 
@@ -204,37 +134,15 @@ def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
         return solution
 
 
-def wrench_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
-    """(n, 6, 6) compliance of the tip for forces and moments; load-dependent effects are not in it."""
-    wrenches = np.broadcast_to(np.eye(6), (len(path), 6, 6))
-    twists, _ = respond(path, assemble_links(model, path), wrenches)
-    return possible(_acting(model), path, twists)
-
-
 def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     """(n, 3, 3) m/N, displacements of the tip under forces at it; load-dependent effects are not in it."""
-    twists, _ = respond(path, assemble_links(model, path), _unit_forces(len(path)))
-    return possible(_acting(model), path, twists[:, :3])
-
-
-def strut_forces(model: StiffnessModel, path: LoadPath) -> FloatArray:
-    """(n, 6, 3) N per N, forces in the struts under forces at the tip; load-dependent effects are not in it."""
-    return respond(path, assemble_links(model, path), _unit_forces(len(path)))[1]
-
-
-def _unit_forces(n: int) -> FloatArray:
-    wrenches = np.zeros((n, 6, 3))
-    wrenches[:, :3] = np.eye(3)
-    return wrenches
-
-
-def _acting(model: StiffnessModel) -> list[Effect]:
-    return [active.effect for active in model.effects]
+    forces = np.broadcast_to(np.eye(6)[:, :3], (len(path), 6, 3))
+    return possible(model, path, respond(path, *assemble_links(model, path), forces)[0][:, :3])
 
 
 def under_load(
     model: StiffnessModel, path: LoadPath, direction: FloatArray
-) -> tuple[LoadPath, AssembledLinks, FloatArray, FloatArray]:
+) -> tuple[LoadPath, FloatArray, FloatArray, FloatArray]:
     """The machine under a load of `path.force` along unit vectors (n, 3), load-dependent effects included.
 
     Those see the strut forces of the loaded machine: the ones of equilibrium or, where a stiffness parallel to the
@@ -242,9 +150,9 @@ def under_load(
 
     Returns
     -------
-    path, links, twists, forces
-        With the strut forces of the loaded machine where effects depend on them; what it is made of; (n, 6) m and rad
-        of the tip, (n, 6) forces in the struts, both per newton of load.
+    path, form, twists, forces
+        With the strut forces of the loaded machine where effects depend on them; Q; (n, 6) m and rad of the tip,
+        (n, 6) forces in the struts, both per newton of load.
 
     Raises
     ------
@@ -253,15 +161,15 @@ def under_load(
     """
     wrenches = np.zeros((len(path), 6, 1))
     wrenches[:, :3, 0] = direction
-    links = assemble_links(model, path)
-    twists, forces = respond(path, links, wrenches)
+    form, parallel = assemble_links(model, path)
+    twists, forces = respond(path, form, parallel, wrenches)
     if model.load_dependent:
         path = replace(path, strut_forces=forces[..., 0] * path.force[:, None])
-        if links.parallel is not None:
-            path = _settled(model, path, links.parallel, wrenches[..., 0])
-        links = assemble_links(model, path)
-        twists, forces = respond(path, links, wrenches)
-    return path, links, twists[..., 0], forces[..., 0]
+        if parallel is not None:
+            _settle(model, path, parallel, wrenches[..., 0])
+        form, parallel = assemble_links(model, path)
+        twists, forces = respond(path, form, parallel, wrenches)
+    return path, form, twists[..., 0], forces[..., 0]
 
 
 def compliance_along(
@@ -270,45 +178,73 @@ def compliance_along(
     """(n,) m/N, displacement along unit vectors (n, 3) per force along them; see `under_load`.
 
     `equilibrium`: (n, 6) N, strut forces in equilibrium with the unit vectors, where they are known: unless a stiffness
-    parallel to the struts shares the load, the energy that they store is the answer (Castigliano), and nothing is
+    parallel to the struts shares the load, twice the energy that they store is the answer (Castigliano), and nothing is
     solved.
     """
-    along = None if equilibrium is None else _stored_along(model, path, direction, equilibrium)
+    along: FloatArray | None = None
+    if equilibrium is not None:
+        loaded = replace(path, strut_forces=equilibrium * path.force[:, None]) if model.load_dependent else path
+        form, parallel = assemble_links(model, loaded)
+        if parallel is None:
+            both = np.concatenate([equilibrium, direction], axis=1)  # no moment
+            along = np.einsum("ni,nij,nj->n", both, form[:, :9, :9], both)
     if along is None:
         along = np.einsum("ni,ni->n", under_load(model, path, direction)[2][:, :3], direction)
-    return possible(_acting(model), path, np.asarray(along)[:, None, None])[:, 0, 0]
+    return possible(model, path, along[:, None, None])[:, 0, 0]
 
 
-def _stored_along(
-    model: StiffnessModel, path: LoadPath, direction: FloatArray, forces: FloatArray
-) -> FloatArray | None:
-    """(n,) [f; w]^T Q [f; w], twice the energy stored under unit forces; None where the struts share the load."""
-    if model.load_dependent:
-        path = replace(path, strut_forces=forces * path.force[:, None])
-    links = assemble_links(model, path)
-    if links.parallel is not None:
-        return None
-    stored = np.einsum("ni,ni->n", links.strut, forces**2)
-    if links.loads is not None:
-        both = np.concatenate([forces, direction], axis=1)  # no moment
-        stored += np.einsum("ni,nij,nj->n", both, links.loads[:, :9, :9], both)
-    return np.asarray(stored)
-
-
-def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenches: FloatArray) -> LoadPath:
-    """The path with strut forces that agree with the compliances that they cause."""
+def _settle(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenches: FloatArray) -> None:
+    """Change the strut forces of the path, in place, to those that agree with the compliances that they cause."""
     assert loaded.strut_forces is not None
-    forces = loaded.strut_forces
-    regular = np.flatnonzero(np.isfinite(forces).all(axis=1))  # nan: a singular pose, which stays nan
+    regular = np.flatnonzero(np.isfinite(loaded.strut_forces).all(axis=1))  # nan: a singular pose, which stays nan
     part = loaded.take(regular)
     rows, wrench = np.arange(len(part)), wrenches[regular] * part.force[:, None]
     for share in SHARES:
         rows = _newton_steps(model, part, parallel[regular], wrench, rows, share)
     if len(rows):
-        names = ", ".join(effect.name for effect in _acting(model) if effect.load_dependent)
+        names = ", ".join(active.effect.name for active in model.effects if active.effect.load_dependent)
         raise EffectError(
             f"the strut forces do not settle{at_pose(part, rows[0])} under {part.force[rows[0]]:g} N with {names}",
             expected="a stretch of each strut that grows with its force",
         )
-    forces[regular] = part.strut_forces
-    return loaded
+    loaded.strut_forces[regular] = part.strut_forces
+
+
+def _newton_steps(
+    model: StiffnessModel, path: LoadPath, parallel: FloatArray, wrench: FloatArray, rows: IntArray, share: float
+) -> IntArray:
+    """Newton's method for the strut forces of some poses, in place, by a share of each step; the rows left unsettled.
+
+    With e_i = t_i F_i + o_i, t the tangent and o_i = (s_i - t_i) F_i from the last forces, the system is linear. Where
+    its forces stay e_i = s_i F_i holds, whatever the tangent was.
+    """
+    forces, load = path.strut_forces, path.force
+    assert forces is not None
+    each = np.arange(6)
+    for _ in range(WHOLE_STEPS if share == 1.0 else PART_STEPS):
+        if not len(rows):
+            break
+        before, jacobian, part = forces[rows], path.struts.jacobian[rows], path.take(rows)
+        transposed = np.swapaxes(jacobian, 1, 2)
+        beyond = before + np.where(before < 0.0, -DIFFERENCE, DIFFERENCE) * load[rows, None]
+        form, further = (assemble_links(model, replace(part, strut_forces=f))[0] for f in (before, beyond))
+        here = form[:, each, each]
+        slope = (further[:, each, each] * beyond - here * before) / (beyond - before)
+        tangent = np.maximum(slope, LEAST_TANGENT * here)
+        longer = _times(form[:, :6, 6:], wrench[rows]) + (here - tangent) * before
+        form[:, each, each] = tangent
+        stiffened = np.linalg.solve(form[:, :6, :6], np.concatenate([jacobian, longer[..., None]], axis=-1))
+        system = transposed @ stiffened[..., :6] + parallel[rows]
+        right = wrench[rows] + _times(transposed, stiffened[..., 6])
+        motion = np.asarray(np.linalg.solve(system, right[..., None])[..., 0])
+        settled = _times(stiffened[..., :6], motion) - stiffened[..., 6]
+        moved = np.abs(settled - before).max(axis=1) / load[rows]
+        # Between tension and compression of a strut lies its gap, where it is idle.
+        crossing = (settled * before < 0.0) & (moved > SETTLED)[:, None]
+        forces[rows] = before + share * (np.where(crossing, 0.0, settled) - before)
+        rows = rows[moved > SETTLED]
+    return rows
+
+
+def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("nij,nj->ni", matrix, vector))

@@ -61,40 +61,33 @@ def loop_compliance(
 
 
 def _one_loop(model: StiffnessModel, path: LoadPath, direction: FloatArray, loop: MeasuringLoop) -> FloatArray:
-    if loop.kind == "tip":
-        return compliance_along(model, path, direction)
-    if loop.kind == "platform":
+    if loop.kind in ("tip", "platform"):
         whole = compliance_along(model, path, direction)
-        return whole - _one_loop(model, path, direction, MeasuringLoop("spindle"))
-    real = np.zeros((len(path), 12))
+        return whole if loop.kind == "tip" else whole - _one_loop(model, path, direction, MeasuringLoop("spindle"))
+    real, pair = np.zeros((2, len(path), 12))
     if loop.kind == "alone":
         real[:, loop.number - 1] = 1.0
         path = replace(path, strut_forces=real[:, :6] * path.force[:, None])
     else:
         path, _, _, real[:, :6] = under_load(model, path, direction)
         real[:, 6:9] = direction
-    reading = np.zeros(len(path))
     if loop.kind == "frame":
-        return reading + _vertex_reading(model, path, real[:, :6], direction, loop)
-    pair = np.zeros((len(path), 12))
+        return _vertex_reading(model, path, real[:, :6], direction, loop)
     if loop.kind in ("spindle", "table"):
         pair[:, 6:9] = direction
     else:
         pair[:, loop.number - 1] = 1.0
+    products, reading = pair[:, :, None] * real[:, None], np.zeros(len(path))
+    in_struts = pair[:, :6] * real[:, :6]
     if "struts" in loop.links:
         law = path.machine.strut_law.stiffness(path.struts.lengths)
         refuse_law_beyond_zero(path, law)
-        reading += (pair[:, :6] * real[:, :6] / law).sum(axis=1)
+        reading += (in_struts / law).sum(axis=1)
     for active in model.effects:
-        share = active.effect.seen_by(loop)
-        if not share or (active.effect.load_dependent and path.strut_forces is None):
-            continue
-        series = active.adds("strut_compliance", path)
-        if series is not None:
-            reading += share * (pair[:, :6] * series * real[:, :6]).sum(axis=1)
-        form = active.adds("load_compliance", path)
-        if form is not None:
-            reading += share * np.einsum("ni,nij,nj->n", pair, form, real)
+        if share := active.effect.seen_by(loop):
+            series, form = active.adds("strut_compliance", path), active.adds("load_compliance", path)
+            reading += 0.0 if series is None else share * (series * in_struts).sum(axis=1)
+            reading += 0.0 if form is None else share * (form * products).sum(axis=(1, 2))
     return reading
 
 

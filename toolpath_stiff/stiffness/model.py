@@ -5,12 +5,10 @@ model's `Conditions`. An effect without a condition that it waits for adds nothi
 every result says so in the same words.
 """
 
-from __future__ import annotations
-
 import difflib
 import shlex
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
@@ -30,12 +26,10 @@ from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.stiffness.parameters import read_parameters
-from toolpath_stiff.units import mm_from_m
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
-TOOL = "tool_extension_mm"
 WORDS = {
-    "temperature_C": f"the temperature, which nobody gives ({both_names('--temperature')})",
+    "temperature_C": "the temperature, which nobody gives (--temperature)",
     "time_min": "the time since an indicator was zeroed, which no program has",
     "direction": "the direction of a reading, which no program has",
 }
@@ -59,8 +53,6 @@ class StiffnessModel:
         The machine as it was loaded, before geometry effects; None for a model that `build_model` did not make.
     conditions
         Under what programs run; measurements bring their own. `acting_effects` says which effects that leaves.
-    withheld
-        Effects that the machine should have and that were left out, with the reason.
     unchecked
         What every result says of effects that fail `effects check` and were allowed all the same.
     """
@@ -71,7 +63,6 @@ class StiffnessModel:
     control: Hexapod | None = None
     given: Hexapod | None = None
     conditions: Conditions = field(default_factory=Conditions)
-    withheld: tuple[Idle, ...] = ()
     unchecked: tuple[str, ...] = ()
 
     @property
@@ -129,32 +120,34 @@ def build_model(
     files = tuple(effect_files)
     if files:
         known_effects(files)  # a file that cannot be loaded is an error even if the machine names none of its effects
-    acting = [_activate(machine, entry, files, instrument=False) for entry in machine.effects]
-    reading = [_activate(machine, entry, files, instrument=True) for entry in machine.instruments]
+    kinds = (("effect", machine.effects), ("instrument", machine.instruments))
+    actives = [_activate(machine, kind, entry, files) for kind, entries in kinds for entry in entries]
     if np.isfinite(machine.platform_bar_stiffness):
-        acting.insert(0, ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness}))
-    for active in extra:
-        (reading if active.effect.is_instrument else acting).append(active)
-    names = [active.effect.name for active in (*acting, *reading)]
+        actives.insert(0, ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness}))
+    actives += extra
+    names = [active.effect.name for active in actives]
     for name in names:
         if names.count(name) > 1:
             hint = "keep one of them (finite platform bars count as platform_flexibility)"
             raise EffectError(f"machine {machine.name}: effect {name} is given twice", hint=hint)
-    return _assembled(machine, acting, reading, conditions or Conditions(machine.setup, machine.temperature))
+    return _assembled(machine, actives, conditions or Conditions(machine.setup, machine.temperature))
 
 
-def _assembled(
-    given: Hexapod, acting: Sequence[ActiveEffect], reading: Sequence[ActiveEffect], conditions: Conditions
-) -> StiffnessModel:
+def _assembled(given: Hexapod, actives: Sequence[ActiveEffect], conditions: Conditions) -> StiffnessModel:
     """Geometry effects applied one after the other, to the true machine and to what the control takes it for."""
+    effects = tuple(active for active in actives if not active.effect.is_instrument)
     machine = control = given
-    for active in acting:
+    for active in effects:
         machine = active.geometry(machine)
         if not active.effect.unknown_to_control:
             control = active.geometry(control)
-    control_differs = any(active.effect.unknown_to_control for active in acting)
     return StiffnessModel(
-        machine, tuple(acting), tuple(reading), control if control_differs else None, given, conditions
+        machine,
+        effects,
+        instruments=tuple(active for active in actives if active.effect.is_instrument),
+        control=control if any(active.effect.unknown_to_control for active in effects) else None,
+        given=given,
+        conditions=conditions,
     )
 
 
@@ -175,36 +168,33 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     """
     if model.given is None:
         raise EffectError(f"a model without its machine has no parameter {name!r}")
-    given, groups = model.given, (list(model.effects), list(model.instruments))
+    given, actives = model.given, [*model.effects, *model.instruments]
     if name in given.strut_law.parameters:
-        return _assembled(given.with_changes(strut_law=given.strut_law.moved(name, change)), *groups, model.conditions)
-    for group in groups:
-        for i, active in enumerate(group):
-            for parameter in active.effect.parameters:
-                if name == f"{active.effect.name}.{parameter.key}" and not parameter.discrete:
-                    value = active.values[parameter.name] + change * parameter.si
-                    low, high = (bound * parameter.si for bound in parameter.bounds)
-                    if not low <= value <= high:
-                        raise EffectError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
-                    group[i] = ActiveEffect(active.effect, {**active.values, parameter.name: value})
-                    return _assembled(given, *groups, model.conditions)
+        return _assembled(given.with_changes(strut_law=given.strut_law.moved(name, change)), actives, model.conditions)
+    for i, active in enumerate(actives):
+        for parameter in active.effect.parameters:
+            if name == f"{active.effect.name}.{parameter.key}" and not parameter.discrete:
+                value = active.values[parameter.name] + change * parameter.si
+                low, high = (bound * parameter.si for bound in parameter.bounds)
+                if not low <= value <= high:
+                    raise EffectError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
+                actives[i] = replace(active, values={**active.values, parameter.name: value})
+                return _assembled(given, actives, model.conditions)
     raise EffectError(f"machine {given.name} has no parameter {name!r}")
 
 
-def _activate(machine: Hexapod, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
-    kind = "instrument" if instrument else "effect"
-    where = f"machine {machine.name}, [[{kind}]]"
+def _activate(machine: Hexapod, kind: str, entry: EffectEntry, files: tuple[str | Path, ...]) -> ActiveEffect:
     try:
         effect = find_effect(entry.name, files)
     except InputError as error:
         if error.file:  # one of the files with effects
             raise
         raise entry.error(error.found, "name", error.expected, error.hint) from None
-    if effect.is_instrument != instrument:
-        acts = f"[[{kind}]] {entry.name} acts on {'readings' if effect.is_instrument else 'the machine'}"
-        hint = f"write it as [[{'effect' if instrument else 'instrument'}]]"
-        raise entry.error(acts, hint=hint, where=f"machine {machine.name}")
-    return ActiveEffect(effect, read_parameters(effect, entry, where))
+    if effect.is_instrument != (kind == "instrument"):
+        right, acts_on = ("instrument", "readings") if effect.is_instrument else ("effect", "the machine")
+        acts = f"[[{kind}]] {entry.name} acts on {acts_on}"
+        raise entry.error(acts, hint=f"write it as [[{right}]]", where=f"machine {machine.name}")
+    return ActiveEffect(effect, read_parameters(effect, entry, f"machine {machine.name}, [[{kind}]]"))
 
 
 def load_path(
@@ -219,68 +209,65 @@ def load_path(
 
     `rotation` None is a vertical spindle; `tool_length` nan the reference tool (m, scalar or (n,)). `seen` are
     `setup`, `time`, `temperature`, `direction` where they are known.
+
+    Raises
+    ------
+    InputError
+        The control computes strut lengths with which the true machine has no pose near the programmed one.
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     n = len(tip)
     length = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    if model.control is not None and n:
-        tip, rotation = _where_control_goes(model, tip, rotation, length)
-    struts = solve_struts(model.machine, tip, rotation, length)
+    if model.control is not None and n:  # the struts get the lengths that the control computes; it may not know all
+        turn = np.broadcast_to(np.eye(3) if rotation is None else np.asarray(rotation, dtype=float), (n, 3, 3))
+        lengths = solve_struts(model.control, tip, turn, length).lengths
+        programmed = np.concatenate([tip, roll_pitch_yaw(turn)], axis=1)
+        poses = forward_kinematics(model.machine, lengths, programmed, length)
+        tip, rotation = poses[:, :3], rotation_matrices(poses[:, 3:])
     turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
     return LoadPath(
         machine=model.machine,
         position=tip,
         rotation=np.broadcast_to(turn, (n, 3, 3)),
-        struts=struts,
+        struts=solve_struts(model.machine, tip, rotation, length),
         tool_extension=np.where(np.isnan(length), 0.0, length - model.machine.reference_tool_length),
         force=np.broadcast_to(np.asarray(force, dtype=float), (n,)),
         **seen,
     )
 
 
-def _where_control_goes(
-    model: StiffnessModel, position: FloatArray, rotation: ArrayLike | None, tool_length: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """True tips and orientations: the struts get the lengths that the control computes for the programmed poses.
-
-    Raises `InputError` where the true machine has no pose with these lengths near the programmed one.
-    """
-    assert model.control is not None
-    turn = np.broadcast_to(np.eye(3) if rotation is None else np.asarray(rotation, dtype=float), (len(position), 3, 3))
-    lengths = solve_struts(model.control, position, turn, tool_length).lengths
-    poses = np.concatenate([position, roll_pitch_yaw(turn)], axis=1)
-    poses = forward_kinematics(model.machine, lengths, poses, tool_length)
-    return poses[:, :3], rotation_matrices(poses[:, 3:])
+def waiting_effects(model: StiffnessModel) -> dict[str, str]:
+    """Effects that add nothing to a program because nobody gives a condition -> what they need; never instruments."""
+    waiting = {}
+    for active in model.effects:
+        options = f"(--setup {shlex.quote(active.setup or 'NAME')}, or --setup {NO_SETUP})"
+        which = f"the set-up {active.setup!r}" if active.setup else "the set-up"
+        words = WORDS | {SETUP: f"{which}, and nobody says which this is {options}"}
+        if missing := [words[condition] for condition in active.waits_for if condition not in model.conditions.known]:
+            waiting[active.effect.name] = f"it needs {'; '.join(missing)}"
+    return waiting
 
 
-@dataclass(frozen=True)
-class Idle:
-    """An effect of the model that adds nothing here.
-
-    Attributes
-    ----------
-    effect, reason
-        Its name; what it waits for, or why it stands aside, as the end of a sentence.
-    waiting
-        Whether a condition is missing; else it is known, and the effect belongs to another set-up.
-    """
-
-    effect: str
-    reason: str
-    waiting: bool
-
-    def __str__(self) -> str:
-        return f"{self.effect} does not act: {self.reason}"
+def effects_elsewhere(model: StiffnessModel) -> dict[str, str]:
+    """Effects that belong to another set-up than the one that a program runs under -> which that is."""
+    setup, waiting = model.conditions.setup, waiting_effects(model)
+    here = f"this is {setup!r}" if setup else "that is not there"
+    return {
+        active.effect.name: f"it belongs to set-up {active.setup!r}, and {here}"
+        for active in model.effects
+        if SETUP in active.waits_for and active.setup not in ("", setup) and active.effect.name not in waiting
+    }
 
 
-def idle_effects(model: StiffnessModel) -> list[Idle]:
-    """The effects that add nothing to a program run under the model's conditions; instruments never do."""
-    return [*model.withheld, *(idle for active in model.effects if (idle := _idle(active, model)))]
+def idle_effects(model: StiffnessModel) -> dict[str, str]:
+    """All effects that add nothing to a program run under the model's conditions -> why, the end of a sentence."""
+    return waiting_effects(model) | effects_elsewhere(model)
 
 
 def acting_effects(model: StiffnessModel) -> tuple[ActiveEffect, ...]:
     """The other effects: those that headers list."""
-    return tuple(active for active in model.effects if not _idle(active, model))
+    idle = idle_effects(model)
+    return tuple(active for active in model.effects if active.effect.name not in idle)
 
 
 def acting_names(model: StiffnessModel) -> list[str]:
@@ -288,41 +275,17 @@ def acting_names(model: StiffnessModel) -> list[str]:
     return [active.effect.name for active in acting_effects(model)]
 
 
-def _idle(active: ActiveEffect, model: StiffnessModel) -> Idle | None:
-    name, setup = active.effect.name, setup_of(active)
-    waits_for = active.effect.conditions(active.values)
-    options = f"(--setup {shlex.quote(setup or 'NAME')}, or --setup {NO_SETUP})"
-    words = WORDS | {SETUP: f"the set-up {setup!r}, and nobody says which this is {options}".replace(" ''", "")}
-    if missing := [words[condition] for condition in waits_for if condition not in model.conditions.known]:
-        return Idle(name, f"it needs {'; '.join(missing)}", True)
-    if SETUP in waits_for and setup and setup != model.conditions.setup:
-        here = f"this is {model.conditions.setup!r}" if model.conditions.setup else "that is not there"
-        return Idle(name, f"it belongs to set-up {setup!r}, and {here}", False)
-    return None
-
-
-def setup_of(active: ActiveEffect) -> str:
-    """The set-up that an effect belongs to, "" if it names none."""
-    named = any(p.name == SETUP and p.kind == "text" for p in active.effect.parameters)
-    return str(active.values[SETUP]) if named else ""
-
-
-def condition_warnings(model: StiffnessModel, tool_given: bool = False) -> list[str]:
-    """What of the model does not act on a program, for want of a condition or as an instrument; plain sentences.
-
-    `tool_given`: whether the length of the tool is known; else it is the reference tool's.
-    """
-    names = ", ".join(active.effect.name for active in model.instruments)
+def condition_warnings(model: StiffnessModel) -> list[str]:
+    """What of the model does not act on a program, for want of a condition or as an instrument; plain sentences."""
     warnings = list(model.unchecked)
-    warnings += [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
-    warnings += [str(idle) for idle in idle_effects(model) if idle.waiting]
-    length = mm_from_m(model.machine.reference_tool_length)
-    asking = [active.effect.name for active in acting_effects(model) if TOOL in active.effect.needs and not tool_given]
-    tool = f"acts as with the reference tool ({length:g} mm): nobody gives the tool's length"
-    warnings += [f"{name} {tool}" for name in asking]
+    if model.instruments:
+        names = ", ".join(active.effect.name for active in model.instruments)
+        warnings.append(f"instruments set aside, they act on readings and not on the machine: {names}")
+    warnings += [f"{name} does not act: {reason}" for name, reason in waiting_effects(model).items()]
+    if secant := ", ".join(active.effect.name for active in acting_effects(model) if active.effect.load_dependent):
+        warnings.append(f"softest and stiffest directions are those without {secant}, the stiffness along them is with")
     setup, machine = model.conditions.setup, model.given or model.machine
-    belonging = any(SETUP in active.effect.conditions(active.values) for active in model.effects)
-    if setup and setup != machine.setup and not belonging:
+    if setup and setup != machine.setup and not any(SETUP in active.waits_for for active in model.effects):
         warnings.append(f"set-up {setup!r} changes nothing: no effect of machine {machine.name} depends on it")
     return warnings
 
@@ -334,14 +297,14 @@ def conditions_stated(model: StiffnessModel) -> list[str]:
         stated.append(f"set-up: {model.conditions.setup or NO_SETUP}")
     if model.conditions.temperature is not None:
         stated.append(f"temperature: {model.conditions.temperature:g} degrees C")
-    return stated + [str(idle) for idle in idle_effects(model) if not idle.waiting]
+    return stated + [f"{name} does not act: {reason}" for name, reason in effects_elsewhere(model).items()]
 
 
 def effects_stated(model: StiffnessModel) -> Document:
     """The entries of a result's JSON: what acts, what does not and why, under which set-up and temperature."""
     return {
         "effects": acting_names(model),
-        "effects_idle": [{"effect": idle.effect, "reason": idle.reason} for idle in idle_effects(model)],
+        "effects_idle": [{"effect": name, "reason": reason} for name, reason in idle_effects(model).items()],
         "setup": NO_SETUP if model.conditions.setup == "" else model.conditions.setup,
         "temperature_C": model.conditions.temperature,
     }
@@ -361,21 +324,12 @@ def idle_on_readings(model: StiffnessModel, missing: Collection[str], setups: Co
     """
     sentences = {}
     for active in (*model.effects, *model.instruments):
-        waits_for, setup, name = active.effect.conditions(active.values), setup_of(active), active.effect.name
-        lacking = ", ".join(condition for condition in waits_for if condition in missing)
-        if lacking or (SETUP in waits_for and setup and setup not in setups):
-            why = f"column {lacking} is missing" if lacking else f"none is of set-up {setup!r}"
+        lacking = ", ".join(condition for condition in active.waits_for if condition in missing)
+        if lacking or (SETUP in active.waits_for and active.setup not in ("", *setups)):
+            why = f"column {lacking} is missing" if lacking else f"none is of set-up {active.setup!r}"
+            name = active.effect.name
             sentences[name] = f"{name} of the machine file does not act on these readings: {why}"
     return sentences
-
-
-def known_setups(models: Iterable[StiffnessModel]) -> list[str]:
-    """The set-ups that machine files list and effects name."""
-    names: dict[str, None] = {}
-    for model in models:
-        names |= dict.fromkeys((model.given or model.machine).setups)
-        names |= dict.fromkeys(setup_of(active) for active in (*model.effects, *model.instruments))
-    return [name for name in names if name]
 
 
 def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:
@@ -383,9 +337,10 @@ def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:
 
     Raises `InputError`, which begins with `said_by`.
     """
-    known = known_setups(models)
-    effects = [active for model in models for active in model.effects]
-    takes_any = any(SETUP in active.effect.needs and not setup_of(active) for active in effects)
+    listed = [name for model in models for name in (model.given or model.machine).setups]
+    effects = [active for model in models for active in (*model.effects, *model.instruments)]
+    known = list(dict.fromkeys(filter(None, [*listed, *(active.setup for active in effects)])))
+    takes_any = any(SETUP in active.effect.needs and not active.setup for active in effects)
     if setup in ("", NO_SETUP, *known) or takes_any or not known:
         return
     near = difflib.get_close_matches(setup, known, n=1)

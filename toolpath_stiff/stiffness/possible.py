@@ -1,15 +1,13 @@
 """Compliances that there can be: finite, symmetric, positive definite. Results of the exact route are held to it."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import EffectError
 from toolpath_stiff.hints import command_line
-from toolpath_stiff.stiffness.contract import Effect, LoadPath
+from toolpath_stiff.stiffness.contract import LoadPath, at_pose
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.stiffness.model import StiffnessModel
 
 APART = 1e-6  # of the tip's compliance: how far a result may be from symmetric
 # Condition of the struts' screws, arms in units of their size, beyond which a pose with an impossible compliance counts
@@ -17,21 +15,8 @@ APART = 1e-6  # of the tip's compliance: how far a result may be from symmetric
 NEARLY_SINGULAR = 1e7
 
 
-def possible(effects: Sequence[Effect], path: LoadPath, compliance: FloatArray) -> FloatArray:
-    """The compliance of the tip, if there can be such a one.
-
-    Parameters
-    ----------
-    effects
-        What acts on the machine, for messages.
-    path
-        n poses.
-    compliance
-        (n, k, k) m/N.
-
-    Returns
-    -------
-    (n, k, k) its symmetric part; nan at a singular pose.
+def possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> FloatArray:
+    """The symmetric part of the tip's compliance (n, k, k) m/N, if there can be such a one; nan at a singular pose.
 
     Raises
     ------
@@ -39,49 +24,29 @@ def possible(effects: Sequence[Effect], path: LoadPath, compliance: FloatArray) 
         It is not finite, not symmetric or not positive definite at a pose that is not singular; with effects and pose.
         A fit walks away from there.
     """
-    wrong = ~is_compliance(compliance)
+    rows = np.flatnonzero(~is_compliance(compliance))
     with np.errstate(over="ignore", invalid="ignore"):
-        symmetric = compliance if compliance.shape[1] == 1 else 0.5 * (compliance + np.swapaxes(compliance, 1, 2))
-    if wrong.any():
-        rows = np.flatnonzero(wrong)
-        regular = ~_is_singular(path, rows)
-        if regular.any():
-            raise _impossible(effects, path, int(rows[regular][0]), "the tip")
+        symmetric = np.asarray(0.5 * (compliance + np.swapaxes(compliance, 1, 2)))
+    if len(rows):
+        regular = rows[~_is_singular(path.take(rows))]
+        if len(regular):
+            raise _impossible(model, path, int(regular[0]), "the tip")
         symmetric[rows] = np.nan
-    return np.asarray(symmetric)
+    return symmetric
 
 
-def _is_singular(path: LoadPath, rows: IntArray) -> BoolArray:
-    arms = path.struts.arms[rows]
-    size = np.linalg.norm(arms, axis=-1).mean(axis=-1)[:, None, None]
+def _is_singular(path: LoadPath) -> BoolArray:
+    screws = path.struts.jacobian.copy()
     with np.errstate(divide="ignore", invalid="ignore"):
-        screws = np.concatenate([path.struts.directions[rows], path.struts.jacobian[rows, :, 3:] / size], axis=-1)
-    singular = ~np.isfinite(screws).all(axis=(1, 2))
-    singular[~singular] = ~(np.linalg.cond(screws[~singular]) < NEARLY_SINGULAR)
-    return np.asarray(singular)
+        screws[:, :, 3:] /= np.linalg.norm(path.struts.arms, axis=-1).mean(axis=-1)[:, None, None]
+    regular = np.flatnonzero(np.isfinite(screws).all(axis=(1, 2)))
+    singular = np.ones(len(path), dtype=bool)
+    singular[regular] = ~(np.linalg.cond(screws[regular]) < NEARLY_SINGULAR)
+    return singular
 
 
 def is_compliance(tensor: FloatArray) -> BoolArray:
     """(n,) whether tensors (n, k, k) are finite, symmetric and positive definite."""
-    size = tensor.shape[1]
-    with np.errstate(all="ignore"):
-        if size == 1:
-            return np.asarray((tensor[:, 0, 0] > 0.0) & (tensor[:, 0, 0] < np.inf))
-        if size != 3:
-            return _has_positive_eigenvalues(tensor)
-        a, d, e, left_d, b, f, left_e, left_f, c = np.ascontiguousarray(tensor.reshape(-1, 9).T)
-        minor = a * b - d * d
-        apart = np.abs(d - left_d) + np.abs(e - left_e) + np.abs(f - left_f)
-        trace = a + b + c
-        # Sylvester: all leading minors above zero. Nothing that is not finite passes.
-        determinant = minor * c - a * f * f - b * e * e + 2.0 * d * e * f
-        good = (a > 0.0) & (minor > 0.0) & (determinant > 0.0) & (apart <= APART * trace) & (trace < np.inf)
-        if not good.all():  # minors of tiny numbers vanish where the eigenvalues do not
-            good[~good] = _has_positive_eigenvalues(tensor[~good])
-    return np.asarray(good)
-
-
-def _has_positive_eigenvalues(tensor: FloatArray) -> BoolArray:
     scale = np.abs(tensor).max(axis=(1, 2))
     good = (scale > 0.0) & (scale < np.inf)
     unit = tensor[good] / scale[good, None, None]  # sums of the largest numbers overflow
@@ -91,15 +56,17 @@ def _has_positive_eigenvalues(tensor: FloatArray) -> BoolArray:
     return np.asarray(good)
 
 
-def refuse_struts_without_stiffness(effects: Sequence[Effect], path: LoadPath, strut: FloatArray) -> None:
-    """Raise `InputError` where the compliances (n, 6) m/N of struts, with all that effects add, are 0 or less."""
-    if (strut <= 0.0).any():
-        row = int(np.argmax((strut <= 0.0).any(axis=1)))
-        raise _impossible(effects, path, row, f"strut {int(np.argmin(strut[row])) + 1}")
+def refuse_struts_without_stiffness(model: StiffnessModel, path: LoadPath, strut: FloatArray) -> None:
+    """Raise `InputError` where the compliances (n, 6) m/N of struts with all effects are 0 or less, or infinite."""
+    bad = (strut <= 0.0) | (strut == np.inf)
+    if bad.any():
+        row = int(np.argmax(bad.any(axis=1)))
+        raise _impossible(model, path, row, f"strut {int(np.argmax(bad[row])) + 1}")
 
 
-def _impossible(effects: Sequence[Effect], path: LoadPath, row: int, part: str) -> EffectError:
+def _impossible(model: StiffnessModel, path: LoadPath, row: int, part: str) -> EffectError:
     """An error that names the effects from outside the package, else all effects, else the machine."""
+    effects = [active.effect for active in model.effects]
     foreign = [effect for effect in effects if is_foreign(effect)]
     names = ", ".join(effect.name for effect in foreign or effects)
     cause, hint = f"machine {path.machine.name}", "check the parameters of the effects, strut law and joints"
@@ -110,9 +77,3 @@ def _impossible(effects: Sequence[Effect], path: LoadPath, row: int, part: str) 
         expected="a compliance that is finite, symmetric and positive definite",
         hint=hint,
     )
-
-
-def at_pose(path: LoadPath, i: int) -> str:
-    """Pose i in words, as " at X0 Y0 Z800 mm" with the space before it."""
-    x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[i])
-    return f" at X{x:g} Y{y:g} Z{z:g} mm"

@@ -10,9 +10,10 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 from toolpath_stiff.stiffness.declarations import NAME, wrong_in
-from toolpath_stiff.stiffness.term_effect import ASSUMED, kind_of, size_parameter
+from toolpath_stiff.stiffness.term_effect import ENDINGS, TermEffect, size_parameter
 from toolpath_stiff.stiffness.terms import (
     ALONG,
+    ASSUMED,
     AXES,
     FORMULAS,
     IN_SERIES,
@@ -24,7 +25,6 @@ from toolpath_stiff.stiffness.terms import (
     SHAPES,
     SWINGS,
     Constants,
-    Factor,
     Term,
 )
 from toolpath_stiff.toml_reader import TomlReader, is_text
@@ -39,9 +39,7 @@ CONSTANT_UNITS = {
     "temperature": ("C", 1.0),
 }
 PLAIN = ("power", "side", *PAIR)
-
 LARGEST = 1e9
-
 SHAPE_KEYS = ("varies_with", "of", "shape", "constants")
 KEYS = ("name", "size", "meaning", "link", "action", "where", "along", *SHAPE_KEYS, "times")
 SHAPES_OF = {**dict.fromkeys(("constant", "direction", "setup"), ("offset",)), "force sign": ("sign",)}
@@ -58,19 +56,25 @@ def entry_of(term: Term, size: str, meaning: str) -> Document:
     """A term as an entry of a file, in the order of its keys."""
     parameter = size_parameter(term.action, size, meaning)
     bounds, typical = _range_keys(parameter)
-    entry = {"name": "term", "size": size, "meaning": meaning, "link": term.link, "action": term.action}
-    more = {} if term.where is None else {"where": term.where}
-    times = {} if term.second is None else {"times": _shape_entry(term.second)}
-    ranges = {bounds: list(parameter.bounds), typical: list(parameter.typical)}
-    return {**entry, **more, "along": term.direction, **_shape_entry(term), **ranges, **times}
+    return {
+        "name": "term",
+        "size": size,
+        "meaning": meaning,
+        "link": term.link,
+        "action": term.action,
+        **({} if term.where is None else {"where": term.where}),
+        "along": term.direction,
+        **_shape_entry(term),
+        bounds: list(parameter.bounds),
+        typical: list(parameter.typical),
+        **({} if term.times is None else {"times": _shape_entry(term.times)}),
+    }
 
 
 def _shape_entry(term: Term) -> Document:
     of = {"of": term.column} if term.column else {}
-    constants = {}
-    for name, value in term.at:
-        key, si = constant_key(name, term.variable)
-        constants[key] = float(f"{value / si:.12g}")
+    keys = [(constant_key(name, term.variable), value) for name, value in term.at]
+    constants = {key: float(f"{value / si:.12g}") for (key, si), value in keys}
     return {"varies_with": term.variable, **of, "shape": term.shape, "constants": constants}
 
 
@@ -92,18 +96,19 @@ def effects_of_terms(file: str) -> dict[str, Effect]:
     source = _text(toml, "source", toml.data.get("source", ASSUMED))
     drawn_from = toml.table("drawn_from", toml.data.get("drawn_from", {}), "[drawn_from] with readings")
     toml.only("drawn_from", drawn_from, ("readings",))
-    marks = tuple(_text(toml, "drawn_from.readings", drawn_from.get("readings", "-")).replace("-", " ").split())
-    entries = [_entry(toml, f"effect[{number}]", row) for number, row in enumerate(rows, 1)]
-    names = [parameter.name for _, parameter in entries]
-    for number, name in enumerate(names):
-        if name in names[:number]:
-            raise toml.error(f"size {name!r} is there twice", where=f"effect[{number + 1}].size")
-    kinds = sorted({kind_of(term) for term, _ in entries}, key=lambda kind: kind.ending)
-    effects = {common if len(kinds) == 1 else f"{common}{kind.ending}": kind for kind in kinds}
-    return {
-        name: kind(name, [entry for entry in entries if kind_of(entry[0]) is kind], source, marks, file)
-        for name, kind in effects.items()
+    marks = tuple(str(drawn_from.get("readings", "")).split())
+    by_ending: dict[str, list[tuple[Term, Parameter]]] = {}
+    names: list[str] = []
+    for number, row in enumerate(rows, 1):
+        term, parameter = _entry(toml, f"effect[{number}]", row)
+        if parameter.name in names:
+            raise toml.error(f"size {parameter.name!r} is there twice", where=f"effect[{number}].size")
+        names.append(parameter.name)
+        by_ending.setdefault(ENDINGS.get(term.action, ""), []).append((term, parameter))
+    effects = {
+        common if len(by_ending) == 1 else f"{common}{ending}": by_ending[ending] for ending in sorted(by_ending)
     }
+    return {name: TermEffect(name, entries, source, marks, file) for name, entries in effects.items()}
 
 
 def _entry(toml: TomlReader, where: str, row: Document) -> tuple[Term, Parameter]:
@@ -115,11 +120,10 @@ def _entry(toml: TomlReader, where: str, row: Document) -> tuple[Term, Parameter
     parameter = _parameter(toml, where, row, action)
     toml.only(where, row, (*KEYS, *_range_keys(parameter)))
     variable, shape, constants, column = _shape(toml, where, row, action, action)
-    times = row.get("times")
-    if times is not None:
-        toml.only(f"{where}.times", toml.table(f"{where}.times", times, "a table"), SHAPE_KEYS)
-        times = Factor(*_shape(toml, f"{where}.times", times, "", action))
-    term = Term(link, along, variable, shape, action, _place(toml, where, row, action), constants, column, times=times)
+    term = Term(link, along, variable, shape, action, _place(toml, where, row, action), constants, column)
+    if "times" in row:
+        toml.only(f"{where}.times", toml.table(f"{where}.times", row["times"], "a table"), SHAPE_KEYS)
+        term = term.with_second(*_shape(toml, f"{where}.times", row["times"], "", action))
     return term, parameter
 
 
@@ -152,16 +156,13 @@ def _shape(toml: TomlReader, where: str, row: Document, action: str, of: str) ->
         column = _choice(toml, where, {"of": "", **row}, "of", [c for c in columns if by_strut or c not in SWINGS])
     given = toml.table(f"{where}.constants", row.get("constants", {}), "a table of numbers")
     pair = PAIR if action == "coupling" else ()
-    ways = [
-        {constant_key(name, variable): name for name in (*names, *pair)} for kind, names in FORMULAS if kind == shape
-    ]
+    ways = [{constant_key(n, variable): n for n in (*names, *pair)} for kind, names in FORMULAS if kind == shape]
     keys = next((way for way in ways if {key for key, _ in way} == given.keys()), None)
     if keys is None:
         known = " or ".join(", ".join(key for key, _ in way) or "none" for way in ways)
         raise toml.error(f"constants {', '.join(given) or 'none'}", f"of {shape}: {known}", where=f"{where}.constants")
-    values = tuple(
-        (name, toml.number(f"{where}.constants", given[key], LARGEST) * si) for (key, si), name in keys.items()
-    )
+    numbers = {key: toml.number(f"{where}.constants", given[key], LARGEST) * si for key, si in keys}
+    values = tuple((name, numbers[key]) for (key, _), name in keys.items())
     if pair and not {dict(values)[name] for name in pair} <= set(range(1, 7)):
         raise toml.error("first and second", "two numbers of struts, 1 to 6", where=f"{where}.constants")
     return variable, shape, values, column

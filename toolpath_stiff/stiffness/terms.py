@@ -14,36 +14,20 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import joint_angles
-from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.contract import IDLE, LoadPath, Parameter
 
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
 AXES = {"X": 0, "Y": 1, "Z": 2}
 SWINGS = ("frame joint", "platform joint")
-IDLE = 1e-3  # N in a strut: below, a power of the force would diverge, and the strut adds nothing that shows
+ASSUMED = "described from readings; usual sizes are engineering experience, no source"
 
 Action = str
 Constants = tuple[tuple[str, float], ...]
-Pair = tuple[float, float]
-
-
-class Acting(NamedTuple):
-    """How large a term of an action is: unit, its SI value, bounds and usual sizes in it; what it adds of a size.
-
-    Sizes are assumed: what a machine that still mills can have. In the equation {} is the size, s its share, h a load.
-    """
-
-    unit: str
-    si: float
-    bounds: Pair
-    typical: Pair
-    equation: str
-
 
 # How a term acts:
 #   give            the tip's force moves the link along its directions; m/N
@@ -59,27 +43,32 @@ class Acting(NamedTuple):
 #   joint offset    a joint stands off its place, and the control does not know; m
 #   reading factor  the deflection is read too large by a share
 #   reading shift   the deflection is read too large by a displacement; m
-FEW_NM_PER_N = ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0))
-ACTIONS: dict[Action, Acting] = {
-    "give": Acting(*FEW_NM_PER_N, "c += {} s h^2, h = tip force"),
-    "rocking": Acting(
-        "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), "c += {} s h^2, h = moment of the tip force about the origin"
-    ),
-    "tilting": Acting(
-        "nrad/N/m", 1e-9, (0.0, 5000.0), (1.0, 300.0),
-        "c += {} s h^2, h = moment of the tip force about the platform's middle",
-    ),
-    "vertex": Acting(*FEW_NM_PER_N, "c += {} s h^2, h = force in the vertex"),
-    "strut": Acting(*FEW_NM_PER_N, "c_i += {} s"),
-    "frame pin": Acting(*FEW_NM_PER_N, "c_i += {} s (u_i . pin)^2"),
-    "platform pin": Acting(*FEW_NM_PER_N, "c_i += {} s (u_i . pin)^2"),
-    "turning": Acting("kN m/rad", 1e3, (0.0, 5000.0), (5.0, 550.0), "K += sum over i of {} s B_i^T B_i"),
-    "strut factor": Acting("%", 0.01, (-50.0, 400.0), (-20.0, 40.0), "c_i += {} s / k_i"),
-    "coupling": Acting("%", 0.01, (-50.0, 50.0), (-20.0, 20.0), "c_ij += {} s / sqrt(k_i k_j)"),
-    "joint offset": Acting("mm", 1e-3, (-30.0, 30.0), (-3.0, 3.0), "joint += {}"),
-    "reading factor": Acting("%", 0.01, (-50.0, 100.0), (-10.0, 10.0), "k_read = k / (1 + {} s)"),
-    "reading shift": Acting("um", 1e-6, (-200.0, 200.0), (-10.0, 10.0), "F / k_read = F / k + {} s"),
-}  # fmt: skip
+NM_PER_N = Parameter("size", "nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0), ASSUMED)
+SIZES: dict[Action, Parameter] = {  # what a machine that still mills can have
+    **dict.fromkeys(("give", "vertex", "strut", "frame pin", "platform pin"), NM_PER_N),
+    "rocking": Parameter("size", "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), ASSUMED),
+    "tilting": Parameter("size", "nrad/N/m", 1e-9, (0.0, 5000.0), (1.0, 300.0), ASSUMED),
+    "turning": Parameter("size", "kN m/rad", 1e3, (0.0, 5000.0), (5.0, 550.0), ASSUMED),
+    "strut factor": Parameter("size", "%", 0.01, (-50.0, 400.0), (-20.0, 40.0), ASSUMED),
+    "coupling": Parameter("size", "%", 0.01, (-50.0, 50.0), (-20.0, 20.0), ASSUMED),
+    "joint offset": Parameter("size", "mm", 1e-3, (-30.0, 30.0), (-3.0, 3.0), ASSUMED),
+    "reading factor": Parameter("size", "%", 0.01, (-50.0, 100.0), (-10.0, 10.0), ASSUMED),
+    "reading shift": Parameter("size", "um", 1e-6, (-200.0, 200.0), (-10.0, 10.0), ASSUMED),
+}
+EQUATIONS: dict[Action, str] = {  # {} is the size, s its share, h a load
+    "give": "c += {} s h^2, h = tip force",
+    "rocking": "c += {} s h^2, h = moment of the tip force about the origin",
+    "tilting": "c += {} s h^2, h = moment of the tip force about the platform's middle",
+    "vertex": "c += {} s h^2, h = force in the vertex",
+    "strut": "c_i += {} s",
+    **dict.fromkeys(("frame pin", "platform pin"), "c_i += {} s (u_i . pin)^2"),
+    "turning": "K += sum over i of {} s B_i^T B_i",
+    "strut factor": "c_i += {} s / k_i",
+    "coupling": "c_ij += {} s / sqrt(k_i k_j)",
+    "joint offset": "joint += {}",
+    "reading factor": "k_read = k / (1 + {} s)",
+    "reading shift": "F / k_read = F / k + {} s",
+}
 PINS = ("frame pin", "platform pin")
 IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of each strut by itself
 PAIR = ("first", "second")  # constants of a coupling
@@ -172,16 +161,6 @@ SHAPES = tuple(dict.fromkeys(shape for shape, _ in FORMULAS))
 
 
 @dataclass(frozen=True)
-class Factor:
-    """A further variable that a term depends on, times the first: shape and so on as of `Term`."""
-
-    variable: str
-    shape: str
-    at: Constants = ()
-    column: str = ""
-
-
-@dataclass(frozen=True)
 class Term:
     """One term of a description.
 
@@ -190,7 +169,7 @@ class Term:
     link, direction, variable, shape
         Of `LINKS`, `ALONG`, `VARIABLES` (or the name of a further column), `SHAPES`.
     action
-        How it acts, one of `ACTIONS`.
+        How it acts, one of `SIZES`.
     where
         Strut (1 to 6) or vertex (1 to 3), numbered from 1; None: all of them, or the link has none.
     at
@@ -206,7 +185,7 @@ class Term:
     size
         In SI.
     times
-        A second variable with its shape: c(v, w) = size * s(v) * t(w).
+        The same term of a second variable with its shape: c(v, w) = size * s(v) * t(w).
     """
 
     link: str
@@ -218,22 +197,22 @@ class Term:
     at: Constants = ()
     column: str = ""
     size: float = field(default=0.0, compare=False)
-    times: Factor | None = None
+    times: Term | None = None
 
     @property
     def unit(self) -> str:
         """Unit of the size in documents."""
-        return ACTIONS[self.action].unit
+        return SIZES[self.action].unit
 
     @property
     def si(self) -> float:
         """SI value of one `unit`."""
-        return ACTIONS[self.action].si
+        return SIZES[self.action].si
 
     @property
     def bounds(self) -> tuple[float, float]:
         """What the size may be, in `unit`."""
-        return ACTIONS[self.action].bounds
+        return SIZES[self.action].bounds
 
     @property
     def signed(self) -> bool:
@@ -241,26 +220,19 @@ class Term:
         return self.bounds[0] < 0.0
 
     @property
+    def unseen(self) -> tuple[str, ...]:
+        """Variables that no effect sees: the order of readings and further columns."""
+        return tuple(name for name in self.variables if name not in SEEN)
+
+    @property
     def acts(self) -> bool:
         """Whether an effect can see its variables."""
         return not self.unseen
 
     @property
-    def unseen(self) -> tuple[str, ...]:
-        """Variables that no effect sees: the order of readings and further columns."""
-        return tuple(name for name in self.variables if name not in VARIABLES or name == "order")
-
-    @property
     def variables(self) -> tuple[str, ...]:
         """One or two."""
         return (self.variable,) if self.times is None else (self.variable, self.times.variable)
-
-    @property
-    def second(self) -> Term | None:
-        """The same with its second variable as the only one."""
-        if self.times is None:
-            return None
-        return replace(self, **vars(self.times), times=None)
 
     @property
     def constants(self) -> dict[str, float]:
@@ -273,9 +245,11 @@ class Term:
         numbers = [f"{name}={value:.6g}" for name, value in self.at]
         named = [self.link, str(self.where or ""), self.action, self.direction, self.variable, self.column, self.shape]
         words = " ".join(part for part in (*named, *numbers) if part)
-        if self.second is None:
-            return words
-        return f"{words} times {self.second.key.removeprefix(f'{self.link} ')}"
+        return words if self.times is None else f"{words} times {self.times.key.removeprefix(f'{self.link} ')}"
+
+    def with_second(self, variable: str, shape: str, at: Constants = (), column: str = "") -> Term:
+        """The same times the share of a second variable, which is not below 0."""
+        return replace(self, times=replace(self, variable=variable, shape=shape, at=at, column=column, times=None))
 
     def sized(self, size: float) -> Term:
         """The same with a size (SI)."""
@@ -298,25 +272,16 @@ def shape_values(shape: str, values: FloatArray, constants: Mapping[str, float],
     return np.maximum(share, 0.0) if names == ("start", "end") and not signed else np.asarray(share)
 
 
-def shaped(term: Term, path: LoadPath) -> FloatArray:
-    """s(v) of a term at n poses: (n,), or (n, 6) where it is each strut's own.
+def shaped(term: Term, values: Callable[[str, str], FloatArray]) -> FloatArray:
+    """s(v) of a term, times t(w) where it has a second variable: (n,), or (n, 6) where it is each strut's own.
 
-    What varies from strut to strut belongs to a single strut where the term has one.
+    `values` gives those of a variable and column. What varies from strut to strut belongs to a single strut where the
+    term has one.
     """
-    values = variable_values(term.variable, path, term.column)
-    first = shape_values(term.shape, values, term.constants, term.signed)
-    if term.times is None:
+    first = shape_values(term.shape, values(term.variable, term.column), term.constants, term.signed)
+    if (other := term.times) is None:
         return first
-    return multiplied(first, factor_values(term.times, variable_values(term.times.variable, path, term.times.column)))
-
-
-def factor_values(factor: Factor, values: FloatArray) -> FloatArray:
-    """t(w) of a second variable, not below 0."""
-    return shape_values(factor.shape, values, dict(factor.at), False)
-
-
-def multiplied(first: FloatArray, second: FloatArray) -> FloatArray:
-    """The product of two shapes, (n,) or of each strut (n, 6)."""
+    second = shape_values(other.shape, values(other.variable, other.column), other.constants, signed=False)
     if first.ndim == second.ndim:
         return np.asarray(first * second)
     wide, narrow = (first, second) if first.ndim == 2 else (second, first)
@@ -326,7 +291,7 @@ def multiplied(first: FloatArray, second: FloatArray) -> FloatArray:
 def formula(term: Term, size: str) -> str:
     """What a term adds, its size and its constants by name."""
     along = f" along {term.direction}" if term.link == "instrument" and term.direction in AXES else ""
-    return f"{ACTIONS[term.action].equation.format(size)}{along}, s = {_share_formula(term, term.signed)}"
+    return f"{EQUATIONS[term.action].format(size)}{along}, s = {_share_formula(term, term.signed)}"
 
 
 def _share_formula(term: Term, signed: bool) -> str:
@@ -339,4 +304,4 @@ def _share_formula(term: Term, signed: bool) -> str:
         names = tuple(name for name, _ in term.at if name not in PAIR)
         share = re.sub(r"\bv\b", " ".join((term.variable, term.column)).strip(), FORMULAS[term.shape, names][0])
         share = f"max(0, {share})" if names == ("start", "end") and not signed else share
-    return share if term.second is None else f"{share} {_share_formula(term.second, signed=False)}"
+    return share if term.times is None else f"{share} {_share_formula(term.times, signed=False)}"

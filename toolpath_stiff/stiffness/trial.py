@@ -22,11 +22,11 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.active import ADDING, ActiveEffect
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import effects_from_file
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
-from toolpath_stiff.stiffness.model import TOOL, StiffnessModel, build_model, load_path
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model, load_path
 from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 POSES, DRAWN = 24, 600
 LEANING = rad_from_deg(10.0)  # largest roll, pitch and yaw of the poses
-LONGER = 0.1  # m, of the longest tool, for effects that ask for it
 SETUPS = ("riser", "table")
 ALLOW = "--allow-unchecked-effects"
 SAME = 1e-9  # relative: of results that must agree
@@ -55,11 +54,6 @@ class TrialOutcome:
     found: str
 
 
-def all_passed(outcomes: Iterable[TrialOutcome]) -> bool:
-    """Whether no check failed."""
-    return all(outcome.passed is not False for outcome in outcomes)
-
-
 def own_effects(model: StiffnessModel, effect_files: Iterable[str | Path]) -> list[Effect]:
     """Effects from outside the package that act in a model, or compete as of a file; each once."""
     acting = [active.effect for active in (*model.effects, *model.instruments) if is_foreign(active.effect)]
@@ -69,22 +63,21 @@ def own_effects(model: StiffnessModel, effect_files: Iterable[str | Path]) -> li
 
 def refuse_failing(effects: Iterable[Effect], machine: Hexapod, machine_name: str) -> None:
     """Raise `InputError` for the first effect from outside the package that fails on a machine, which it names."""
-    for effect in effects:
-        if reason := failure(effect, machine):
-            check = command_line("effects", "check", file_of(effect), *options(machine=machine_name))
-            hint = f"`{check}` says more; with {ALLOW} (allow_unchecked_effects=True) it is used all the same"
-            raise EffectError(f"effect {effect.name} {reason}", file=file_of(effect), hint=hint)
+    for effect, reason in _failing(effects, machine):
+        check = command_line("effects", "check", file_of(effect), *options(machine=machine_name))
+        hint = f"`{check}` says more; with {ALLOW} (allow_unchecked_effects=True) it is used all the same"
+        raise EffectError(f"effect {effect.name} {reason}", file=file_of(effect), hint=hint)
 
 
 def failures(effects: Iterable[Effect], machine: Hexapod) -> list[str]:
     """What results say of effects that were used although they fail."""
-    reasons = ((effect.name, failure(effect, machine)) for effect in effects)
-    return [f"UNCHECKED effect {name} ({ALLOW}): it {reason}" for name, reason in reasons if reason]
+    return [f"UNCHECKED effect {effect.name} ({ALLOW}): it {reason}" for effect, reason in _failing(effects, machine)]
 
 
-def failure(effect: Effect, machine: Hexapod) -> str:
-    """What `effects check` finds wrong in an effect, the end of a sentence; "" if nothing."""
-    return _failure(effect, pickle.dumps(machine.with_changes(effects=(), instruments=())))
+def _failing(effects: Iterable[Effect], machine: Hexapod) -> Iterator[tuple[Effect, str]]:
+    """Effects in which `effects check` finds something wrong: the end of a sentence."""
+    plain = pickle.dumps(machine.with_changes(effects=(), instruments=()))
+    return ((effect, reason) for effect in effects if (reason := _failure(effect, plain)))
 
 
 @lru_cache(maxsize=256)
@@ -97,7 +90,7 @@ def _failure(effect: Effect, machine: bytes) -> str:
 
 
 def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> list[TrialOutcome]:
-    """Try an effect on a machine, by itself: at its neutral value, typical values and finite bounds.
+    """Try an effect on a machine, by itself: at its neutral value and typical values.
 
     Parameters
     ----------
@@ -111,90 +104,77 @@ def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> list[TrialOut
     outcomes = [_unit(parameter) for parameter in effect.parameters if parameter.kind == "real"]
     try:
         outcomes += _behaviour(effect, machine.with_changes(effects=(), instruments=()), seed)
-    except EffectFault as fault:
-        outcomes.append(TrialOutcome("shapes", False, str(fault)))
+    except (EffectFault, InputError) as error:
+        outcomes.append(TrialOutcome("shapes" if isinstance(error, EffectFault) else "stiffness", False, str(error)))
     return outcomes
 
 
 def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOutcome]:
     """What it does at some poses with one set of parameters after the other."""
-    plain, poses = build_model(machine), _poses(effect, machine, seed)
+    plain, poses = build_model(machine), _poses(machine, seed)
     before, after = _shown(plain, _path(plain, poses)), {}
     for words, values in _parameter_sets(effect):
         model = build_model(machine, extra=[ActiveEffect(effect, values)])
         path = _path(model, poses)
-        try:
-            exact.tip_compliance(model, path)  # refused if there can be no such one
-            after[words] = _shown(model, path)
-        except EffectFault:
-            raise
-        except InputError as error:  # at its bounds an effect may ask more than a machine can give
-            if "bounds" not in words:
-                yield TrialOutcome("stiffness", False, f"{words}: {error}")
-                return
-        if words == "typical, high":
-            alone = np.array([_shown(model, path.take(np.array([i])))[0] for i in range(len(path))])
-            mixed = _largest(alone / after[words] - 1.0)
-            negative = [] if _goes_both_ways(effect) else [*_negative(model, path)]
-    count = f"{len(after)} sets of parameters, {len(poses)} poses"
-    yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}")
-    change = _largest(after["neutral"] / before - 1.0)
+        exact.tip_compliance(model, path)  # refused if there can be no such one
+        after[words] = _shown(model, path)
+    each = (path.take(slice(i, i + 1)) for i in range(len(path)))
+    alone = np.concatenate([_shown(model, pose) for pose in each])
+    yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {len(poses)} poses")
+    change = float(np.abs(after["neutral"] / before - 1.0).max())
     mistake = f"there it changes the stiffness by up to {100.0 * change:.3g} %; it must not"
     yield TrialOutcome("neutral value", change <= SAME, "there the effect vanishes" if change <= SAME else mistake)
     changes = 100.0 * (after["typical, high"] / before - 1.0)
-    if _largest(changes) > 100.0 * SAME:
+    if np.abs(changes).max() > 100.0 * SAME:
         span = f"{changes.min():+.3g} to {changes.max():+.3g} % (median {np.median(changes):+.3g} %)"
         yield TrialOutcome("size", None, f"at its upper typical value the stiffness changes by {span}")
     else:  # one drawn from readings may act at a set-up, a load, a corner that is not among these poses
         passed = None if effect.described_from else False
         yield TrialOutcome("size", passed, "at its upper typical value it changes nothing at these poses")
+    mixed = float(np.abs(alone / after["typical, high"] - 1.0).max())
     mistake = f"alone and together differ by up to {100.0 * mixed:.3g} %: the poses mix"
     yield TrialOutcome("poses", mixed <= SAME, "each alone gives what all together give" if mixed <= SAME else mistake)
-    for hook in negative:
-        mistake = f"{hook} is negative; if both signs are meant, bound the parameter so"
+    # What gives way can only soften the tip, what stands beside the struts only stiffen it; others may do both.
+    softening = set(effect.hooks) <= {"strut_compliance", "load_compliance"}
+    side = 1.0 if softening else -1.0 if effect.hooks == ["parallel_stiffness"] else 0.0
+    both_ways = any(p.kind == "real" and p.bounds[0] < p.neutral < p.bounds[1] for p in effect.parameters)
+    if (side * changes > 100.0 * SAME).any() and not both_ways and not effect.described_from:
+        mistake = f"{effect.hooks[0]} is negative; if both signs are meant, bound the parameter so"
         yield TrialOutcome("sign", False, mistake)
 
 
-def _poses(effect: Effect, machine: Hexapod, seed: int) -> FloatArray:
-    """(n, 7) m and rad within reach, the default origin first, and how much longer the tool is, if the effect asks."""
+def _poses(machine: Hexapod, seed: int) -> FloatArray:
+    """(n, 6) m and rad within reach, the default origin first."""
     origin = np.array(machine.default_origin)
     low, high = machine.limits.workspace
     size = 0.25 * float(solve_struts(machine, origin[:3]).lengths.mean())
     low, high = np.maximum(low, origin[:3] - size), np.minimum(high, origin[:3] + size)
     generator = np.random.default_rng(seed)
-    drawn = np.empty((DRAWN, 6))
-    drawn[:, :3] = generator.uniform(low, high, (DRAWN, 3))
-    drawn[:, 3:] = generator.uniform(-LEANING, LEANING, (DRAWN, 3))
-    drawn[0] = origin
+    place, lean = generator.uniform(low, high, (DRAWN, 3)), generator.uniform(-LEANING, LEANING, (DRAWN, 3))
+    drawn = np.vstack([origin, np.column_stack([place, lean])[1:]])
     turn = rotation_matrices(drawn[:, 3:])
     within = reach(machine, drawn[:, :3], solve_struts(machine, drawn[:, :3], turn), turn).reachable
-    poses = drawn[within][:POSES] if within.any() else drawn[:1]
-    return np.column_stack([poses, np.linspace(0.0, LONGER if TOOL in effect.needs else 0.0, len(poses))])
+    return drawn[within][:POSES] if within.any() else drawn[:1]
 
 
 def _parameter_sets(effect: Effect) -> Iterator[tuple[str, Values]]:
-    """Words -> SI values. A bound that is not finite is left out."""
-    sets = (("neutral", "neutral", 0), ("typical, low", "typical", 0), ("typical, high", "typical", 1))
-    for words, attribute, index in (*sets, ("lower bounds", "bounds", 0), ("upper bounds", "bounds", 1)):
+    """Words -> SI values."""
+    for words, index in (("neutral", None), ("typical, low", 0), ("typical, high", 1)):
         values: dict[str, str | float] = {}
         for p in effect.parameters:
-            if p.discrete:
-                values[p.name] = SETUPS[0] if p.kind == "text" else int(p.bounds[index])
+            if p.kind == "real":
+                values[p.name] = p.si * (p.neutral if index is None else p.typical[index])
             else:
-                values[p.name] = p.si * (p.neutral if words == "neutral" else getattr(p, attribute)[index])
-        if "bounds" not in words or np.isfinite([value for value in values.values() if isinstance(value, float)]).all():
-            yield words, values
+                values[p.name] = SETUPS[0] if p.kind == "text" else int(p.bounds[index or 0])
+        yield words, values
 
 
 def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
     """Everything that an effect may ask for: half of the poses on the riser, an hour of time, 5 K."""
     n = len(poses)
-    length = np.where(poses[:, 6] > 0.0, model.machine.reference_tool_length + poses[:, 6], np.nan)
-    ramp, setup = np.linspace(0.0, 1.0, n), np.array([SETUPS[i % 2] for i in range(n)])
-    return load_path(
-        model, poses[:, :3], rotation_matrices(poses[:, 3:6]), length, setup=setup, time=3600.0 * ramp,
-        temperature=20.0 + 5.0 * ramp, direction=np.eye(3)[np.arange(n) % 3],
-    )  # fmt: skip
+    ramp, turns = np.linspace(0.0, 1.0, n), rotation_matrices(poses[:, 3:])
+    seen = {"setup": np.resize(SETUPS, n), "time": 3600.0 * ramp, "temperature": 20.0 + 5.0 * ramp}
+    return load_path(model, poses[:, :3], turns, direction=np.resize(np.eye(3), (n, 3)), **seen)
 
 
 def _shown(model: StiffnessModel, path: LoadPath) -> FloatArray:
@@ -204,27 +184,6 @@ def _shown(model: StiffnessModel, path: LoadPath) -> FloatArray:
     for active in model.instruments:
         stiffness = active.reading(stiffness, path)
     return np.asarray(stiffness)
-
-
-def _largest(values: FloatArray) -> float:
-    return float(np.abs(values).max())
-
-
-def _goes_both_ways(effect: Effect) -> bool:
-    """Whether it may add and take: its neutral value lies between bounds, or it was drawn from readings."""
-    between = any(p.kind == "real" and p.bounds[0] < p.neutral < p.bounds[1] for p in effect.parameters)
-    return between or bool(effect.described_from)
-
-
-def _negative(model: StiffnessModel, path: LoadPath) -> Iterator[str]:
-    """Hooks that add less than nothing: what gives way can only add compliance, what stands beside only stiffness."""
-    for active in model.effects:
-        for hook in ADDING:
-            added = active.adds(hook, path)
-            if added is not None:
-                lowest = np.asarray(added if added.ndim == 2 else np.linalg.eigvalsh(added))
-                if lowest.min() < -SAME * _largest(lowest):
-                    yield hook
 
 
 def _unit(parameter: Parameter) -> TrialOutcome:
@@ -241,6 +200,11 @@ def unit_in_si(unit: str) -> float | None:
     above, *below = ([UNITS.get(token, np.nan) for token in re.split(r"[ .*]+", part)] for part in unit.split("/"))
     value = float(np.prod(above) / np.prod([factor for part in below for factor in part]))
     return None if np.isnan(value) else value
+
+
+def all_passed(outcomes: Iterable[TrialOutcome]) -> bool:
+    """Whether no check failed."""
+    return all(outcome.passed is not False for outcome in outcomes)
 
 
 @dataclass(frozen=True, repr=False, eq=False)

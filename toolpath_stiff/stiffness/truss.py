@@ -54,44 +54,29 @@ def _free_flexibility(joints: bytes) -> FloatArray:
     """`free_platform_flexibility` of six joints, as one array that nobody writes to."""
     platform_joints = np.frombuffer(joints).reshape(6, 3)
     nodes = platform_nodes(platform_joints)
-    stiffness = np.zeros((24, 24))
-    for i, j in platform_bars(platform_joints):
-        bar = nodes[j] - nodes[i]
-        length = np.linalg.norm(bar)
-        if length < 1e-9:
-            raise EffectError(
-                f"platform nodes {i + 1} and {j + 1} coincide, so the platform truss has a bar of no length",
-                hint="set bar_stiffness_N_per_m = inf (a rigid platform)",
-            )
-        unit = bar / length
-        ends = np.zeros(24)
-        ends[3 * i : 3 * i + 3], ends[3 * j : 3 * j + 3] = -unit, unit
-        stiffness += np.outer(ends, ends)
-    rigid = _rigid_motions(nodes)
+    first, last = np.array(platform_bars(platform_joints)).T
+    bars, each = nodes[last] - nodes[first], np.arange(len(first))
+    ends = np.zeros((len(first), len(nodes), 3))  # how much a bar is stretched by motions of its ends
+    with np.errstate(invalid="ignore"):  # a bar without a length
+        ends[each, last] = bars / np.linalg.norm(bars, axis=1, keepdims=True)
+    ends[each, first] = -ends[each, last]
+    stretch = ends.reshape(len(first), -1)
+    motions = np.zeros((len(nodes), 3, 6))  # for unit translations and unit rotations about the tip
+    motions[:, :, :3] = np.eye(3)
+    motions[:, :, 3:] = np.swapaxes(np.cross(np.eye(3), nodes[:, None]), 1, 2)
+    rigid = motions.reshape(-1, 6)
     basis, _ = np.linalg.qr(rigid)
     # Springs on the rigid motions alone: balanced loads do not feel them, and the matrix can be inverted.
-    held = stiffness + basis @ basis.T
-    if np.linalg.cond(held) > 1e10:
+    held = stretch.T @ stretch + basis @ basis.T
+    if not np.linalg.cond(held) < 1e10:
         raise EffectError(
-            "the platform truss is a mechanism: its bars do not lock the joints and the tip",
+            "the platform truss is a mechanism: its bars do not lock the joints and the tip, or one has no length",
             hint="set bar_stiffness_N_per_m = inf (a rigid platform)",
         )
     loaded = np.r_[0:18, 21:24]
-    flexibility = np.linalg.inv(held)[np.ix_(loaded, loaded)]
-    balance = np.eye(21)
+    flexibility, balance, arms = np.linalg.inv(held)[np.ix_(loaded, loaded)], np.eye(21), rigid[:18]
     resultants = rigid[loaded].T  # (6, 21): total force and moment about the tip
-    arms = rigid[:18]  # (18, 6)
     balance[:18] -= arms @ np.linalg.solve(arms.T @ arms, resultants)
     loaded_flexibility = np.asarray(balance.T @ flexibility @ balance)
     loaded_flexibility.flags.writeable = False
     return loaded_flexibility
-
-
-def _rigid_motions(nodes: FloatArray) -> FloatArray:
-    """(3 N, 6) displacements of the nodes for unit translations and unit rotations about the tip."""
-    motions = np.zeros((3 * len(nodes), 6))
-    for i, node in enumerate(nodes):
-        rows = slice(3 * i, 3 * i + 3)
-        motions[rows, :3] = np.eye(3)
-        motions[rows, 3:] = np.cross(np.eye(3), node).T
-    return motions

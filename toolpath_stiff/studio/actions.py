@@ -2,24 +2,27 @@
 
 import tempfile
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import toolpath_stiff as tps
-from toolpath_stiff.case.steps import TABLES
+from toolpath_stiff.case.state import TABLES
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.nc.controller import KEYS
 from toolpath_stiff.nc.program import Reading
 from toolpath_stiff.studio.session import Session
 
 MOST_POSES = 60
+LEAST_READINGS = 8
 SUFFIXES = {".csv": "data", ".xlsx": "data", ".py": "effects", ".toml": "machine", ".tbl": "tools", ".var": "offsets"}
 NOT_OURS = (TypeError, ValueError, KeyError, OverflowError, AttributeError)  # of arguments that no page of ours sends
 LONGEST_NAME = 200  # bytes: what a file system takes, and what is put before it
 
 
-def do(session: Session, question: Mapping[str, Any]) -> dict[str, Any]:
+def do(session: Session, question: Document) -> Document:
     """Do what a page asks. Raises `InputError` for what cannot be done."""
     name = str(question.get("do"))
     if name not in ACTIONS:
@@ -37,17 +40,18 @@ def do(session: Session, question: Mapping[str, Any]) -> dict[str, Any]:
     return answer or {}
 
 
-def _by_hand(session: Session, on: Mapping[str, Any]) -> dict[str, Any]:
+def _by_hand(session: Session, on: Mapping[str, Document]) -> Document:
     # Which readings are wild is found out when the slider is let go.
     errors = session.case.preview.at(on, strut_law=bool(on), near=session.case.state.on or None)
-    return {**errors, "deviation_percent": [round(percent, 3) for percent in errors["deviation_percent"]],
-            "modelled_N_per_mm": [round(stiffness) for stiffness in errors["modelled_N_per_mm"]]}  # fmt: skip
+    rounded = {"deviation_percent": 3, "modelled_N_per_mm": 0}
+    return {**errors, **{name: [round(value, n) for value in errors[name]] for name, n in rounded.items()}}
 
 
 def _aside(session: Session, file: str, line: int) -> None:
-    back = f"{file}:{line}" in session.case.state.aside
-    if not back and len(session.case.state.aside) + 8 > len(session.readings()["line"]):
-        raise InputError("too few readings would be left", expected="more than 8 in use")
+    aside = session.case.state.aside
+    back = f"{file}:{line}" in aside
+    if not back and len(aside) + LEAST_READINGS > len(session.readings()["line"]):
+        raise InputError("too few readings would be left", expected=f"more than {LEAST_READINGS} in use")
     session.case.set_aside(file, int(line), back=back)
 
 
@@ -56,6 +60,13 @@ def _fit(session: Session) -> None:
     if not on:
         raise InputError("no effect is switched on", hint="switch one on, then fit")
     session.queue("update", add=[_word(session.catalogue()[name], keys) for name, keys in on.items()])
+
+
+def _word(effect: tps.Effect, keys: Document) -> str:
+    """An effect as --add takes it: with what it acts on."""
+    discrete = [parameter for parameter in effect.parameters if parameter.discrete]
+    chosen = [f"{part.name}={keys[part.key]}" for part in discrete if keys.get(part.key) not in ("", None)]
+    return f"{effect.name}:{','.join(chosen)}" if chosen else effect.name
 
 
 def _accept(session: Session) -> None:
@@ -72,21 +83,28 @@ def _measure(session: Session) -> None:
     session.case.measure(str(session.case.folder / plan / "plan.csv"))
 
 
-def _claim(session: Session, effects: str) -> None:
-    session.revealed = session.case.claim(str(effects))
-
-
-def _exercise(session: Session, seed: int, layout: str = "tilted") -> None:
-    session.case.start_exercise(seed, layout=layout)
-    session.revealed = None
-
-
 def _save_effect(session: Session, file: str, text: str) -> None:
-    session.editing.save(str(file), str(text))
-    session.editing.look()
+    try:
+        with _sent(session, Path(file).name, text.encode()) as path:
+            session.case.add_effects(path, instead_of=file)
+        session.faults.pop(file, None)
+    except TpsError as error:
+        session.faults[file] = (text, str(error))
 
 
-def take_file(session: Session, name: str, content: bytes, run: bool) -> dict[str, Any]:
+@contextmanager
+def _sent(session: Session, name: str, content: bytes) -> Iterator[Path]:
+    """What a page has sent, as a file; errors do not name its folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / name
+        file.write_bytes(content)
+        try:
+            yield file
+        except TpsError as error:
+            raise InputError(str(error).replace(f"{folder}/", "").replace(f"{session.case.folder}/", "")) from None
+
+
+def take_file(session: Session, name: str, content: bytes, run: bool) -> Document:
     """A file that was dropped: measurements, a machine, effects, else a program."""
     plain = Path(name.replace("\\", "/")).name or "file"
     if "\0" in plain or len(plain.encode()) > LONGEST_NAME:
@@ -94,24 +112,18 @@ def take_file(session: Session, name: str, content: bytes, run: bool) -> dict[st
     kind = _kind(Path(plain).suffix.lower(), content)
     if kind == "effects" and not run:
         return {"confirm": f"{plain} is code. It is run when it is loaded. Load it?"}
-    with tempfile.TemporaryDirectory() as folder, session.lock:
-        file = Path(folder) / plain
-        file.write_bytes(content)
-        session.case.sent_to = f"{folder}/"
+    with session.lock, _sent(session, plain, content) as file:
         case = session.case
-        add: dict[str, Callable[[Path], None]] = {
-            "data": case.add_data,
-            "effects": case.add_effects,
-            "machine": case.set_machine,
-        }
-        try:
-            if kind in TABLES:
-                case.read_programs(**cast("Reading", {kind: file}))
-            else:
-                add.get(kind, case.add_program)(file)
-        except TpsError as error:
-            raise InputError(str(error).replace(f"{folder}/", "").replace(f"{case.folder}/", "")) from None
-        session.message = f"{plain}: {session.case.history[-1].text}"
+        if kind in TABLES:
+            case.add_program(**cast("Reading", {kind: file}))
+        else:
+            takers: dict[str, Callable[[Path], None]] = {
+                "data": case.add_data,
+                "effects": case.add_effects,
+                "machine": case.set_machine,
+            }
+            takers.get(kind, case.add_program)(file)
+        session.message = f"{plain}: {case.history[-1].text}"
         session.follow_up()
         session.tell()
     return {"message": session.message}
@@ -131,17 +143,7 @@ def _kind(suffix: str, content: bytes) -> str:
     return SUFFIXES.get(suffix, "program")
 
 
-def _word(effect: tps.Effect, keys: Mapping[str, Any]) -> str:
-    """An effect as --add takes it: with what it acts on."""
-    chosen = [
-        f"{parameter.name}={keys[parameter.key]}"
-        for parameter in effect.parameters
-        if parameter.discrete and keys.get(parameter.key) not in ("", None)
-    ]
-    return f"{effect.name}:{','.join(chosen)}" if chosen else effect.name
-
-
-ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {
+ACTIONS: dict[str, Callable[..., Document | None]] = {
     "hand": _by_hand,
     "at": lambda session, origin: session.trial().at(origin),
     "switch": lambda session, effect, values: session.case.switch(str(effect), values),
@@ -151,17 +153,15 @@ ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {
     "plan": lambda session, n=6: session.queue("plan", n=max(1, min(MOST_POSES, int(n)))),
     "compare": lambda session: session.queue("compare"),
     "draft": lambda session: session.queue("draft"),
-    "edit": lambda session, file: session.editing.open(str(file)),
-    "save_effect": _save_effect,
     "set_up": lambda session: session.queue("set_up"),
-    "measure": _measure,
-    "exercise": _exercise,
-    "claim": _claim,
     "place": lambda session: session.queue("place"),
+    "save_effect": _save_effect,
+    "measure": _measure,
+    "exercise": lambda session, seed, layout="tilted": session.case.start_exercise(seed, layout=layout),
+    "claim": lambda session, effects: session.case.claim(str(effects)),
     "place_at": lambda session, origin: session.case.place_at(origin),
     "require": lambda session, value: session.case.require(float(value)),
     "undo": lambda session: None if session.case.undo() else {"message": "nothing to undo"},
-    "redo": lambda session: None if session.case.redo() else {"message": "nothing to redo"},
     "cancel": lambda session: session.cancel(),
 }
 LOOKS = ("hand", "at")  # these change nothing

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from toolpath_stiff.case.case import Case
-from toolpath_stiff.case.steps import CASE_FILE
+from toolpath_stiff.case.state import CASE_FILE
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file

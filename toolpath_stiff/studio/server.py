@@ -63,9 +63,9 @@ class Studio(ThreadingHTTPServer):
     daemon_threads = True
     allow_reuse_address = False
 
-    def __init__(self, session: Session, port: int = 0, token: str = "") -> None:
+    def __init__(self, session: Session, port: int = 0) -> None:
         super().__init__(("127.0.0.1", port), Handler)
-        self.session, self.token = session, token or secrets.token_urlsafe(24)
+        self.session, self.token = session, secrets.token_urlsafe(24)
         self.closing = threading.Event()
 
     @property
@@ -93,26 +93,23 @@ class Handler(BaseHTTPRequestHandler):
         """Nothing on the terminal: the page says what is wrong."""
 
     def do_GET(self) -> None:
-        """The page, the state, the events, results."""
-        self._guarded(self._get)
-
-    def do_POST(self) -> None:
-        """What is to be done; files."""
-        self._guarded(self._post)
-
-    def _guarded(self, answer: Any) -> None:
+        """The page, the state, the events, results; by POST what is to be done, and files."""
         try:
             if self._refused():
                 self.close_connection = True
-                return self._send(HTTPStatus.FORBIDDEN, REFUSED, "text/plain")
-            answer()
+                self._send(HTTPStatus.FORBIDDEN, REFUSED, "text/plain")
+            elif self.command == "GET":
+                self._get()
+            else:
+                self._post()
         except TpsError as error:
             self._json({"error": str(error)})
         except (ConnectionError, TimeoutError):  # the tab was closed
             self.close_connection = True
         except OSError as error:
             self._json({"error": error.strerror or str(error)})
-        return None
+
+    do_POST = do_GET  # noqa: N815  (a name of the standard library)
 
     @property
     def _cookie_name(self) -> str:
@@ -124,9 +121,8 @@ class Handler(BaseHTTPRequestHandler):
         host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
         if host not in hosts or (origin is not None and origin not in {f"http://{host}"}):
             return True
-        if self.headers.get("Sec-Fetch-Site", "same-origin") not in ("same-origin", "none"):
-            return True
-        if self.command == "POST" and origin is None:
+        foreign = self.headers.get("Sec-Fetch-Site", "same-origin") not in ("same-origin", "none")
+        if foreign or (self.command == "POST" and origin is None):
             return True
         given = parse_qs(urlsplit(self.path).query).get("token", [""])[0] if self.command == "GET" else ""
         try:
@@ -142,11 +138,8 @@ class Handler(BaseHTTPRequestHandler):
     def _get(self) -> None:
         parts, session = urlsplit(self.path), self.server.session
         if "token" in parse_qs(parts.query):  # from now on in a cookie: it stays out of histories and referrers
-            self.send_response(HTTPStatus.SEE_OTHER)
             cookie = f"{self._cookie_name}={self.server.token}; HttpOnly; SameSite=Strict; Path=/"
-            for name, value in (("Location", "/"), ("Set-Cookie", cookie), ("Content-Length", "0")):
-                self.send_header(name, value)
-            return self.end_headers()
+            return self._send(HTTPStatus.SEE_OTHER, "", "text/plain", more={"Location": "/", "Set-Cookie": cookie})
         if parts.path == "/":
             return self._send(HTTPStatus.OK, page(), "text/html")
         if parts.path == "/state":
@@ -192,8 +185,8 @@ class Handler(BaseHTTPRequestHandler):
         seen: tuple[int, int] = (-1, -1)
         while not self.server.closing.is_set():
             now = self.server.session.wait(seen, BEAT)
-            text = json.dumps(self.server.session.news()) if now != seen else ""
-            self.wfile.write(f"data: {text}\n\n".encode() if text else b": here\n\n")
+            sign = f"data: {json.dumps(self.server.session.news())}" if now != seen else ": here"
+            self.wfile.write(f"{sign}\n\n".encode())
             self.wfile.flush()
             seen = now
 

@@ -2,31 +2,27 @@
 
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from itertools import takewhile
 from typing import Any, TypeVar
 
 import toolpath_stiff as tps
 from toolpath_stiff.case.case import Case
-from toolpath_stiff.case.history import python_line
-from toolpath_stiff.case.steps import Step
+from toolpath_stiff.case.state import Step, call
 from toolpath_stiff.documents import Document
-from toolpath_stiff.studio.editing import Editing
 from toolpath_stiff.studio.work import Job, Reply
 
 READING = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz", "stiffness_N_per_mm", "force_N")
-
+OF_READINGS = ("diagnose", "update", "plan")  # results that a studio takes up again
 
 Made = TypeVar("Made")
 
 
-def fitted_sizes(update: Document) -> dict[str, dict[str, Any]]:
+def fitted_sizes(update: Document) -> Mapping[str, Document]:
     """Effect -> key -> value of the last model of an update's document."""
-    last = update["steps"][-1]["parameters"]
     return {
         name: {key: size["value"] if isinstance(size, dict) else size for key, size in sizes.items()}
-        for name, sizes in last.items()
+        for name, sizes in update["steps"][-1]["parameters"].items()
     }
 
 
@@ -39,23 +35,36 @@ class Session:
         The case; changed by `do` alone.
     lock
         Held by whoever reads or changes the state.
+    message
+        What tabs are told.
+    faults
+        File of own effects -> the text that was saved last and what is wrong with it.
     """
 
     def __init__(self, case: Case) -> None:
-        self.case, self.name = case, case.folder.resolve().name
+        self.case, self.name, self.message = case, case.folder.resolve().name, ""
+        self.faults: dict[str, tuple[str, str]] = {}
         self.lock, self._changed = threading.RLock(), threading.Condition()
         self._version = self._beat = 0
-        self._jobs: list[tuple[str, dict[str, Any]]] = []
+        self._jobs: list[tuple[str, Document]] = []
         self._running: Job | None = None
         self._found: dict[tuple[str, object], Reply] = {}  # kind and what it was found for -> what was found
-        self._failed: dict[str, tuple[Any, str]] = {}
-        self.message = ""
-        self.revealed: dict[str, Any] | None = None
-        self._kept: dict[str, tuple[Any, Any]] = {}  # name -> key, value: what is worked out once for a state
-        self.editing = Editing(case)
-        self._resume()
+        self._failed: dict[str, tuple[object, str]] = {}
+        self._kept: dict[str, tuple[object, Any]] = {}  # name -> key, value: what is worked out once for a state
+        for step in case.history:
+            if step.kind in OF_READINGS and (document := self._document_of(step)):
+                accepted = (case.folder / step.result / "machine.toml").is_file()
+                reply = Reply(step.text, step.command, document, step.result, accepted)
+                self._found[step.kind, step.state.judged] = reply
         self.follow_up()
-        self.editing.follow(self.look)
+
+    def _document_of(self, step: Step) -> Document | None:
+        with suppress(OSError, ValueError):
+            document: Document = json.loads((self.case.folder / step.result / f"{step.kind}.json").read_text("utf-8"))
+            return document
+        return None
+
+    # What tabs are told.
 
     def wait(self, seen: tuple[int, int], seconds: float) -> tuple[int, int]:
         """The version and the beat of the work, as soon as one of them is another."""
@@ -63,17 +72,13 @@ class Session:
             self._changed.wait_for(lambda: (self._version, self._beat) != seen, seconds)
             return self._version, self._beat
 
-    def news(self) -> dict[str, Any]:
+    def news(self) -> Document:
         """What tabs are told at once: the version of the state, the work under way, the last message."""
-        return {"version": self._version, "job": self._job(), "message": self.message}
-
-    def close(self) -> None:
-        """End the work under way."""
-        self.editing.close()
-        with self.lock:
-            self._jobs = []
-            if self._running:
-                self._running.stop()
+        job, shown = self._running, None
+        if job:
+            text, done, total = job.progress
+            shown = {"kind": job.kind, "text": text, "done": done, "total": total}
+        return {"version": self._version, "job": shown, "message": self.message}
 
     def tell(self, state: bool = True) -> None:
         """Wake all tabs; `state`: it is another than before."""
@@ -82,28 +87,22 @@ class Session:
             self._beat += 1
             self._changed.notify_all()
 
-    @property
-    def data_key(self) -> tuple[Any, ...]:
-        """What a diagnosis hangs on."""
-        state = self.case.state
-        return (state.machine, state.effects, state.data, state.aside)
+    # What holds, each worked out once.
 
     @property
-    def path_key(self) -> tuple[Any, ...]:
+    def path_key(self) -> tuple[object, ...]:
         """What the analysis of the program hangs on."""
         state = self.case.state
-        switches = tuple((name, tuple(keys.items())) for name, keys in state.on.items())
-        fitted = bool(switches) and self.is_fitted  # a fit knows how well it knows: its machine has a band
-        on = self.data_key if switches else (state.machine, state.effects)
-        return (on, switches, fitted, self.program_key, state.origin, state.require)
+        fitted = bool(state.on) and self.is_fitted  # a fit knows how well it knows: its machine has a band
+        on = state.judged if state.on else (state.machine, state.effects)
+        return (on, str(state.on), fitted, self.program_key, state.origin, state.require)
 
     @property
-    def program_key(self) -> tuple[Any, ...]:
+    def program_key(self) -> tuple[str, str]:
         """The program and how it is read."""
-        state = self.case.state
-        return (state.program, tuple(state.reading.items()))
+        return (self.case.state.program, str(self.case.state.reading))
 
-    def once(self, name: str, key: Any, make: Callable[[], Made]) -> Made:
+    def once(self, name: str, key: object, make: Callable[[], Made]) -> Made:
         """What `make` gives, worked out once for a key."""
         if name not in self._kept or self._kept[name][0] != key:
             self._kept[name] = (key, make())
@@ -116,10 +115,33 @@ class Session:
         state = self.case.state
         return self.once("machine", (state.machine, state.effects), lambda: self.case.machine)
 
-    def errors(self) -> dict[str, Any]:
+    def errors(self) -> Document:
         """The error of every reading in use as the switches stand."""
         on = self.case.state.on
-        return self.once("errors", (self.data_key, on), lambda: self.case.preview.at(on, strut_law=bool(on)))
+        return self.once("errors", (self.case.state.judged, on), lambda: self.case.preview.at(on, strut_law=bool(on)))
+
+    def catalogue(self) -> tps.EffectCatalogue:
+        """The effects that can be switched on."""
+        files = self.case.effect_files
+        return self.once("catalogue", files, lambda: tps.effects(files))
+
+    def trial(self) -> tps.PlacementTrial:
+        """The program that can be put anywhere."""
+        return self.once("trial", self.key("place"), lambda: tps.try_placement(self.case.program, self.machine))
+
+    def readings(self) -> Mapping[str, list[Any]]:
+        """All readings of the case, those set aside too, as columns."""
+        state = self.case.state
+
+        def make() -> Mapping[str, list[Any]]:
+            names = {self.case.path(name): name for name in state.data}
+            frame = tps.Measurements(list(names)).to_frame(self.machine).round(4)
+            columns = {name: frame[name].tolist() for name in ("line", "point", *READING)}
+            return {"file": frame["file"].map(names).tolist(), **columns}
+
+        return self.once("readings", (state.machine, state.data), make)
+
+    # What was found.
 
     def found(self, kind: str) -> Reply | None:
         """What was found last, if it still holds."""
@@ -130,16 +152,31 @@ class Session:
         latest = self.found(kind)
         return latest.document if latest else None
 
-    def catalogue(self) -> tps.EffectCatalogue:
-        """The effects that can be switched on."""
-        files = self.case.effect_files
-        return self.once("catalogue", files, lambda: tps.effects(files))
+    def failed(self, kind: str) -> str:
+        """Why the last attempt for this state failed; "" where it did not."""
+        key, text = self._failed.get(kind, (None, ""))
+        return text if key == self.key(kind) else ""
 
-    def trial(self) -> tps.PlacementTrial:
-        """The program that can be put anywhere."""
+    @property
+    def is_fitted(self) -> bool:
+        """True where the switches stand as the last fit has them."""
+        fit = self.document("update")
+        return fit is not None and self.case.state.on == fitted_sizes(fit)
+
+    def revealed(self) -> Document | None:
+        """What the opened seal of the present exercise has shown."""
+        exercise = self.case.state.exercise
+        steps = [step for step in self.case.history if step.kind == "reveal" and step.state.exercise == exercise]
+        return self._document_of(steps[-1]) if steps else None
+
+    # The work.
+
+    def key(self, kind: str) -> object:
+        """What the state holds of that on which this kind of result hangs."""
         state = self.case.state
-        key = (state.machine, state.effects, self.program_key)
-        return self.once("trial", key, lambda: tps.try_placement(self.case.program, self.machine))
+        if kind in ("place", "set_up"):
+            return (state.machine, state.effects, self.program_key, state.origin if kind == "set_up" else ())
+        return self.path_key if kind == "analyze" else state.judged
 
     def queue(self, kind: str, **given: Any) -> None:
         """Ask for a result before all that waits."""
@@ -148,8 +185,7 @@ class Session:
 
     def follow_up(self) -> None:
         """Stop what has lost its reason; ask for what the state wants; start the next."""
-        state = self.case.state
-        running = self._running
+        state, running = self.case.state, self._running
         if running and running.key != self.key(running.kind):
             running.stop()
         for kind in [*(["diagnose"] if state.data else []), *(["analyze"] if state.program else [])]:
@@ -157,29 +193,17 @@ class Session:
             waiting = kind in [waiting for waiting, _ in self._jobs]
             if self.found(kind) is None and not busy and not self.failed(kind) and not waiting:
                 self._jobs.append((kind, {}))
-        self._start()
+        if not running and self._jobs:
+            self._start(*self._jobs.pop(0))
 
-    def key(self, kind: str) -> Any:
-        """What the state holds of that on which this kind of result hangs."""
-        state = self.case.state
-        if kind == "place":
-            return (state.machine, state.effects, self.program_key)
-        if kind == "set_up":
-            return (state.machine, state.effects, self.program_key, state.origin)
-        return self.path_key if kind == "analyze" else self.data_key
-
-    def _start(self) -> None:
-        if self._running or not self._jobs:
-            return
-        kind, given = self._jobs.pop(0)
-        first: dict[str, str] = {}
+    def _start(self, kind: str, given: Document) -> None:
+        first = ""
         if kind == "analyze":
             fit = self.found("update")
-            fitted = fit.result if fit and fit.accepted and self.is_fitted else ""
-            given = {"machine": f"{fitted}/machine.toml"} if fitted else {}
-            first = {"first": self.first_machine}
+            given = {"machine": f"{fit.result}/machine.toml"} if fit and fit.accepted and self.is_fitted else {}
+            first = [step.state.machine for step in self.case.history if step.kind in ("machine", "exercise")][-1]
         result = self.case.next_result(kind)
-        self._running = Job(self.case.folder, kind, {"result": result, **first, **given}, given, self.key(kind))
+        self._running = Job(self.case.folder, kind, result, given, self.key(kind), first)
         self._running.follow(lambda: self.tell(state=False), self._done)
 
     def _done(self, job: Job, answer: Reply | None, error: str) -> None:
@@ -188,7 +212,7 @@ class Session:
             if job.key == self.key(job.kind):
                 if answer is not None:
                     self._take(job, answer)
-                elif error:
+                else:
                     self._failed[job.kind] = (job.key, error)
                     self.message = "" if error == "stopped" else f"{job.kind}: {error}"
             self.follow_up()
@@ -197,59 +221,18 @@ class Session:
     def _take(self, job: Job, answer: Reply) -> None:
         """An answer into the history; what was fitted or drafted acts from now on."""
         self._found[job.kind, job.key] = answer
-        if not self._is_recorded(job.kind, answer.command):
-            line = python_line(job.kind, (), job.given)
-            self.case.record(job.kind, answer.text, answer.command, python=line, result=answer.result)
+        case, state = self.case, self.case.state
+        known = [(step.kind, step.command) for step in case.history if step.state == state]
+        if (job.kind, answer.command) not in known:  # a studio that resumes works some things out again
+            case.record(job.kind, answer.text, answer.command, call("find", job.kind, **job.given), None, answer.result)
         if job.kind == "update":  # the fit holds for the sizes that the switches take over
             for name, sizes in fitted_sizes(answer.document).items():
-                if name in self.case.state.on:
-                    self.case.switch(name, {**self.case.state.on[name], **sizes})
+                if name in state.on:
+                    case.switch(name, {**state.on[name], **sizes})
         if job.kind == "draft":
             self.message = answer.document["reason"]
             if answer.file:  # written by the tool itself
-                self.case.add_effects(self.case.folder / answer.file)
-
-    def _is_recorded(self, kind: str, command: str) -> bool:
-        """True where the history has it since the last change: a studio that resumes works some things out again."""
-        since = takewhile(lambda step: not step.change, reversed(self.case.history))
-        return any((step.kind, step.command) == (kind, command) for step in since)
-
-    @property
-    def is_fitted(self) -> bool:
-        """True where the switches stand as the last fit has them."""
-        fit = self.found("update")
-        return fit is not None and {n: dict(k) for n, k in self.case.state.on.items()} == fitted_sizes(fit.document)
-
-    @property
-    def first_machine(self) -> str:
-        """The machine as it was given: before anything was fitted."""
-        given = [step.change["machine"] for step in self.case.history if step.kind in ("machine", "exercise")]
-        return str(given[-1])
-
-    def _job(self) -> dict[str, Any] | None:
-        job = self._running
-        if not job:
-            return None
-        text, done, total = job.progress
-        return {"kind": job.kind, "text": text, "done": done, "total": total, "waiting": len(self._jobs)}
-
-    def _resume(self) -> None:
-        """Take up what an earlier studio has found, where it still holds."""
-        latest: dict[str, Step] = {}
-        for step in self.case.history:
-            if {"machine", "effects", "data", "aside"} & set(step.change):
-                latest = {kind: revealed for kind, revealed in latest.items() if kind == "reveal"}
-            elif step.result and step.kind in ("diagnose", "update", "plan", "reveal"):
-                latest[step.kind] = step
-        for kind, step in latest.items():
-            folder = self.case.folder / step.result
-            with suppress(OSError, ValueError):
-                document = json.loads((folder / f"{kind}.json").read_text("utf-8"))
-                if kind == "reveal":
-                    self.revealed = document
-                    continue
-                accepted = (folder / "machine.toml").is_file()
-                self._found[kind, self.data_key] = Reply(step.text, step.command, document, step.result, accepted)
+                case.add_effects(case.folder / answer.file)
 
     def cancel(self) -> None:
         """End the work under way, and forget what waits."""
@@ -258,34 +241,7 @@ class Session:
             self._failed[self._running.kind] = (self._running.key, "stopped")
             self._running.stop()
 
-    def look(self) -> None:
-        """Load own effects that were saved in an editor."""
+    def close(self) -> None:
+        """End the work under way."""
         with self.lock:
-            if not self.editing.look():
-                return
-            self.follow_up()
-        self.tell()
-
-    def failed(self, kind: str) -> str:
-        """Why the last attempt for this state failed; "" where it did not."""
-        key, text = self._failed.get(kind, (None, ""))
-        return text if key == self.key(kind) else ""
-
-    def reveal(self) -> dict[str, Any] | None:
-        """What the opened seal has shown."""
-        opened = any(step.kind == "reveal" for step in self.case.history)
-        return self.revealed if opened else None
-
-    def readings(self) -> dict[str, list[Any]]:
-        """All readings of the case, those set aside too, as columns."""
-        state = self.case.state
-
-        def make() -> dict[str, list[Any]]:
-            files = [self.case.path(name) for name in state.data]
-            frame = tps.Measurements(files).to_frame(self.machine)
-            names = dict(zip(files, state.data, strict=True))
-            frame["file"] = [names[file] for file in frame["file"]]
-            return {"file": frame["file"].tolist(), "line": frame["line"].tolist(), "point": frame["point"].tolist(),
-                    **{name: frame[name].round(4).tolist() for name in READING}}  # fmt: skip
-
-        return self.once("readings", (state.machine, state.data), make)
+            self.cancel()

@@ -5,10 +5,11 @@ from __future__ import annotations
 import multiprocessing
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from multiprocessing.connection import Connection
+from multiprocessing.context import BaseContext
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,14 @@ import numpy as np
 
 import toolpath_stiff as tps
 from toolpath_stiff.case.case import Case
+from toolpath_stiff.case.findings import find
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
 
 COARSE_SAMPLES = 6000  # of a path in the page; the statistics are those of all samples
+REPORTS_EVERY = 0.2  # s
+DRAWN = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "s_mm", "t_s", "margin")
+PRELOADED = ("studio.work", "correction.strut_law", "diagnosis.diagnose", "analysis.results", "planning.result")
 
 
 class Job:
@@ -27,52 +32,47 @@ class Job:
 
     Attributes
     ----------
-    kind, options, given, key
-        What is done, with all that its process needs, with what was asked; the state of the case that it is done for.
+    kind, given, key
+        What is done, with what was asked; the state of the case that it is done for.
     progress
         (what is being done, how much of it, how much there is; 0: not known).
     """
 
-    def __init__(
-        self, folder: Path, kind: str, options: Mapping[str, Any], given: Mapping[str, Any], key: object
-    ) -> None:
-        self.kind, self.options, self.given, self.key = kind, dict(options), given, key
+    def __init__(self, folder: Path, kind: str, result: str, given: Document, key: object, first: str) -> None:
+        self.kind, self.given, self.key = kind, given, key
         self.progress: tuple[str, int, int] = (kind, 0, 0)
-        context = _context()
+        context: Any = _context()
         self._pipe, theirs = context.Pipe()
-        arguments = (str(folder), kind, self.options, theirs)
-        self._process = context.Process(target=work, args=arguments, daemon=True)
+        self._process = context.Process(target=work, args=(folder, kind, result, given, first, theirs), daemon=True)
         self._process.start()
         theirs.close()
 
-    def follow(self, reported: Callable[[], None], done: Callable[[Job, Any, str], None]) -> None:
-        """In a thread: `told` after every report, `done` with the answer, or None and what went wrong."""
-        threading.Thread(target=self._listen, args=(reported, done), daemon=True).start()
+    def follow(self, reported: Callable[[], None], done: Callable[[Job, Reply | None, str], None]) -> None:
+        """In a thread: `reported` after every report, `done` with the answer, or None and what went wrong."""
 
-    def _listen(self, reported: Callable[[], None], done: Callable[[Job, Any, str], None]) -> None:
-        answer, error = None, "stopped"
-        try:
-            while True:
-                word, content = self._pipe.recv()
-                if word != "progress":
-                    answer, error = (content, "") if word == "done" else (None, content)
-                    break
-                self.progress = content
-                reported()
-        except (EOFError, OSError):
-            pass
-        self._process.join()
-        done(self, answer, error)
+        def listen() -> None:
+            answer, error = None, "stopped"
+            try:
+                while True:
+                    word, content = self._pipe.recv()
+                    if word != "progress":
+                        answer, error = (content, "") if word == "done" else (None, content)
+                        break
+                    self.progress = content
+                    reported()
+            except (EOFError, OSError):
+                pass
+            self._process.join()
+            done(self, answer, error)
+
+        threading.Thread(target=listen, daemon=True).start()
 
     def stop(self) -> None:
         """End it at once; nothing of it is kept."""
         self._process.kill()
 
 
-PRELOADED = ("studio.work", "correction.strut_law", "diagnosis.diagnose", "analysis.results", "planning.result")
-
-
-def _context() -> Any:
+def _context() -> BaseContext:
     """Processes that begin with the libraries loaded where the system can do that, from scratch elsewhere."""
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
@@ -81,18 +81,18 @@ def _context() -> Any:
     return context
 
 
-def work(folder: str, kind: str, options: Mapping[str, Any], pipe: Connection) -> None:
+def work(folder: Path, kind: str, result: str, given: Document, first: str, pipe: Connection) -> None:
     """The process: one task, reports, one answer."""
     last = 0.0
 
     def tell(text: str, done: int, total: int) -> None:
         nonlocal last
-        if not total or done == total or time.monotonic() - last > 0.2:
+        if not total or done == total or time.monotonic() - last > REPORTS_EVERY:
             last = time.monotonic()
             pipe.send(("progress", (text, done, total)))
 
     try:
-        pipe.send(("done", answer(Case.open(folder), kind, tell, **options)))
+        pipe.send(("done", answer(Case.open(folder), kind, result, given, first, tell)))
     except TpsError as error:
         pipe.send(("error", str(error)))
     except Exception as error:  # a fault of ours, or of an effect of the user's own: the page says so and goes on
@@ -127,43 +127,37 @@ class Reply:
 
 
 def answer(
-    case: Case, kind: str, tell: Callable[[str, int, int], None], result: str, first: str = "", **given: Any
+    case: Case, kind: str, result: str, given: Document, first: str, tell: Callable[[str, int, int], None]
 ) -> Reply:
     """What the page needs of a result that is kept in the case; `first`: the machine to hold an analysis against."""
     case.plots = kind == "compare"  # the only one whose page is opened from the studio
     tell(kind, 0, 0)
-    kept, command = case.find(kind, result, tell, **given)
-    file = ""
+    kept, command = find(case, kind, result, tell, **given)
+    files = {
+        "draft": (f"{getattr(kept, 'name', '')}.toml",),
+        "set_up": (Path(case.state.program).name, "not_written.txt"),
+    }
+    written = [f"{result}/{name}" for name in files.get(kind, ()) if (case.folder / result / name).is_file()]
     path: Document = {}
-    if kind == "draft":
-        file = f"{result}/{kept.name}.toml" if kept.text else ""
-    elif kind == "set_up":
-        names = (case.program.name, "not_written.txt")
-        file = next(f"{result}/{name}" for name in names if (case.folder / result / name).is_file())
-    elif kind == "analyze":
+    if kind == "analyze":
         origin = case.state.origin or None
-        given_machine = case.machine_of(first)
-        before = tps.analyze(case.program, given_machine, origin_mm_deg=origin, partial=True, progress=tell)
+        before = tps.analyze(case.program, case.machine_of(first), origin_mm_deg=origin, partial=True, progress=tell)
         path = _columns(kept, before)
     accepted = kind == "update" and kept.accepted
-    return Reply(repr(kept).strip("<>"), command, kept.to_dict(), result, accepted, file, path)
+    return Reply(repr(kept).strip("<>"), command, kept.to_dict(), result, accepted, "".join(written[:1]), path)
 
 
 def _columns(analysis: tps.Analysis, before: tps.Analysis) -> Document:
     """What the page draws of a path: at most so many samples, the lowest and the highest of every stretch."""
     frame, given = analysis.to_frame(), before.to_frame()["stiffness_N_per_mm"].to_numpy()
-    stiffness = frame["stiffness_N_per_mm"].to_numpy()
+    stiffness, band = frame["stiffness_N_per_mm"].to_numpy(), analysis.deviation_N_per_mm
     rows = _thinned(stiffness, np.flatnonzero(np.diff(frame["line"], prepend=-1, append=-1)[:-1]))
-    band = analysis.deviation_N_per_mm
-    columns = {
-        name: _plain(frame[name].to_numpy()[rows], 4)
-        for name in ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "s_mm", "t_s", "margin")
-    }
+    drawn = frame.iloc[rows]
     return {
-        **columns,
-        "line": frame["line"].to_numpy()[rows].tolist(),
-        "cut": (frame["motion"] != "rapid").to_numpy()[rows].tolist(),
-        "plunge": (frame["cut"] == "plunge").to_numpy()[rows].tolist(),
+        **{name: _plain(drawn[name].to_numpy(), 4) for name in DRAWN},
+        "line": drawn["line"].tolist(),
+        "cut": (drawn["motion"] != "rapid").tolist(),
+        "plunge": (drawn["cut"] == "plunge").tolist(),
         "now": _plain(stiffness[rows], 1),
         "given": _plain(given[rows], 1) if len(given) == len(stiffness) else None,
         "sd": None if band is None else _plain(band[rows], 1),
@@ -176,11 +170,10 @@ def _thinned(values: Any, starts: Any) -> Any:
     if len(values) <= COARSE_SAMPLES:
         return np.arange(len(values))
     edges = np.linspace(0, len(values), COARSE_SAMPLES // 3 + 1).astype(int)
-    filled = np.nan_to_num(values, nan=np.inf)
-    low = [a + int(np.argmin(filled[a:b])) for a, b in pairwise(edges)]
-    high = [a + int(np.argmax(np.where(np.isfinite(filled[a:b]), filled[a:b], -1))) for a, b in pairwise(edges)]
+    low, high = np.nan_to_num(values, nan=np.inf), np.where(np.isfinite(values), values, -1)
+    extremes = [a + part for a, b in pairwise(edges) for part in (np.argmin(low[a:b]), np.argmax(high[a:b]))]
     some = starts[:: max(1, len(starts) // (COARSE_SAMPLES // 3))]
-    return np.unique(np.concatenate([low, high, edges[:-1], some, [len(values) - 1]]))
+    return np.unique(np.concatenate([extremes, edges[:-1], some, [len(values) - 1]]))
 
 
 def _plain(values: Any, digits: int) -> list[float | None]:

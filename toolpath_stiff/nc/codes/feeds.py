@@ -2,7 +2,6 @@
 
 import math
 
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.codes.code import Code, family, g_codes, holds_anyway
 from toolpath_stiff.nc.codes.dwell import dwells_by
 from toolpath_stiff.nc.frames import Numbers
@@ -66,7 +65,7 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
         word = next((word for word in block.block.words if word.letter == "G"), block.block.words[0])
         if state.feed_mode == "G93":
             raise block.fail(word, "is a feed move without F under G93", "F above 0")
-        hint = f", or {both_names('--feed', 'MM_PER_MIN')} for such moves" if state.feed_mode == "G94" else ""
+        hint = ", or --feed MM_PER_MIN for such moves" if state.feed_mode == "G94" else ""
         raise block.fail(word, "is a feed move before any feed", f"F above 0{hint}")
     if state.feed_mode == "G93":
         feed, state.feed = state.feed, None  # every move needs its own

@@ -30,14 +30,14 @@ SWEEP_TOLERANCE_DEG = 0.05
 class Circle:
     """A circle that the next motion follows: centre, unit axis (the motion is right-handed about it), radius.
 
-    The radius is nan where the file gives none. `turns` are whole turns, given for a start that is the end; `sweep` is
-    the angle in degrees, if given.
+    The radius is nan where the file gives none. `sweep` is the angle in degrees, if given; `line`
+    that of the file.
     """
 
     center: Vector
     axis: Vector
     radius: float
-    turns: int = 1
+    line: int
     sweep: float | None = None
 
 
@@ -100,10 +100,7 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
 
 def _sweep(circle: Circle, here: Point2, there: Point2) -> float:
     angle = math.atan2(there[1], there[0])
-    whole = math.dist(here, there) < SAME_POINT_MM
-    angle = angle + math.tau * circle.turns if whole else angle % math.tau
-    if circle.turns > 1 and not whole:
-        raise ArcError("a helix of several turns that does not end above its start", "one CIRCLE a turn")
+    angle = angle + math.tau if math.dist(here, there) < SAME_POINT_MM else angle % math.tau
     if circle.sweep is not None:
         angle += math.tau * round((math.radians(circle.sweep) - angle) / math.tau)
         if angle <= 0.0 or abs(math.degrees(angle) - circle.sweep) > SWEEP_TOLERANCE_DEG:

@@ -28,25 +28,23 @@ def cycle(state: CutterLocationState, statement: MajorStatement) -> None:
     kind = arguments.pop(0).upper() if arguments else ""
     if kind in ("OFF", "NOMORE"):
         return
-    if kind not in KINDS:
-        known = ", ".join(f"CYCLE/{known}" for known in (*KINDS, "OFF"))
-        raise state.fail(f"CYCLE/{kind} is not supported", known, EXPAND)
+    known = ", ".join(f"CYCLE/{known}" for known in (*KINDS, "OFF"))
+    state.refuse_if(kind not in KINDS, f"CYCLE/{kind} is not supported", known, EXPAND)
     if arguments and arguments[0].upper() in ("DEEP", "BRKCHP"):  # NX, CAMplete: CYCLE/DRILL,DEEP
         kind = arguments.pop(0).upper()
     values = dict[str, float]()
     for key, value in zip(arguments[::2], arguments[1::2], strict=False):
         name = _name_in_cycle(state, key)
-        if name in values:
-            raise state.fail(f"{key} twice", "one", EXPAND)
+        state.refuse_if(name in values, f"{key} twice", "one", EXPAND)
         values[name] = state.number(value, f"the number of {key}")
         if name == "feed":
             factor, state.hole_per_revolution = FEED_UNITS[key.upper()]
             state.hole_feed = values["feed"] * (factor or state.scale)
-    if len(arguments) % 2:
-        raise state.fail(f"{arguments[-1]!r} without its value", "a number", EXPAND)
+    state.refuse_if(len(arguments) % 2, f"{statement.shown}: a word without its value", "a number", EXPAND)
     for needed in ("DEPTH", "feed", "CLEAR"):
-        if needed not in values:
-            raise state.fail(f"{statement.shown} without {needed}", "DEPTH, CLEAR and a feed as MMPM,100", EXPAND)
+        state.refuse_if(
+            needed not in values, f"{statement.shown} without {needed}", "DEPTH, CLEAR and a feed as MMPM,100", EXPAND
+        )
     _check_cycle(state, KINDS[kind], values)
     scale, dwell = state.scale, values.get("DWELL", 0.0)
     state.hole = Drilling(
@@ -63,15 +61,12 @@ def cycle(state: CutterLocationState, statement: MajorStatement) -> None:
 def _name_in_cycle(state: CutterLocationState, key: str) -> str:
     """The quantity that a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
     name = ALIASES.get(key.upper(), key.upper())
-    if name in FEED_UNITS:
-        return "feed"
-    if is_number(name):
-        problem = "a cycle of numbers without words: their order depends on the CAM system"
-        raise state.fail(problem, "pairs, as DEPTH,5", EXPAND)
-    if name not in PAIRS:
-        expected = "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed"
-        raise state.fail(f"CYCLE/ with {name}, which is not supported", expected, EXPAND)
-    return name
+    by_order = "a cycle of numbers without words: their order depends on the CAM system"
+    state.refuse_if(is_number(name), by_order, "pairs, as DEPTH,5", EXPAND)
+    expected = "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed"
+    unknown = name not in PAIRS and name not in FEED_UNITS
+    state.refuse_if(unknown, f"CYCLE/ with {name}, which is not supported", expected, EXPAND)
+    return "feed" if name in FEED_UNITS else name
 
 
 def _check_cycle(state: CutterLocationState, code: str, values: dict[str, float]) -> None:
@@ -79,14 +74,26 @@ def _check_cycle(state: CutterLocationState, code: str, values: dict[str, float]
     shown, pecks = state.statement.shown, code in ("G73", "G83")
     depth, clear, step, dwell = (values.get(name, 0.0) for name in ("DEPTH", "CLEAR", "STEP", "DWELL"))
     back = values.get("RETURN", clear)
-    if not depth or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= dwell <= SECONDS_PER_DAY:
-        raise state.fail(shown, "DEPTH and feed above 0, CLEAR and DWELL of 0 or more")
-    if "RETURN" in values and (back < clear or not back > 0.0):
-        raise state.fail(f"RETURN,{back:g}: a plane of the CAM system's, or below CLEAR", "CLEAR or more", EXPAND)
-    if back != clear and "FEDTO" in state.statement.words:
-        problem = "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate"
-        raise state.fail(problem, "DEPTH", EXPAND)
-    if bool(step) != pecks or (pecks and not 0.0 < (clear + abs(depth)) / step <= MOST_STROKES):
-        raise state.fail(shown, f"STEP above 0 with DEEP or BRKCHP alone, for up to {MOST_STROKES} strokes")
-    if dwell and pecks:
-        raise state.fail("DWELL in a cycle with pecks", "no DWELL", EXPAND)
+    state.refuse_if(
+        not depth or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= dwell <= SECONDS_PER_DAY,
+        shown,
+        "DEPTH and feed above 0, CLEAR and DWELL of 0 or more",
+    )
+    state.refuse_if(
+        "RETURN" in values and (back < clear or not back > 0.0),
+        f"RETURN,{back:g}: a plane of the CAM system's, or below CLEAR",
+        "CLEAR or more",
+        EXPAND,
+    )
+    state.refuse_if(
+        back != clear and "FEDTO" in state.statement.words,
+        "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate",
+        "DEPTH",
+        EXPAND,
+    )
+    state.refuse_if(
+        bool(step) != pecks or (pecks and not 0.0 < (clear + abs(depth)) / step <= MOST_STROKES),
+        shown,
+        f"STEP above 0 with DEEP or BRKCHP alone, for up to {MOST_STROKES} strokes",
+    )
+    state.refuse_if(dwell and pecks, "DWELL in a cycle with pecks", "no DWELL", EXPAND)

@@ -22,7 +22,7 @@ FEED_UNITS: dict[str, tuple[float | None, bool]] = {
     "FPR": (MM_PER_FOOT, True),
     "PERREV": (None, True),
 }
-INCH_FEEDS = ("IPM", "IPR", "FPM", "FPR")
+INCH_FEEDS = {"IPM", "IPR", "FPM", "FPR"}
 LENGTH_UNITS = {"MM": 1.0, "INCH": MM_PER_INCH, "INCHES": MM_PER_INCH, "IN": MM_PER_INCH}
 SEVERAL_TOOLS = ToolUse(0, math.nan, math.nan, "several tools without numbers")
 TURNING = "turning: the points are read as those of a mill, X as a position"
@@ -38,40 +38,43 @@ def units(state: CutterLocationState, statement: MajorStatement) -> None:
     scale = LENGTH_UNITS.get(",".join(statement.words))
     if scale is None:
         raise state.fail(statement.shown, "UNITS/MM or UNITS/INCHES")
-    if state.circle is not None:
-        raise state.fail("UNITS/ within an arc", "UNITS/ before CIRCLE/")
-    if not state.units_given and len(state.recorder) and scale != 1.0:
-        raise state.fail("UNITS/ after the first points, which were taken as mm", "UNITS/ before any point")
+    state.no_circle("UNITS/")
+    state.refuse_if(
+        not state.units_given and len(state.recorder) and scale != 1.0,
+        "UNITS/ after the first points, which were taken as mm",
+        "UNITS/ before any point",
+    )
     state.scale, state.units_given = scale, True
 
 
 def fedrat(state: CutterLocationState, statement: MajorStatement) -> None:
     """The feed: a number, and its unit before or after it."""
     words = statement.words
-    if state.rapid:
-        raise state.fail(
-            f"a feed after the RAPID of line {state.rapid}, before its motion",
-            "one of them",
-            "whether the motion is rapid is not certain",
-        )
+    state.refuse_if(
+        state.rapid,
+        f"a feed after the RAPID of line {state.rapid}, before its motion",
+        "one of them",
+        "whether the motion is rapid is not certain",
+    )
     if words[:1] == ["INVERS"]:  # Creo: whether the post makes inverse-time feeds; the numbers stay per minute
-        if words[1:] not in (["AUTO"], ["OFF"]):
-            raise state.fail(statement.shown, "a feed per minute or per revolution")
+        state.refuse_if(words[1:] not in (["AUTO"], ["OFF"]), statement.shown, "a feed per minute or per revolution")
         state.note("how the post processor writes feeds")
         return
     values = [word for word in words if is_number(word)]
     units = [word for word in words if not is_number(word)]
-    if len(values) != 1 or len(units) > 1 or not FEED_UNITS.keys() >= set(units):
-        raise state.fail(statement.shown, f"FEDRAT/ with a number and one of {', '.join(FEED_UNITS)}")
-    if not state.units_given and units and units[0] in INCH_FEEDS:
-        raise state.fail(
-            f"{units[0]} in a file that names no UNITS: are its points in inches?",
-            "UNITS/INCHES or UNITS/MM before it",
-            "add the line at the beginning of the file",
-        )
+    state.refuse_if(
+        len(values) != 1 or len(units) > 1 or not FEED_UNITS.keys() >= set(units),
+        statement.shown,
+        f"FEDRAT/ with a number and one of {', '.join(FEED_UNITS)}",
+    )
+    state.refuse_if(
+        not state.units_given and INCH_FEEDS.intersection(units),
+        f"{', '.join(units)} in a file that names no UNITS: are its points in inches?",
+        "UNITS/INCHES or UNITS/MM before it",
+        "add the line at the beginning of the file",
+    )
     value = state.number(values[0])
-    if value < 0.0:
-        raise state.fail(f"a feed of {value:g}", "a feed above 0")
+    state.refuse_if(value < 0.0, f"a feed of {value:g}", "a feed above 0")
     factor, state.per_revolution = FEED_UNITS[units[0]] if units else (None, False)
     state.feed = value * (factor or state.scale) or None
 
@@ -95,31 +98,29 @@ def spindl(state: CutterLocationState, statement: MajorStatement) -> None:
 def delay(state: CutterLocationState, statement: MajorStatement) -> None:
     """A pause in seconds, or in revolutions and REV."""
     words = statement.words
-    if words[1:] not in ([], ["REV"]):
-        raise state.fail(statement.shown, "the seconds, or the revolutions and REV")
+    state.refuse_if(words[1:] not in ([], ["REV"]), statement.shown, "the seconds, or the revolutions and REV")
     time = state.number(statement.arguments[0]) if words else math.nan
     if words[1:]:
-        if not state.speed > 0.0:
-            raise state.fail("a pause in revolutions without a spindle speed", "SPINDL/ with RPM before it")
+        state.refuse_if(
+            not state.speed > 0.0, "a pause in revolutions without a spindle speed", "SPINDL/ with RPM before it"
+        )
         time *= SECONDS_PER_MINUTE / state.speed
-    if not 0.0 <= time <= SECONDS_PER_DAY:
-        raise state.fail(statement.shown, "the seconds, 0 or more")
+    state.refuse_if(not 0.0 <= time <= SECONDS_PER_DAY, statement.shown, "the seconds, 0 or more")
     state.recorder.add_dwell(time)
 
 
 def multax(state: CutterLocationState, statement: MajorStatement) -> None:
     """Points carry a tool axis; after MULTAX/OFF a tilted tool must be given again."""
     words = statement.words
-    if words not in ([], ["ON"], ["OFF"]):
-        raise state.fail(statement.shown, "MULTAX, MULTAX/ON or MULTAX/OFF")
+    state.refuse_if(words not in ([], ["ON"], ["OFF"]), statement.shown, "MULTAX, MULTAX/ON or MULTAX/OFF")
     state.multax = words != ["OFF"]
     if not state.multax and state.next_axis != VERTICAL:
-        state.axis_known = False
+        state.next_axis = None
 
 
 def tlaxis(state: CutterLocationState, statement: MajorStatement) -> None:
     """The tool axis of points that give none."""
-    state.next_axis, state.axis_known = unit_axis(state.numbers(statement, 3)), True
+    state.next_axis = unit_axis(state.numbers(statement, 3))
 
 
 def frame_word(state: CutterLocationState, statement: MajorStatement) -> None:
@@ -144,8 +145,7 @@ def one_frame(state: CutterLocationState, kind: str, numbers: tuple[float, ...],
 
 def mode(state: CutterLocationState, statement: MajorStatement) -> None:
     """Milling; turning is doubted: its points are read all the same."""
-    if statement.words not in (["MILL"], ["TURN"]):
-        raise state.fail(statement.shown, "MODE/MILL or MODE/TURN")
+    state.refuse_if(statement.words not in (["MILL"], ["TURN"]), statement.shown, "MODE/MILL or MODE/TURN")
     turns = statement.words == ["TURN"]
     state.note(TURNING if turns else "milling", doubtful=turns)
 
@@ -154,29 +154,19 @@ def loadtl(state: CutterLocationState, statement: MajorStatement) -> None:
     """Another tool: its number (after TOOL in NX' LOAD/), and perhaps LENGTH and the length."""
     words, given = statement.words, statement.arguments
     if statement.word == "LOAD":
-        if words[:1] != ["TOOL"] or len(words) < 2:
-            raise state.fail(statement.shown, "LOAD/TOOL, and the tool's number")
+        state.refuse_if(words[:1] != ["TOOL"] or len(words) < 2, statement.shown, "LOAD/TOOL, and the tool's number")
         given = given[1:]
-    if not given:
-        raise state.fail("LOADTL without a tool", "LOADTL/ and the tool's number")
+    state.refuse_if(not given, "LOADTL without a tool", "LOADTL/ and the tool's number")
     number = state.number(given[0], "the tool's number")
-    if number != int(number) or not 0 <= number < 1e9:
-        raise state.fail(f"tool {given[0]}", "a whole number")
+    state.refuse_if(number != int(number) or not 0 <= number < 1e9, f"tool {given[0]}", "a whole number")
     state.no_circle(f"{statement.word}/")
-    length = math.nan
-    if "LENGTH" in words[:-1]:
-        length = state.number(statement.arguments[words.index("LENGTH") + 1]) * state.scale
+    length = tool_of(state.tools, int(number)).length
+    if "LENGTH" in words[:-1] and (stated := state.number(words[words.index("LENGTH") + 1]) * state.scale) > 0.0:
+        state.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools takes precedence")
+        length = stated if math.isnan(length) else length
     if len(state.recorder) > state.moves_before_cutter:  # a CUTTER between the last move and this is its own
         state.diameter = math.nan
-    state.tool, state.tool_length = int(number), _length_of(state, int(number), length if length > 0.0 else math.nan)
-
-
-def _length_of(state: CutterLocationState, number: int, given: float) -> float:
-    """The tool table's length, or the one that the file gives; nan: the machine's reference tool."""
-    length = tool_of(state.tools, number).length
-    if not math.isnan(given):
-        state.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools takes precedence")
-    return given if math.isnan(length) else length
+    state.tool, state.tool_length = int(number), length
 
 
 def cutter(state: CutterLocationState, statement: MajorStatement) -> None:

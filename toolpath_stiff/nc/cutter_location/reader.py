@@ -18,7 +18,7 @@ from toolpath_stiff.nc.cutter_location.statements import MajorStatement, frame_i
 from toolpath_stiff.nc.cutter_location.vocabulary import execute
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.languages import any_statement
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Remark, Unsupported
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Remark
 from toolpath_stiff.nc.request import Request
 
 NO_UNITS = "the file names no UNITS; its numbers are taken as mm"
@@ -68,7 +68,7 @@ def program_of(state: CutterLocationState, request: Request) -> ReadProgram:
         moves=state.recorder.moves(),
         origin=request.default_origin if request.origin is None else request.origin,
         origin_source="default" if request.origin is None else "option",
-        unsupported=unsupported(state),
+        unsupported=tuple(state.noted.values()),
         warnings=(*not_for(request), *state.warnings),
         assumptions=tuple(state.assumptions),
         tools=tuple(state.used_tools.values()),
@@ -141,30 +141,19 @@ def _conclude(state: CutterLocationState) -> None:
     """Warnings about the file as a whole."""
     if not state.units_given and len(state.recorder):
         state.assume(NO_UNITS)
-    for noted in state.noted.values():
-        if noted.doubtful:
-            state.warnings.append(Remark(f"{noted.statement.shown}: {noted.reason}", noted.statement.line))
-    if state.unsmooth and not state.smooth:
+    state.warnings += state.doubted.values()
+    if state.turning_back and not state.smooth:
         text = "the tool turns back where this arc begins, and no arc of the file begins smoothly: "
-        remark = Remark(f"{text}check that the arcs turn the right way about their axes", state.first_unsmooth)
+        remark = Remark(f"{text}check that the arcs turn the right way about their axes", state.turning_back[0])
         state.warnings.append(remark)
-
-
-def unsupported(state: CutterLocationState) -> tuple[Unsupported, ...]:
-    """Words that were not acted upon, in the order of the file, each once."""
-    noted = sorted(state.noted.values(), key=lambda word: word.statement.line)
-    return tuple(
-        Unsupported(word.statement.line, word.statement.column, word.statement.word, word.reason) for word in noted
-    )
 
 
 def in_force(state: CutterLocationState) -> dict[str, str]:
     """The modes in force, names to words."""
-    i, j, k = state.next_axis
     feed = "none" if state.feed is None else f"{state.feed:g} mm/{'rev' if state.per_revolution else 'min'}"
     return {
         "units": "mm" if state.scale == 1.0 else "inch",
-        "tool axis": f"{i:g} {j:g} {k:g}",
+        "tool axis": "not given" if state.next_axis is None else "{:g} {:g} {:g}".format(*state.next_axis),
         "MULTAX": {None: "not given", True: "on", False: "off"}[state.multax],
         "feed": feed,
         "spindle": f"{state.speed:g} rpm",

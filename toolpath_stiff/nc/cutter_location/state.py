@@ -9,13 +9,12 @@ import math
 from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.courses import point_on_arc
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, dot, minus
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
 from toolpath_stiff.nc.geometry import Vector
-from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Move, Recorder, Remark, ToolUse
+from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Move, Recorder, Remark, ToolUse, Unsupported
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.strokes import Drilling, strokes
 from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry, tool_of
@@ -25,15 +24,6 @@ FREE_YAW = "the turn of the tool about its own axis (yaw) is free in a cutter-lo
 TURN_FEED = "where the tool turns about its standing tip, a feed of 1 mm/min counts as 1 degree per minute"
 PECKS = "a drilling cycle with STEP or INCR ends its rapids 0.254 mm above the last depth, as LinuxCNC does"
 NOT_MOVED = (False, False)
-
-
-@dataclass
-class Noted:
-    """A word that was not acted upon: where it stands first, why, whether that is a warning."""
-
-    statement: MajorStatement
-    reason: str
-    doubtful: bool
 
 
 @dataclass
@@ -71,11 +61,9 @@ class CutterLocationState:
     # What the next motion is.
     rapid: int = 0  # line of the RAPID that waits for its motion
     multax: bool | None = None
-    next_axis: Vector = VERTICAL  # of a point that gives none
-    axis_known: bool = True  # false where MULTAX/OFF leaves open how the tool stands
+    next_axis: Vector | None = VERTICAL  # of a point that gives none; None: MULTAX/OFF leaves open how the tool stands
     direction: Vector | None = None  # of INDIRV
     circle: Circle | None = None  # waits for its GOTO
-    circle_line: int = 0
     followed: Circle | None = None  # whose arc the last GOTO made
     swept: float = 0.0  # rad, along that circle
     hole: Drilling | None = None  # that each point drills: heights from the point in mm
@@ -89,21 +77,26 @@ class CutterLocationState:
     marks: list[tuple[int, str]] = field(default_factory=list)  # line and name of each operation
     assumptions: list[str] = field(default_factory=list)
     warnings: list[Remark] = field(default_factory=list)
-    noted: dict[str, Noted] = field(default_factory=dict)
-    smooth: int = 0  # arcs that a straight move enters smoothly, and would turn back into
-    unsmooth: int = 0
-    first_unsmooth: int = 0
+    noted: dict[str, Unsupported] = field(default_factory=dict)  # words that were not acted upon, each once
+    doubted: dict[str, Remark] = field(default_factory=dict)  # those of them that deserve a warning
+    smooth: int = 0  # arcs that a straight move enters smoothly
+    turning_back: list[int] = field(default_factory=list)  # lines of those into which it would turn back
 
     def fail(self, problem: str, expected: str = "", hint: str = "") -> ProgramError:
         """The error for the statement being executed."""
         return Place(self.name, self.statement.line, self.statement.column).fail(problem, expected, hint)
 
+    def refuse_if(self, refused: object, problem: str, expected: str = "", hint: str = "") -> None:
+        """Raise the error for the statement being executed, if it is to be refused."""
+        if refused:
+            raise self.fail(problem, expected, hint)
+
     def note(self, reason: str, doubtful: bool = False) -> None:
         """Note that the word being executed is not acted upon; `doubtful`: which is a warning."""
-        word = self.statement.word
-        noted = self.noted.get(word)
-        if noted is None or doubtful > noted.doubtful:
-            self.noted[word] = Noted(self.statement, reason, doubtful)
+        line, column, word = self.statement.line, self.statement.column, self.statement.word
+        self.noted.setdefault(word, Unsupported(line, column, word, reason))
+        if doubtful:
+            self.doubted.setdefault(word, Remark(f"{self.statement.shown}: {reason}", line))
 
     def assume(self, text: str) -> None:
         """Note an assumption, once."""
@@ -136,7 +129,7 @@ class CutterLocationState:
     def no_circle(self, what: str) -> None:
         """Refuse `what` while a circle waits for its GOTO."""
         if self.circle is not None:
-            raise self.fail(f"{what} while the circle of line {self.circle_line} waits for its GOTO", "GOTO/")
+            raise self.fail(f"{what} while the circle of line {self.circle.line} waits for its GOTO", "GOTO/")
 
     def feed_per_minute(self, feed: float, per_revolution: bool) -> float:
         """mm/min of a feed that may be per revolution."""
@@ -174,7 +167,7 @@ def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, 
         if state.feed is None:
             raise state.fail(
                 "a cut before any feed",
-                f"FEDRAT/ with a feed above 0, or {both_names('--feed', 'MM_PER_MIN')} for such cuts",
+                "FEDRAT/ with a feed above 0, or --feed MM_PER_MIN for such cuts",
             )
         # Of a tip that stands still the same number of degrees per minute.
         feed = state.feed_per_minute(state.feed, state.per_revolution)

@@ -39,11 +39,6 @@ def angles_near(axis: Vector, near: tuple[float, float]) -> tuple[float, float]:
     return roll + 0.0, pitch + 360.0 * round((near[1] - pitch) / 360.0)
 
 
-def angle_between(first: Vector, second: Vector) -> float:
-    """Degrees between two unit vectors; exact for small ones too."""
-    return math.degrees(2.0 * math.asin(min(1.0, math.dist(first, second) / 2.0)))
-
-
 def angle_of(first: Vector, second: Vector) -> float:
     """Degrees between two vectors of any length, nan where one has none."""
     x, y, z = cross(first, second)
@@ -57,7 +52,7 @@ def division(first: Vector, second: Vector) -> int:
     chord = math.dist(first, second)
     if chord < 0.008 and abs(first[1]) < 0.9 and abs(second[1]) < 0.9:
         return 1  # half a degree and less, of a tool well away from Y: what most moves turn by
-    angle = angle_between(first, second)
+    angle = angle_of(first, second)
     if angle > TURNED_OVER:
         raise ArcError(f"a tool axis that turns over by {angle:.1f} degrees within one move", "points in between")
     turn = math.radians(angle)
@@ -80,7 +75,7 @@ def _steepest_roll(first: Vector, second: Vector, angle: float) -> float:
 
 def on_great_circle(first: Vector, second: Vector, share: float) -> Vector:
     """The unit vector at a share of the way from one to another."""
-    angle = math.radians(angle_between(first, second))
+    angle = math.radians(angle_of(first, second))
     if angle < 1e-9:
         return second
     near, far = math.sin((1.0 - share) * angle) / math.sin(angle), math.sin(share * angle) / math.sin(angle)

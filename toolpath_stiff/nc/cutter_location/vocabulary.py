@@ -4,7 +4,7 @@ Functions of words that act are in `modes` and `motion`; those of words that are
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.cutter_location import cycles, modes, motion
@@ -100,17 +100,7 @@ _TURNS, _COMPENSATES = "turns the work or the head of one machine", "is cutter c
 _REPEATS, _DRIVE = "repeats or calls a part of the file", "is driven along surfaces: APT's processor writes the points"
 
 
-def table(words: Iterable[MajorWord]) -> dict[str, MajorWord]:
-    """Name to word. Raises `ValueError` for a name that is there twice."""
-    by_name: dict[str, MajorWord] = {}
-    for word in words:
-        if word.name in by_name:
-            raise ValueError(f"{word.name} is in the table twice")
-        by_name[word.name] = word
-    return by_name
-
-
-_ACTING = (
+TABLE = (
     MajorWord("GOTO", motion.goto, "the tool moves to a point", ALL, ISO, _POINT),
     MajorWord("", motion.more_points, "further points of the GOTO before it", CREO, PTC, "x,y,z[,i,j,k]"),
     MajorWord("GODLTA", motion.godlta, "the tool moves by a distance", "", ISO, _POINT),
@@ -142,56 +132,52 @@ _ACTING = (
     MajorWord("MCS", modes.frame_word, FRAMES["MCS"], AUTODESK, POSTS, kind=LISTED),
     MajorWord("CSYS", modes.frame_word, FRAMES["CSYS"], "", VERICUT, kind=LISTED),
     MajorWord("ZERO", modes.frame_word, FRAMES["ZERO"], AUTODESK, POSTS, kind=LISTED),
+    *refused(_COMPENSATES, ISO, "CUTCOM", unless="OFF"),
+    *refused(_SHIFTS, ISO, "TRANS ORIGIN", unless="0,0,0"),
+    *refused(_TURNS, ISO, "ROTABL ROTHED", unless="0"),
+    *refused(_TURNS, MANUALS, "ROTATE TABLE INDEX TILT", unless="0"),
+    *listed(HEADING, ALL, ISO, "PARTNO PPRINT REMARK LETTER"),
+    *listed(HEADING, "", APT, "TITLES TITLE"),
+    *listed(HEADING, CATIA, DASSAULT, "TPRINT"),
+    *listed(HEADING, CREO, PTC, "MFGNO"),
+    *listed(HEADING, NX, SIEMENS, "END-OF-PATH"),
+    *listed(_TOLERANCE, ALL, VERICUT, "INTOL OUTTOL TOLER LINTOL THICK MCHTOL"),
+    *listed(_TOLERANCE, "", APT, "OUTOL MAXDP NUMPTS"),
+    *listed(_STOP, ALL, ISO, "STOP OPSTOP END BREAK"),
+    *listed(_SCREEN, NX, SIEMENS, "PAINT"),
+    *listed(_SCREEN, "", VERICUT, "DISPLY PLOT VERIFY CLPRNT"),
+    *listed(TOOL, NX, SIEMENS, "SELECT"),
+    *listed(TOOL, "", VERICUT, "SELCTL SELECTL TLCHG OFSTNO"),
+    *listed(TOOL, "", MANUALS, "TOOL HEAD SWITCH"),
+    *listed(_OUTPUT, ALL, ISO, "MACHIN SEQNO LEADER TMARK REWIND"),
+    *listed(_OUTPUT, "", MANUALS, "CHANNEL NOPOST CLDATA PROGRM"),
+    *listed("for CAMplete", CAMPLETE, POSTS, "CSI_PROGRAM_COMMENT CSI_SET_PATH_PARAM CSI_PATH_TOLERANCE"),
+    *listed(TOOL, CAMPLETE, POSTS, "CSI_SET_FLUTE_LENGTH"),
+    *listed("coolant", ALL, ISO, "COOLNT FLUSH"),
+    *listed(_RETRACT, "", ISO, "CLEARP CLRSRF"),
+    *listed("the part surface; the points have its height already", CATIA, DASSAULT, "AUTOPS PSIS"),
+    *listed("clamps of machine axes", "", ISO, "CLAMP UNCLMP"),
+    *listed(_M_CODE, "", ISO, "AUXFUN", DOUBTFUL),
+    *listed(_G_CODE, "", ISO, "PREFUN", DOUBTFUL),
+    *listed(_BLOCK, "", ISO, "INSERT", DOUBTFUL),
+    *listed(_BLOCK, CAMPLETE, POSTS, "CSI_INSERT_CUSTOM_GCODE", DOUBTFUL),
+    *listed("statements that the operator may leave out: they are read", "", ISO, "OPSKIP", DOUBTFUL),
+    *listed(TOOL, CATIA, ISO, "TOOLNO"),
+    *refused(_SHIFTS, APT, "TRACUT MIRROR SCALE"),
+    *refused(_TURNS, ISO, "PIVOTZ"),
+    *refused(_REPEATS, APT, "COPY CALL CALSUB DEFSUB ENDSUB MACRO TERMAC LOOPST JUMPTO"),
+    *refused(_REPEATS, MANUALS, "CALLSUB"),
+    *refused(_DRIVE, APT, "TLLFT TLRGT TLON TLONPS TLOFPS TLNDON"),
+    *refused(_DRIVE, APT, "GO GOFWD GOBACK GOLFT GORGT GOUP GODOWN OFFSET POCKET SCURV"),
+    *refused(_COMPENSATES, MANUALS, "TLCOMP"),
+    *refused("feeds the tool to where a post processor knows", MANUALS, "PLUNGE"),
+    *refused("retracts the tool to a plane of the post processor's", ISO, "RETRCT"),
+    *refused("cuts a thread", ISO, "THREAD"),
+    *refused("is an arc of one post processor", VERICUT, "ARC"),
+    *refused("is a NURBS curve", SIEMENS, "NURBS"),
+    *refused("is a spline or a polynomial", MANUALS, "SPLINE POLYNO"),
 )
-WORDS = table(
-    (
-        *_ACTING,
-        *refused(_COMPENSATES, ISO, "CUTCOM", unless="OFF"),
-        *refused(_SHIFTS, ISO, "TRANS ORIGIN", unless="0,0,0"),
-        *refused(_TURNS, ISO, "ROTABL ROTHED", unless="0"),
-        *refused(_TURNS, MANUALS, "ROTATE TABLE INDEX TILT", unless="0"),
-        *listed(HEADING, ALL, ISO, "PARTNO PPRINT REMARK LETTER"),
-        *listed(HEADING, "", APT, "TITLES TITLE"),
-        *listed(HEADING, CATIA, DASSAULT, "TPRINT"),
-        *listed(HEADING, CREO, PTC, "MFGNO"),
-        *listed(HEADING, NX, SIEMENS, "END-OF-PATH"),
-        *listed(_TOLERANCE, ALL, VERICUT, "INTOL OUTTOL TOLER LINTOL THICK MCHTOL"),
-        *listed(_TOLERANCE, "", APT, "OUTOL MAXDP NUMPTS"),
-        *listed(_STOP, ALL, ISO, "STOP OPSTOP END BREAK"),
-        *listed(_SCREEN, NX, SIEMENS, "PAINT"),
-        *listed(_SCREEN, "", VERICUT, "DISPLY PLOT VERIFY CLPRNT"),
-        *listed(TOOL, NX, SIEMENS, "SELECT"),
-        *listed(TOOL, "", VERICUT, "SELCTL SELECTL TLCHG OFSTNO"),
-        *listed(TOOL, "", MANUALS, "TOOL HEAD SWITCH"),
-        *listed(_OUTPUT, ALL, ISO, "MACHIN SEQNO LEADER TMARK REWIND"),
-        *listed(_OUTPUT, "", MANUALS, "CHANNEL NOPOST CLDATA PROGRM"),
-        *listed("for CAMplete", CAMPLETE, POSTS, "CSI_PROGRAM_COMMENT CSI_SET_PATH_PARAM CSI_PATH_TOLERANCE"),
-        *listed(TOOL, CAMPLETE, POSTS, "CSI_SET_FLUTE_LENGTH"),
-        *listed("coolant", ALL, ISO, "COOLNT FLUSH"),
-        *listed(_RETRACT, "", ISO, "CLEARP CLRSRF"),
-        *listed("the part surface; the points have its height already", CATIA, DASSAULT, "AUTOPS PSIS"),
-        *listed("clamps of machine axes", "", ISO, "CLAMP UNCLMP"),
-        *listed(_M_CODE, "", ISO, "AUXFUN", DOUBTFUL),
-        *listed(_G_CODE, "", ISO, "PREFUN", DOUBTFUL),
-        *listed(_BLOCK, "", ISO, "INSERT", DOUBTFUL),
-        *listed(_BLOCK, CAMPLETE, POSTS, "CSI_INSERT_CUSTOM_GCODE", DOUBTFUL),
-        *listed("statements that the operator may leave out: they are read", "", ISO, "OPSKIP", DOUBTFUL),
-        *listed(TOOL, CATIA, ISO, "TOOLNO"),
-        *refused(_SHIFTS, APT, "TRACUT MIRROR SCALE"),
-        *refused(_TURNS, ISO, "PIVOTZ"),
-        *refused(_REPEATS, APT, "COPY CALL CALSUB DEFSUB ENDSUB MACRO TERMAC LOOPST JUMPTO"),
-        *refused(_REPEATS, MANUALS, "CALLSUB"),
-        *refused(_DRIVE, APT, "TLLFT TLRGT TLON TLONPS TLOFPS TLNDON"),
-        *refused(_DRIVE, APT, "GO GOFWD GOBACK GOLFT GORGT GOUP GODOWN OFFSET POCKET SCURV"),
-        *refused(_COMPENSATES, MANUALS, "TLCOMP"),
-        *refused("feeds the tool to where a post processor knows", MANUALS, "PLUNGE"),
-        *refused("retracts the tool to a plane of the post processor's", ISO, "RETRCT"),
-        *refused("cuts a thread", ISO, "THREAD"),
-        *refused("is an arc of one post processor", VERICUT, "ARC"),
-        *refused("is a NURBS curve", SIEMENS, "NURBS"),
-        *refused("is a spline or a polynomial", MANUALS, "SPLINE POLYNO"),
-    )
-)
+WORDS = {word.name: word for word in TABLE}
 
 
 def look_up(name: str) -> MajorWord | None:
@@ -219,11 +205,9 @@ def execute(state: CutterLocationState, statement: MajorStatement) -> None:
     if word is not None:
         word.act(state, statement)
         return
-    if LIKE_G_CODE.match(name) or (not count and " " in name):
-        raise state.fail(f"{statement.shown!r} is not a statement of a cutter-location file", "a word of APT's")
+    other = LIKE_G_CODE.match(name) or (not count and " " in name)
+    state.refuse_if(other, f"{statement.shown!r} is not a statement of a cutter-location file", "a word of APT's")
     carries_point = count >= NUMBERS_OF_A_POINT and all(map(is_number, statement.words))
-    if name.startswith(LIKE_MOTION) or carries_point:
-        raise state.fail(
-            f"{statement.shown}: {name} {UNKNOWN}, and may move the tool", GEOMETRY, "take the line out if it does not"
-        )
+    moves = f"{statement.shown}: {name} {UNKNOWN}, and may move the tool"
+    state.refuse_if(name.startswith(LIKE_MOTION) or carries_point, moves, GEOMETRY, "take the line out if it does not")
     state.note(f"{name} {UNKNOWN}, and not acted upon", doubtful=True)

@@ -18,7 +18,6 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
-from toolpath_stiff.nc.linuxcnc import line_words
 from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Jump, Move, Recorder
 from toolpath_stiff.nc.request import ZERO
@@ -28,8 +27,22 @@ from toolpath_stiff.units import MM_PER_INCH
 
 CALL = re.compile(r"^ *\d+ +N(?:\.+|(\d+)) *([A-Z][A-Z0-9_]*)\((.*)\) *$", re.MULTILINE)
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
+# What the words of a program's line say, where `rs274` prints too little.
+MOTION_CODE = re.compile(r"G0*(0|1|2|3|5|33|38|73|74|76|8\d)(?![\d])")
+CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
+MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
+HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
+AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
+DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
+LEAVES = re.compile(r"O|.*M0*9[89](?!\d)")  # lines of which rs274 prints no comment: calls, returns, loops, conditions
+FINE_WORD = re.compile(r"[XYZ]\[?[-+]?\d*\.\d{4,}[1-9]")  # more decimals than rs274 prints
 PLANES = {"XY": "G17", "XZ": "G18", "YZ": "G19"}
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
+REFUSED = {  # problem, what was expected
+    "CHANGE_TOOL_NUMBER": ("M61: LinuxCNC's rs274 goes on with length and diameter of the tool before", "T and M6"),
+    "NURBS_FEED": ("a spline, whose points LinuxCNC does not print", "arcs and lines"),
+    "STRAIGHT_PROBE": ("probing: what follows depends on what is met", "no probing"),
+}
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
 ROUNDING = 1e-6  # far less than one of them
 
@@ -76,13 +89,10 @@ class Follower:
 
     def __post_init__(self) -> None:
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
-        self.fine = any(line_words.FINE_WORD.search(line.words) for line in self.lines)
-        self.incremental = False
-        # The numbers of plain blocks, of this line and before it, in the digits of the program.
-        self.given, self.given_before = dict[str, str](), dict[str, str]()
+        self.fine = any(FINE_WORD.search(line.words) for line in self.lines)
         self.passed = [0]  # how many of the first lines no run that comes straight on leaves out
         for line in self.lines:
-            shows = line.words.strip("%") and not line.optional and not line_words.LEAVES.match(line.words)
+            shows = line.words.strip("%") and not line.optional and not LEAVES.match(line.words)
             self.passed.append(self.passed[-1] + bool(shows))
 
     def follow(self, text: str) -> None:
@@ -90,8 +100,11 @@ class Follower:
         for match in CALL.finditer(text):
             number, name, inner = match.groups()
             action = getattr(self, f"_on_{name.lower()}", None)
-            if action is not None:
+            if action is not None or name in REFUSED:
                 self.reading = self.reading if number is None else int(number)
+            if name in REFUSED:
+                raise self.fail(*REFUSED[name])
+            if action is not None:
                 action(inner)
 
     def fail(self, problem: str, expected: str = "", hint: str = "", line: int | None = None) -> InputError:
@@ -111,15 +124,9 @@ class Follower:
         if text.isdigit():
             self._note_jump(int(text))
             self.line, self.moves_of_line = int(text), 0
-            words, was = self.lines[self.line - 1].words, self.incremental
-            modes = line_words.DISTANCE_MODE.findall(words)
-            self.incremental = modes[-1] == "1" if modes else was
-            self.given_before = dict.fromkeys("XYZ", "0") if self.incremental else {} if was else self.given
-            plain = line_words.PLAIN_BLOCK.fullmatch(words)
-            self.given = {**self.given_before, **dict(line_words.COORDINATE.findall(words))} if plain else {}
-            codes = line_words.MOTION_CODE.findall(self._words(self.line))
+            codes = MOTION_CODE.findall(self._words(self.line))
             if codes:
-                self.cycle = codes[-1] in line_words.CYCLE_CODES
+                self.cycle = codes[-1] in CYCLE_CODES
         elif text.startswith("interpreter: cutter radius compensation on"):
             self._check_diameter()
 
@@ -132,8 +139,8 @@ class Follower:
             left += 1
         while after > 1 and not self.lines[after - 1].words:
             after -= 1
-        left = left if line_words.LEAVES.match(self.lines[left - 1].words) else self.line
-        after = after if line_words.LEAVES.match(self.lines[after - 1].words) else line - 1
+        left = left if LEAVES.match(self.lines[left - 1].words) else self.line
+        after = after if LEAVES.match(self.lines[after - 1].words) else line - 1
         self.jumps.append(Jump(len(self.recorder), left, after))
 
     def _on_use_length_units(self, inner: str) -> None:
@@ -200,9 +207,6 @@ class Follower:
         self.tool = self.numbers[place - 1] if place else 0
         self.lost, self.raised = self.lost + self.raised, 0.0
 
-    def _on_change_tool_number(self, _: str) -> None:
-        raise self.fail("M61: LinuxCNC's rs274 goes on with length and diameter of the tool before", "T and M6")
-
     def _on_select_plane(self, inner: str) -> None:
         name = inner.removeprefix("CANON_PLANE_")
         self.plane = PLANES.get(name, name)
@@ -232,12 +236,6 @@ class Follower:
 
     def _on_dwell(self, inner: str) -> None:
         self.recorder.add_dwell(_numbers(inner)[0])
-
-    def _on_nurbs_feed(self, _: str) -> None:
-        raise self.fail("a spline, whose points LinuxCNC does not print", hint="post arcs and lines")
-
-    def _on_straight_probe(self, _: str) -> None:
-        raise self.fail("probing: what follows depends on what is met", hint="leave probing out")
 
     def _on_straight_traverse(self, inner: str) -> None:
         self._move(RAPID, self._point(inner))
@@ -301,7 +299,12 @@ class Follower:
         here, there = frames.to_program(start), frames.to_program(end)
         apart = max(abs(here[axis] - there[axis]) for axis in (first, second)) / self.scale
         if apart < SAME_PLACE:
-            there = self._end_in_words(here, apart, (first, second))
+            named = {AXES[first], AXES[second]}.intersection(AXIS_WORD.findall(self._words(self.line)))
+            if apart > ROUNDING or (self.fine and named):
+                problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
+                expected = "no more than four decimals, or a full circle without its end words"
+                raise self.fail(problem, expected, line=self.line)
+            there = here
         middle = list(here)
         middle[first], middle[second] = c1, c2
         beginning, ending, center = ((point[first], point[second]) for point in (here, there, middle))
@@ -313,27 +316,12 @@ class Follower:
         x, y, z = (c - r for c, r in zip(frames.to_control(middle), self.reference, strict=False))
         return Arc((x, y, z), frames.turn_direction(geometry.normal_of(self.plane)), sweep)
 
-    def _end_in_words(self, here: Vector, apart: float, axes: tuple[int, int]) -> Vector:
-        """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
-        named, end = line_words.AXIS_WORD.findall(self._words(self.line)), list(here)
-        for axis in (axis for axis in axes if AXES[axis] in named):
-            numbers = [given.get(AXES[axis], "nan") for given in (self.given, self.given_before)]
-            step = float(numbers[0]) - float(numbers[1])
-            if not abs(step) <= SAME_PLACE:  # computed, or compensated
-                if apart > ROUNDING or self.fine:
-                    problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
-                    expected = "a full circle without its end words, or an end more than 0.0002 from the start"
-                    raise self.fail(problem, expected, line=self.line)
-                return here
-            end[axis] += step * self.scale
-        return end
-
     def _find_height(self, end: Vector) -> None:
         """Until a move names Z, rs274 prints the number that Z had before the length changed."""
         words = self._words(self.line)
-        named = "Z" in line_words.AXIS_WORD.findall(words)
-        modes = [mode for line in self.lines[: self.line] for mode in line_words.DISTANCE_MODE.findall(line.plain)]
-        if self.cycle or (named and modes and modes[-1] == "1") or (line_words.HOME_MOVE.search(words) and not named):
+        named = "Z" in AXIS_WORD.findall(words)
+        modes = [mode for line in self.lines[: self.line] for mode in DISTANCE_MODE.findall(line.plain)]
+        if self.cycle or (named and modes and modes[-1] == "1") or (HOME_MOVE.search(words) and not named):
             problem = "a move from a height that rs274 has lost: the tool length changed between the last move and M6"
             raise self.fail(problem, "G90 G0 with Z before it", line=self.line)
         if named:
@@ -347,14 +335,14 @@ class Follower:
             return (False, False)
         was = self.frames.bound
         words = self._words(self.line)
-        named = {AXES.index(letter) for letter in line_words.AXIS_WORD.findall(words)}
+        named = {AXES.index(letter) for letter in AXIS_WORD.findall(words)}
         named |= {0, 1} if {"@", "^"} & set(words) else set()
-        machine = bool(line_words.MACHINE_MOVE.search(words))
-        if line_words.HOME_MOVE.search(words):  # first to the intermediate point, then home
+        machine = bool(MACHINE_MOVE.search(words))
+        if HOME_MOVE.search(words):  # first to the intermediate point, then home
             machine = self.moves_of_line > 0
             named = named or (set(range(6)) if machine else set())
         self.moves_of_line += 1
-        if self.cycle and not line_words.HOME_MOVE.search(words):  # to the hole at the old height, or along the normal
+        if self.cycle and not HOME_MOVE.search(words):  # to the hole at the old height, or along the normal
             normal = geometry.PLANES[self.plane][2]
             along = all(start[axis] == end[axis] for axis in range(6) if axis != normal)
             named = {normal} if along else named - {normal}

@@ -5,10 +5,8 @@ import re
 from collections.abc import Sequence
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import LISTED
-from toolpath_stiff.nc.lathes import lathe_warning
 from toolpath_stiff.nc.linuxcnc.canon import Follower
 from toolpath_stiff.nc.linuxcnc.fence import refuse_other_programs
 from toolpath_stiff.nc.linuxcnc.inputs import (
@@ -20,7 +18,7 @@ from toolpath_stiff.nc.linuxcnc.inputs import (
     tool_file,
     tool_numbers,
 )
-from toolpath_stiff.nc.linuxcnc.runner import Run, RunLimits, find_rs274, run_rs274
+from toolpath_stiff.nc.linuxcnc.runner import Run, find_rs274, run_rs274
 from toolpath_stiff.nc.moves import ReadProgram, Remark, Unsupported
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START
@@ -31,20 +29,20 @@ MACHINE_CODES = re.compile(r"G0*(?:53|28|30)(?!\d)")
 OFFSET_CODES = re.compile(r"G0*10(?!\d)")
 SETS_G54 = re.compile(r"L0*20?(?!\d).*P0*[01](?!\d)|P0*[01](?!\d).*L0*20?(?!\d)")
 G_OR_M_WORD = re.compile(r"([GM])([0-9]+\.?[0-9]*)")
-TURNING = re.compile(r"G0*(33|76|95|96)(?![\d.])")  # what lathes' programs have, seldom those of mills
 WAITS = re.compile(r"M0*66(?!\d)")
+WAITING = "M66 waits for an input that is not there; what depends on it may differ"
 NO_SHIFT = (0.0, 0.0, 0.0)
 
 
-def read(request: Request, limits: RunLimits | None = None) -> ReadProgram:
-    """A program as `rs274` reads it, within the limits of its run.
+def read(request: Request) -> ReadProgram:
+    """A program as `rs274` reads it.
 
     Raises
     ------
     InputError
         The fence, or the interpreter, refuses the program, or a limit was exceeded.
     """
-    return _Session(request, fenced(request.lines, request.name), limits or RunLimits()).read()
+    return _Session(request, fenced(request.lines, request.name)).read()
 
 
 def fenced(source: Sequence[str], name: str) -> list[Line]:
@@ -57,8 +55,8 @@ def fenced(source: Sequence[str], name: str) -> list[Line]:
 class _Session:
     """A program being read, as often as it takes to know its zero."""
 
-    def __init__(self, request: Request, lines: list[Line], limits: RunLimits) -> None:
-        self.request, self.lines, self.limits = request, lines, limits
+    def __init__(self, request: Request, lines: list[Line]) -> None:
+        self.request, self.lines = request, lines
         self.rs274 = find_rs274(request.rs274, request.unconfined)
         self.offsets = copy.deepcopy(request.work_offsets)
         self.tool_numbers = tool_numbers(request.controller.tools, lines)
@@ -81,16 +79,18 @@ class _Session:
             place, source = origin, "option"
         if shift == NO_SHIFT and self._uses(MACHINE_CODES) and place != g54:
             raise self._machine_error()
-        moves = follower.recorder.moves()
         return ReadProgram(
             name=request.name,
             path=request.path,
             source=request.lines,
-            moves=moves,
+            moves=follower.recorder.moves(),
             origin=pose_in_si(place),
             origin_source=source,
             unsupported=tuple(self._unsupported()),
-            warnings=(*self._warnings(source, given), *lathe_warning(self._turning(), moves)),
+            warnings=(
+                *([ORIGIN_WINS] if source == "option" and given else ()),
+                *(Remark(WAITING, line.number) for line in self.lines if WAITS.search(line.plain)),
+            ),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),
             tools=tuple(tool_of(request.controller.tools, number).in_use() for number in follower.used_tools),
             interpreter="linuxcnc",
@@ -119,7 +119,7 @@ class _Session:
             "machine coordinates (G53, G28, G30) in a program whose zero lies elsewhere than its G10 says, or is "
             "turned: LinuxCNC's interpreter knows the machine by its offsets alone",
             expected="G54 as the program or the offsets file sets it",
-            hint=f"leave {both_names('--origin')} out, or read the program with --interpreter builtin",
+            hint="leave --origin out, or read the program with --interpreter builtin",
             file=self.request.name,
             line=next((line.number for line in self.lines if MACHINE_CODES.search(line.plain)), None),
         )
@@ -144,7 +144,6 @@ class _Session:
             parameter_file(self.offsets, shift, active),
             tool_file(self.tool_numbers, self.request.controller.tools),
             rs274=self.rs274,
-            limits=self.limits,
         )
 
     def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
@@ -178,28 +177,12 @@ class _Session:
         early = (line.plain for line in self.lines if line.number < first_motion)
         return before, g54.given or any(OFFSET_CODES.search(words) and SETS_G54.search(words) for words in early)
 
-    def _turning(self) -> dict[str, int]:
-        """Codes that make the program look like a lathe's, with their lines."""
-        signs: dict[str, int] = {}
-        for line in self.lines:
-            for number in TURNING.findall(line.plain) if "G" in line.words else ():
-                signs.setdefault(f"G{number}", line.number)
-        return signs
-
     def _unsupported(self) -> list[Unsupported]:
         """Words that change nothing in a path."""
-        unsupported = []
-        for line in self.lines:
-            for match in G_OR_M_WORD.finditer(line.plain):
-                code = code_name(match[1], float(match[2]))
-                if code in LISTED:
-                    column = line.columns[match.start()]
-                    unsupported.append(Unsupported(line.number, column, match[0], LISTED[code]))
-        return unsupported
-
-    def _warnings(self, source: str, given: bool) -> list[Remark]:
-        waits = "M66 waits for an input that is not there; what depends on it may differ"
+        matches = ((line, match) for line in self.lines for match in G_OR_M_WORD.finditer(line.plain))
+        codes = ((line, match, code_name(match[1], float(match[2]))) for line, match in matches)
         return [
-            *([ORIGIN_WINS] if source == "option" and given else ()),
-            *(Remark(waits, line.number) for line in self.lines if WAITS.search(line.plain)),
+            Unsupported(line.number, line.columns[match.start()], match[0], LISTED[code])
+            for line, match, code in codes
+            if code in LISTED
         ]

@@ -23,17 +23,10 @@ HOW_TO_CONFINE = (
 HOW_TO_GET = "install LinuxCNC (Debian, Ubuntu: apt install linuxcnc-uspace), or name the program with --rs274 PATH"
 PROGRAM, CANON, PARAMETERS, TOOLS, ERRORS = "program.ngc", "canon.txt", "rs274.var", "tool.tbl", "errors.txt"
 LONGEST_MESSAGE = 4000
+# Limits of a run: processor time, memory, and size of any file it writes.
+SECONDS, MEMORY_BYTES, FILE_BYTES = 60, 1 << 30, 1 << 28
 # rs274 repeats the line that it was reading, with the copy's N word; of its output the last line names it too.
 LAST_LINE = re.compile(r"^(?: *\d+ )?N(\d+)", re.MULTILINE)
-
-
-@dataclass(frozen=True)
-class RunLimits:
-    """Limits of a run: processor time, memory, and size of any file it writes."""
-
-    seconds: int = 60
-    memory_bytes: int = 1 << 30
-    file_bytes: int = 1 << 28
 
 
 @dataclass(frozen=True)
@@ -58,7 +51,7 @@ def find_rs274(path: str | None = None, unconfined: bool = False) -> str:
     return str(Path(program).resolve())
 
 
-def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: RunLimits) -> Run:
+def run_rs274(program: str, parameters: str, tools: str, *, rs274: str) -> Run:
     """Run the interpreter on a program that has passed the fence. Raises `InputError` if it cannot be started."""
     with tempfile.TemporaryDirectory(prefix="tps-rs274-", ignore_cleanup_errors=True) as place:
         folder = Path(place)
@@ -66,25 +59,25 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: 
             (folder / name).write_text(text, encoding="ascii")
         wrapper = _bubblewrap()
         sandbox = () if wrapper is None else (*wrapper, "--bind", str(folder), str(folder), "--chdir", str(folder))
-        bounds = (f"--cpu={limits.seconds}", f"--as={limits.memory_bytes}", f"--fsize={limits.file_bytes}")
+        bounds = (f"--cpu={SECONDS}", f"--as={MEMORY_BYTES}", f"--fsize={FILE_BYTES}")
         command = (rs274, "-g", "-t", TOOLS, "-v", PARAMETERS, PROGRAM, CANON)
-        code = _execute([*sandbox, "prlimit", *bounds, "--core=0", "--nproc=0", *command], folder, limits)
+        code = _execute([*sandbox, "prlimit", *bounds, "--core=0", "--nproc=0", *command], folder)
         canon, message = _text(folder / CANON), _text(folder / ERRORS)[:LONGEST_MESSAGE]
-        exceeded = _exceeded(code, limits, len(canon))
+        exceeded = _exceeded(code, len(canon))
         if exceeded:
             numbers = LAST_LINE.findall(canon[-4096:])
             return Run("", "", exceeded, (int(numbers[-1]) or None) if numbers else None)
         return Run(canon, _text(folder / PARAMETERS), *(_refusal_and_line(message) if code else ()))
 
 
-def _execute(command: list[str], folder: Path, limits: RunLimits) -> int:
+def _execute(command: list[str], folder: Path) -> int:
     """Exit code, or less the signal that ended it; a process that sleeps uses no processor time: the clock ends it."""
     environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LC_ALL": "C", "TMPDIR": str(folder)}
     with (folder / ERRORS).open("wb") as errors:
         try:
             done = subprocess.run(
                 command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=errors, stderr=errors,
-                start_new_session=True, timeout=2 * limits.seconds + 5, check=False,
+                start_new_session=True, timeout=2 * SECONDS + 5, check=False,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
             return -signal.SIGKILL
@@ -93,15 +86,15 @@ def _execute(command: list[str], folder: Path, limits: RunLimits) -> int:
     return done.returncode
 
 
-def _exceeded(code: int, limits: RunLimits, written: int) -> str:
+def _exceeded(code: int, written: int) -> str:
     """The limit that an exit code stands for, "" for none; a shell's or bubblewrap's 128 + n is signal n."""
     number = -code if code < 0 else code - 128
-    if written >= limits.file_bytes:  # Python within rs274 ignores the signal
-        limit = f"{limits.file_bytes / 1e6:.0f} MB of output"
+    if written >= FILE_BYTES:  # Python within rs274 ignores the signal
+        limit = f"{FILE_BYTES / 1e6:.0f} MB of output"
     elif number in (signal.SIGXCPU, signal.SIGKILL):
-        limit = f"{limits.seconds} s of processor time"
+        limit = f"{SECONDS} s of processor time"
     elif number in (signal.SIGABRT, signal.SIGSEGV, signal.SIGBUS):
-        memory = limits.memory_bytes >> 20
+        memory = MEMORY_BYTES >> 20
         return f"LinuxCNC's interpreter crashed (signal {number}; its memory is limited to {memory} MB)"
     else:
         return ""

@@ -11,28 +11,23 @@ bind last; FIX and FUP round towards and from zero in Macro B, down and up in NG
 EQ allows for 0.0001. A variable that nothing has set is 0 in NGC and empty in Macro B.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import add, and_, ge, gt, le, lt, mul, or_, sub, truediv, xor
-from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
+from toolpath_stiff.nc.parametric.variables import Variables, Which
 from toolpath_stiff.nc.place import Place
 
-if TYPE_CHECKING:
-    from toolpath_stiff.nc.parametric.variables import Variables
-
-
-Value = Callable[["Variables"], float | None]  # None: an empty variable of Macro B
+Value = Callable[[Variables], float | None]  # None: an empty variable of Macro B
 
 NUMBER = re.compile(r"\d+\.?\d*|\.\d+", re.ASCII)
-NAME = re.compile(r"<([^<>]*)>")
-FUNCTION = re.compile(r"ABS|ACOS|ASIN|ATAN|COS|EXISTS|EXP|FIX|FUP|LN|POW|ROUND|SIN|SQRT|TAN")
+SIGNS = re.compile(r"[+-]*")
+NAME = re.compile(r"<[^<>]*>")
+FUNCTION = re.compile(r"ABS|ACOS|ASIN|ATAN|COS|EXISTS|EXP|FIX|FUP|LN|POW|RND|ROUND|SIN|SQRT|SQR|TAN")
 SHORT = {"RND": "ROUND", "SQR": "SQRT"}  # Fanuc's short forms
 OPERATOR = re.compile(r"\*\*|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE|[*/+-]")
 COMPARISONS = ("EQ", "NE", "GT", "GE", "LT", "LE")
@@ -45,8 +40,6 @@ BINDS = {
     EITHER: _SHARED,
 }
 EQUAL = 1e-4  # NGC's EQ and NE: LinuxCNC's rs274 takes 5 and 5.00009 for equal, 5 and 5.0002 not
-DEEPEST = 50  # brackets, or variables of variables, within each other
-MOST_OPERATIONS = 200  # in a block; LinuxCNC's has at most 255 characters
 LARGEST_PLACE = 1e9
 LARGEST_BITS = 2**31
 NO_TANGENT_DEGREES = 1e-9
@@ -68,8 +61,6 @@ class Scanner:
         Whether a word's value is read, not an assignment's or a condition's.
     position
         The next character.
-    depth, operations
-        Brackets that are open; operators so far.
     """
 
     text: str
@@ -78,8 +69,6 @@ class Scanner:
     family: str
     of_word: bool = False
     position: int = 0
-    depth: int = 0
-    operations: int = 0
 
     @property
     def done(self) -> bool:
@@ -91,23 +80,34 @@ class Scanner:
         """The column of the next character."""
         return self.columns[min(self.position, len(self.columns) - 1)]
 
-    def next(self, what: str) -> bool:
-        """Whether `what` comes next; it is then read."""
-        if not self.text.startswith(what, self.position):
-            return False
-        self.position += len(what)
-        return True
+    def begins(self, *texts: str) -> bool:
+        """Whether one of these comes next."""
+        return self.text.startswith(texts, self.position)
 
-    def match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
-        """What matches next, then read; None if nothing does."""
+    def next(self, text: str) -> bool:
+        """Whether that comes next; it is then read."""
+        begins = self.begins(text)
+        self.position += len(text) * begins
+        return begins
+
+    def take(self, pattern: re.Pattern[str]) -> str:
+        """What matches next, then read; "" if nothing does."""
         token = pattern.match(self.text, self.position)
-        if token is not None:
-            self.position = token.end()
-        return token
+        if token is None:
+            return ""
+        self.position = token.end()
+        return token[0]
 
     def fail(self, problem: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
         """An error at a column, unless given that of the next character."""
         return self.place.fail(problem, expected, hint, column or self.column)
+
+    def refuse_if(
+        self, refused: object, problem: str, expected: str = "", hint: str = "", column: int | None = None
+    ) -> None:
+        """Raise the error, if there is to be one."""
+        if refused:
+            raise self.fail(problem, expected, hint, column)
 
     def rest(self) -> str:
         """The next few characters, for errors."""
@@ -127,71 +127,61 @@ class Scanner:
 
         return value
 
-    def _closed(self, column: int) -> None:
-        if not self.next("]"):
-            raise self.fail("a bracket that is not closed", "]", column=column)
+    def _open(self) -> int:
+        """The column of the bracket that comes next, then read."""
+        column = self.column
+        if not self.next("["):
+            raise self._missing("a bracket", "[")
+        return column
+
+    def _close(self, column: int) -> None:
+        self.refuse_if(not self.next("]"), "a bracket that is not closed", "]", column=column)
 
     def value(self) -> Value:
         """The value after a letter or an operator: a number, a variable, a function, an expression in brackets."""
-        negative = False
-        while not self.done and self.text[self.position] in "+-":
-            negative ^= self.text[self.position] == "-"
-            self.position += 1
+        negative = self.take(SIGNS).count("-") % 2
         value = self._unsigned()
         return (lambda variables: -number(value(variables))) if negative else value
 
     def _unsigned(self) -> Value:
-        literal = self.match(NUMBER)
-        if literal is not None:
-            constant = float(literal[0])
-            if not math.isfinite(constant):
-                raise self.fail(f"{literal[0][:20]!r} is not a finite number")
+        literal = self.take(NUMBER)
+        if literal:
+            constant = float(literal)
             return lambda variables: constant
         if self.next("#"):
             return self.variable()
-        if not self.done and self.text[self.position] == "[":
+        if self.begins("["):
             return self.bracket()
-        name = self.match(FUNCTION)
-        if name is not None:
-            return self._function(name[0])
-        for short, long in SHORT.items():
-            if self.next(short):
-                return self._function(long)
+        name = self.take(FUNCTION)
+        if name:
+            return self._function(SHORT.get(name, name))
         raise self._missing("a value", "a value")
 
     def bracket(self) -> Value:
         """An expression in brackets."""
-        column = self.column
-        if not self.next("["):
-            raise self._missing("a bracket", "[")
-        self._deeper(column)
+        column = self._open()
         value = self.expression()
-        self._closed(column)
-        self.depth -= 1
+        self._close(column)
         return value
-
-    def _deeper(self, column: int) -> None:
-        self.depth += 1
-        if self.depth > DEEPEST:
-            raise self.fail(f"more than {DEEPEST} brackets within each other", column=column)
 
     def variable(self) -> Value:
         """The variable after a `#`."""
-        where, which = self.place._replace(column=self.column), self.which()
-        return lambda variables: variables.get(which(variables), where)
+        place, which = self.place._replace(column=self.column), self.which()
+        return lambda variables: variables.get(which(variables), place)
 
-    def which(self) -> Callable[[Variables], str | int]:
+    def which(self) -> Callable[[Variables], Which]:
         """Which variable a `#` means: a number, the number that another one holds, an expression, a name."""
         column = self.column
-        named = self.match(NAME)
-        if named is not None:
-            if self.family == MACRO_B:
-                problem = f"#<{named[1]}> is a named variable, which Macro B does not have"
-                raise self.fail(problem, "#1 to #999", column=column)
-            return lambda variables: named[1]
-        self._deeper(column)
+        name = self.take(NAME)[1:-1]
+        self.refuse_if(
+            name and self.family == MACRO_B,
+            f"#<{name}> is a named variable, which Macro B does not have",
+            "#1 to #999",
+            column=column,
+        )
+        if name:
+            return lambda variables: name
         inner = self._unsigned()
-        self.depth -= 1
 
         def numbered(variables: Variables) -> int:
             variable_number = number(inner(variables))
@@ -205,12 +195,10 @@ class Scanner:
         """Values and operators that bind tighter than `tightest`."""
         left = self.value()
         while True:
-            begin = self.position
-            column = self.column if not self.done else 0
-            token = self.match(OPERATOR)
-            if token is None:
+            begin, column = self.position, self.column
+            operator = self.take(OPERATOR)
+            if not operator:
                 return left
-            operator = token[0]
             rank = BINDS[self.family].get(operator)
             if rank is None:
                 hint = "name the control with --dialect"
@@ -218,27 +206,22 @@ class Scanner:
             if rank <= tightest:
                 self.position = begin
                 return left
-            self.operations += 1
-            if self.operations > MOST_OPERATIONS:
-                raise self.fail(f"more than {MOST_OPERATIONS} operators in a block", column=column)
             left = self._operation(operator, left, self.expression(rank), column)
 
     def _operation(self, operator: str, left: Value, right: Value, column: int) -> Value:
-        family = self.family
-        if operator in ("EQ", "NE"):
-            return lambda variables: equality(operator, left(variables), right(variables), family)
-
-        def work(variables: Variables) -> float:
-            return operate(operator, number(left(variables)), number(right(variables)), family)
-
-        return self._worked_out(operator, column, work)
+        return self._worked_out(
+            operator, column, lambda variables: operate(operator, left(variables), right(variables), self.family)
+        )
 
     def _function(self, name: str) -> Value:
         column, family = self.column, self.family
         if name == "EXISTS":
             return self._exists()
-        if name == "ROUND" and self.of_word and family == MACRO_B:
-            raise self.fail("ROUND in a word, where it rounds to the least increment", "it in an assignment")
+        self.refuse_if(
+            name == "ROUND" and self.of_word and family == MACRO_B,
+            "ROUND in a word, where it rounds to the least increment",
+            "it in an assignment",
+        )
         if name in ("ATAN", "POW"):
             return self._of_two(name, column)
         argument = self.bracket()
@@ -246,19 +229,15 @@ class Scanner:
 
     def _of_two(self, name: str, column: int) -> Value:
         """ATAN[y]/[x]; Macro B's ATAN[y,x] and POW[base,exponent] too."""
-        start = self.position
-        if not self.next("["):
-            raise self._missing("a bracket", "[")
+        start = self._open()
         first = self.expression()
         if self.family != NGC and self.next(","):
             second = self.expression()
-            self._closed(self.columns[start])
-        elif name == "ATAN" and self.next("]") and self.next("/"):
+            self._close(start)
+        elif name == "ATAN" and self.next("]/"):
             second = self.bracket()
         else:
             raise self.fail(f"{name} with one value", "ATAN[y]/[x] or POW[base,exponent]", column=column)
-        if name == "POW" and self.family == NGC:
-            raise self.fail(f"POW is no function of {NGC}", column=column)
 
         def work(variables: Variables) -> float:
             left, right = number(first(variables)), number(second(variables))
@@ -268,12 +247,9 @@ class Scanner:
 
     def _exists(self) -> Value:
         """EXISTS[#<name>]: 1 if the variable has been set."""
-        if self.family != NGC:
-            raise self.fail(f"EXISTS is no function of {self.family}")
-        named = self.match(NAME) if self.next("[#") else None
-        if named is None or not self.next("]"):
-            raise self.fail("EXISTS without a named variable", "EXISTS[#<name>]")
-        return lambda variables: float(variables.exists(named[1]))
+        name = self.take(NAME)[1:-1] if self.family == NGC and self.next("[#") else ""
+        self.refuse_if(not name or not self.next("]"), f"EXISTS in {self.family}", "EXISTS[#<name>], on LinuxCNC")
+        return lambda variables: float(variables.exists(name))
 
 
 def number(value: float | None) -> float:
@@ -288,28 +264,30 @@ def finite(value: float) -> float:
     return float(value)
 
 
-def equality(operator: str, left: float | None, right: float | None, family: str) -> float:
-    """EQ and NE; empty is not 0 to Macro B ("Custom macro", "Handling of an empty variable")."""
-    same = abs(number(left) - number(right)) < EQUAL if family == NGC else left == right
-    return float(same == (operator == "EQ"))
+def operate(operator: str, left: float | None, right: float | None, family: str) -> float:
+    """The value of an operator.
 
-
-def operate(operator: str, left: float, right: float, family: str) -> float:
-    """The value of an operator: logic of truth values in NGC, of bits in Macro B; MOD never negative in NGC."""
+    EQ and NE allow for 0.0001 in NGC; to Macro B empty is not 0 ("Custom macro", "Handling of an empty variable").
+    Logic is of truth values in NGC, of bits in Macro B; MOD is never negative in NGC.
+    """
+    a, b = number(left), number(right)
+    if operator in ("EQ", "NE"):
+        same = abs(a - b) < EQUAL if family == NGC else left == right
+        return float(same == (operator == "EQ"))
+    if operator in LOGIC and family == NGC:
+        return float(LOGIC[operator](a != 0.0, b != 0.0))
     if operator in LOGIC:
-        if family == NGC:
-            return float(LOGIC[operator](left != 0.0, right != 0.0))
-        if any(value != round(value) or not 0 <= value < LARGEST_BITS for value in (left, right)):
+        if any(value != round(value) or not 0 <= value < LARGEST_BITS for value in (a, b)):
             raise ValueError("its values are not whole numbers from 0")
-        return float(LOGIC[operator](round(left), round(right)))
-    if operator in ("/", "MOD") and right == 0.0:
+        return float(LOGIC[operator](round(a), round(b)))
+    if operator in ("/", "MOD") and b == 0.0:
         raise ValueError("the divisor is 0")
     if operator != "MOD":
-        return float(ARITHMETIC[operator](left, right))
-    if family != NGC and (left < 0.0 or right < 0.0):
+        return float(ARITHMETIC[operator](a, b))
+    if family != NGC and (a < 0.0 or b < 0.0):
         raise ValueError("controls differ in the remainder of negative numbers")
-    rest = math.fmod(left, right)
-    return rest + abs(right) if rest < 0.0 else rest
+    rest = math.fmod(a, b)
+    return rest + abs(b) if rest < 0.0 else rest
 
 
 def evaluate(name: str, value: float, family: str) -> float:

@@ -52,15 +52,13 @@ def family_of(lines: tuple[str, ...], dialect: Dialect, name: str) -> str:
         return NGC
     if dialect.name in ("fanuc", "haas"):
         return MACRO_B
-    signs = {}
-    for family, sign in ((NGC, _NGC_SIGN), (MACRO_B, _MACRO_SIGN)):
-        first = next((number for number, text in _bare(lines) if sign.search(text)), None)
-        if first is not None:
-            signs[family] = first
-    if len(signs) == 2:
-        raise Place(name, max(signs.values())).fail(
-            f"line {signs[NGC]} is of LinuxCNC's language (O words, #<name>, **), line {signs[MACRO_B]} of Macro B "
-            "(IF GOTO, WHILE DO, G65)",
+    ngc, macro = (
+        next((number for number, text in _bare(lines) if sign.search(text)), 0) for sign in (_NGC_SIGN, _MACRO_SIGN)
+    )
+    if ngc and macro:
+        raise Place(name, max(ngc, macro)).fail(
+            f"line {ngc} is of LinuxCNC's language (O words, #<name>, **), line {macro} of Macro B (IF GOTO, WHILE DO, "
+            "G65)",
             hint="name the control with --dialect",
         )
-    return next(iter(signs), EITHER)
+    return NGC if ngc else MACRO_B if macro else EITHER

@@ -1,43 +1,191 @@
-"""Runs a parametric program: goes where O words, GOTO and WHILE lead.
+"""Runs a parametric program: works out the values of its blocks, and goes where O words, GOTO, WHILE and calls lead.
 
-LinuxCNC's manual, "O Codes"; Fanuc's operator's manuals, "Custom macro" ("Macro call", "Branch and repetition").
-Bounded: the blocks that run, and calls within calls.
+LinuxCNC's manual, "O Codes"; Fanuc's operator's manuals, "Custom macro" ("Macro call", "Branch and repetition"). Each
+block's words act as those of any program (`interpreter.execute`). Subprograms of other files are read from one folder
+that the caller names, and from nowhere else. Bounded: the blocks that run, and calls within calls.
 """
 
 from bisect import bisect_right
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.interpreter import execute
+from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.expressions import EQUAL, number
-from toolpath_stiff.nc.parametric.families import NGC
-from toolpath_stiff.nc.parametric.statements import Steering
-from toolpath_stiff.nc.parametric.structure import Structure, loops_of, shown, structure_of
-from toolpath_stiff.nc.parametric.values import ValuesRun
-from toolpath_stiff.nc.program_run import HEAD, Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.parametric.families import NGC, family_of
+from toolpath_stiff.nc.parametric.macro_calls import arguments_of
+from toolpath_stiff.nc.parametric.statements import Assignment, Statement, Steering, computed_word, read_statement
+from toolpath_stiff.nc.parametric.structure import Structure, structure_of
+from toolpath_stiff.nc.parametric.variables import Variables
+from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.program_run import HEAD, ProgramRun, Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.state import Flow, GoTo
+from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
+from toolpath_stiff.nc.words import Block, Word
 
 MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
 MOST_IDLE = 100_000  # blocks of loops that run without a move between; a program that works out values needs far fewer
+SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
+SHOWN = 40  # characters of the program in a message
+LARGEST_NUMBER = 99_999_999  # of a program, or of repeats
+WHOLE_WORDS = frozenset("GMTL")  # codes and numbers, which a value must be
+MACRO_CALLS = ("G65", "G66", "G67")
 
 
-class ParametricRun(ValuesRun):
-    """A run of a program with variables, and with what steers it."""
+class ParametricRun(ProgramRun):
+    """A run of a program with variables, and with what steers it; parameters as of `ProgramRun`.
+
+    Files of subprograms are looked for in the folder of the controller: `name.ngc` for `o<name> call`, `O1234.nc` or
+    `1234.nc` for M98 and G65 P1234.
+    """
 
     def __init__(self, request: Request, tally: Tally | None = None) -> None:
-        super().__init__(request, tally)
-        self._structure: Structure | None = None
-        self._loops: dict[int, int] | None = None
-        self._counts: dict[int, int] = {}  # repeats left in the main program, by line
+        super().__init__(request, tally, fast=False)
+        self.family = family_of(self.lines, self.state.dialect, self.name)
+        self.variables = Variables(self.family, self.state)
+        self.folder = None if request.controller.subprograms is None else Path(request.controller.subprograms)
+        self._main_lines = len(self.lines)
+        self._files: list[tuple[int, int, str]] = []  # first line, line after the last, name
+        self._statements: dict[int, Statement] = {}
+        self._structure_known: Structure | None = None
+        self._modal: Call | None = None
+        self._at = 0  # the block that runs
         self._steps = 0
         self._passes: dict[int, str] = {}  # by the line that jumps back: what changes often, as it was there
         self._moved = (0, 0)  # moves at the last jump back after a move, and the blocks that had run by then
         self._began = False  # a variable was set, or the flow steered
+        self._repeats: dict[tuple[int, int], int] = {}  # left of a loop, by the calls that run and its line
+        self._marks: dict[str, int] = {}  # lines of BREAK and CONTINUE that LinuxCNC's interpreter has not forgotten
+
+    def _place(self, row: int) -> Place:
+        """File and line (from 1) of a line that is read."""
+        in_files = (Place(name, row - first + 1) for first, stop, name in self._files if first <= row < stop)
+        return next(in_files, super()._place(row))
+
+    def _statement(self, row: int) -> Statement:
+        if row not in self._statements:
+            place = self._place(row)
+            self._statements[row] = read_statement(self.lines[row], place, self.family, self.state.dialect)
+        return self._statements[row]
+
+    def _block(self, row: int) -> Block:
+        return self._tried(self._read, row, Block(row + 1, ()))
+
+    def _read(self, row: int) -> Block:
+        """The block with its values; its variables are set."""
+        statement = self._statement(row)
+        words = []
+        for index, word in enumerate(statement.block.words):
+            if index not in statement.computed:
+                words.append(word)
+                continue
+            value = statement.computed[index](self.variables)
+            if value is not None:  # else an empty variable: the word is as if it were not there (Macro B)
+                words.append(computed_word(word, self._whole(word, value) if word.letter in WHOLE_WORDS else value))
+        self._assign(statement.assignments)
+        line = statement.block.line if row < self._main_lines else self._line_of_call()
+        return replace(statement.block, line=line, words=tuple(words))
+
+    def _whole(self, word: Word, value: float) -> float:
+        """The code or number that a value stands for, as LinuxCNC's interpreter rounds it."""
+        whole = round(value, 1 if word.letter in "GM" else 0)
+        if abs(whole - value) > EQUAL or whole < 0.0:
+            code = f"a code such as {word.letter}1 or {word.letter}59.3"
+            expected = code if word.letter in "GM" else "a whole number from 0"
+            raise self._word_fault(word, f"is {word.letter}{value:g}", expected)
+        return whole
+
+    def _assign(self, assignments: tuple[Assignment, ...]) -> None:
+        """Set variables, once all values are known (LinuxCNC, "Numbered Parameters")."""
+        for set_variable in [assignment(self.variables) for assignment in assignments]:
+            set_variable()
+
+    def _line_of_call(self) -> int:
+        """The line of the main file from which a subprogram's file is called: its moves are of that line."""
+        return next((level.back for level in reversed(self._levels) if level.back <= self._main_lines), 1)
+
+    def _word_fault(self, word: Word, problem: str, expected: str) -> InputError:
+        return self._fail(self._at, f"{word.text[:SHOWN]} {problem}", expected, column=word.column)
+
+    def _execute(self, block: Block) -> Then:
+        codes = [code_name("G", word.value) if word.letter == "G" else "" for word in block.words]
+        place = next((index for index, code in enumerate(codes) if code in MACRO_CALLS), None)
+        try:
+            if place is None or self.family == NGC:  # LinuxCNC has none: refused where the codes are sorted
+                return self._act(block)
+            return self._macro_call(block, codes[place], place)
+        except InputError as error:
+            error.file, error.line, _ = self._place(self._at)  # the block stands on the line that calls its file
+            raise
+
+    def _act(self, block: Block) -> Then:
+        """Carry out a block; after a move the call of G66 follows."""
+        moves = len(self.state.recorder)
+        flow = execute(self.state, block) if block.words else Flow.NEXT
+        if self._modal is None or flow is not Flow.NEXT or len(self.state.recorder) == moves:
+            return flow
+        return flow if any(level.modal for level in self._levels) else self._modal
+
+    def _macro_call(self, block: Block, code: str, place: int) -> Then:
+        """Carry out G65, G66 or G67 at a place in a block, and what stands before it."""
+        before, word, after = block.words[:place], block.words[place], block.words[place + 1 :]
+        if before:
+            execute(self.state, replace(block, words=before))
+        if code == "G67":
+            self._modal = None
+            return self._act(replace(block, words=after))
+        given = {w.letter: w for w in after if w.letter in "PL"}
+        if "P" not in given:
+            raise self._word_fault(word, "without P", "P with the number of the macro")
+        program, repeats = (self._count(given[letter]) if letter in given else 1 for letter in "PL")
+        arguments = arguments_of(after, self.state.dialect.increments, self._word_fault)
+        call = Call(program, repeats, word.column, arguments=arguments, modal=code == "G66")
+        if not call.modal:
+            return call
+        self._modal = call
+        return Flow.NEXT
+
+    def _count(self, word: Word) -> int:
+        if word.value != round(word.value) or not 1 <= word.value <= LARGEST_NUMBER:
+            raise self._word_fault(word, "is not a count", "a whole number from 1")
+        return int(word.value)
+
+    def _begin(self, level: Subprogram, row: int, column: int) -> None:
+        super()._begin(level, row, column)
+        if level.arguments is not None:
+            self.variables.levels.append(dict(level.arguments.items()))
+
+    def _leave(self, row: int) -> int:
+        level, back = self._levels[-1], super()._leave(row)
+        if level.arguments is not None:
+            self.variables.levels.pop()
+            if self._levels and self._levels[-1] is level:  # it runs again
+                self.variables.levels.append(dict(level.arguments.items()))
+        return back
+
+    def _target(self, row: int, call: Call) -> tuple[int, int]:
+        if call.number not in self._heads() and call.number < 10_000:
+            self._load((f"O{call.number:04d}", f"O{call.number}", f"{call.number}", f"{call.number:04d}"))
+        if call.arguments is None:
+            return super()._target(row, call)
+        if call.number not in self._heads():
+            raise self._fail(row, f"the file has no program O{call.number}", column=call.column)
+        return call.number, call.repeats or 1
 
     def _load(self, names: tuple[str, ...]) -> None:
-        super()._load(names)
-        self._structure = self._loops = None
+        """Read a subprogram's file from the folder, if it is there; its lines follow those that are read."""
+        names = names if self.folder is not None else ()
+        files = (Path(self.folder or "", name + suffix) for name in names for suffix in SUFFIXES)
+        file = next((file for file in files if file.is_file()), None)
+        if file is not None:
+            first = len(self.lines)
+            self.lines = (*self.lines, *read_lines(file))
+            self._files.append((first, len(self.lines), file.name))
+            self._programs = self._sequence = self._structure_known = None
 
     def _steered(self, row: int) -> int | None:
         """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
@@ -48,37 +196,38 @@ class ParametricRun(ValuesRun):
         if self._steps > MOST_STEPS:
             raise self._fail(row, f"more than {MOST_STEPS:,} blocks have run", "a loop that ends")
         statement = self._statement(row)
-        self.variables.line = statement.line
-        if statement.percent and self._began:  # as after a word, the tape mark is the last one
+        block, steering = statement.block, statement.steering
+        self.variables.line = block.line
+        if block.percent and self._began:  # as after a word, the tape mark is the last one
             return len(self.lines)
-        self._began |= bool(statement.assignments or statement.steering)
-        if statement.optional and statement.switch in self.switches:
+        self._began |= bool(statement.assignments or steering)
+        if block.optional and block.switch in self.switches:
             return row + 1
-        if statement.steering is None:
+        if steering is None:
             return None
-        to = self._steer(row, statement.steering)
-        if to is None:
-            return row + 1
-        return to if to == row + 1 else self._jump(row, to)
+        if row in self._structure.faults:
+            raise self._structure.faults[row]
+        act = STEPS.get(steering.kind)
+        to = act(self, row, steering) if act else None
+        return row + 1 if to is None else self._jump(row, to)
 
     def _jump(self, row: int, to: int) -> int:
+        if to == row + 1:
+            return to
         if to <= row:
             self._check_loop(row, to)
         return super()._jump(row, to) if max(row, to) < self._main_lines else to
 
     def _check_loop(self, row: int, to: int) -> None:
         """Refuse a loop in which nothing changes, or that makes no move in very many blocks, where it goes back."""
-        state, known = self.state, self.variables
-        kept = repr((state.frames.position, known.levels, known.common, known.named, self._counts, self._levels))
-        if len(state.recorder) != self._moved[0]:
-            self._moved = (len(state.recorder), self._steps)
-        last = self._passes.get(row, "")
-        if last.startswith(kept):  # the offsets, which take long to write down, only then
-            kept += repr(state.frames)
-        if kept == last or self._steps - self._moved[1] > MOST_IDLE:
+        moves, variables = len(self.state.recorder), self.variables
+        if moves != self._moved[0]:
+            self._moved = (moves, self._steps)
+        now = repr((self.state.frames, variables.levels, variables.common, self._repeats, self._levels))
+        if now == self._passes.get(row) or self._steps - self._moved[1] > MOST_IDLE:
             problem = f"the loop back to line {self._place(to).line} never ends"
             raise self._fail(row, f"{problem}: no variable or position changes, or nothing moves", "a loop that ends")
-        self._passes[row] = kept
+        self._passes[row] = now
 
     def _return(self, row: int, flow: Flow | GoTo) -> int | None:
         """M99; with P it goes on at that block of the caller, wherever that is."""
@@ -87,119 +236,117 @@ class ParametricRun(ValuesRun):
         self._levels[-1].again = 0
         return self._go_on(self._leave(row) - 1, flow.number, flow.column)
 
-    def _steer(self, row: int, steering: Steering) -> int | None:
-        """The line (from 0) at which the run goes on; None: the next one."""
-        if self.family == NGC and row in self._ngc().faults:
-            raise self._ngc().faults[row]
-        act = (NGC_STEPS if self.family == NGC else MACRO_STEPS).get(steering.kind)
-        return None if act is None else act(self, row, steering)
-
     def _value(self, steering: Steering, which: int = 0) -> float:
         return number(steering.values[which](self.variables))
 
-    def _true(self, steering: Steering) -> bool:
-        return self._value(steering) != 0.0
-
     def _if(self, row: int, steering: Steering) -> int | None:
-        if self._true(steering):
-            return None
-        for branch in self._ngc().branches[row]:
-            other = self._statement(branch).steering
-            assert other is not None
-            if other.kind != "ELSEIF" or self._true(other):
+        for branch in (row, *self._structure.branches[row]):
+            condition = self._statement(branch).steering
+            if condition is None or condition.kind not in ("IF", "ELSEIF") or self._value(condition):
                 return branch + 1
         raise AssertionError("every if has its endif")
 
     def _else(self, row: int, steering: Steering) -> int | None:
         """Reached from the branch before: the rest is passed over."""
-        return self._ngc().branches[self._ngc().branch_of[row]][-1] + 1
+        return self._structure.end[self._structure.start[row]] + 1
 
     def _while(self, row: int, steering: Steering) -> int | None:
-        structure = self._ngc()
-        if row in structure.start:  # the end of a do
-            return structure.start[row] + 1 if self._true(steering) else None
-        return None if self._true(steering) else structure.end[row] + 1
+        start, true = self._structure.start.get(row), self._value(steering) != 0.0
+        if start is None and true:
+            return None
+        if start is None:
+            self._marks.pop("CONTINUE", None)
+            return self._structure.end[row] + 1
+        if true:
+            self._refuse_after("BREAK", row, "would not run this loop again")
+            return start + 1
+        self._marks.pop("BREAK", None)
+        return None
 
-    def _end_while(self, row: int, steering: Steering) -> int | None:
-        return self._ngc().start[row]
+    def _back(self, row: int, steering: Steering) -> int | None:
+        return self._structure.start[row]
 
     def _repeat(self, row: int, steering: Steering) -> int | None:
         count = self._value(steering)
         if abs(count - round(count)) > EQUAL:
             raise self._fail(row, f"repeat [{count:g}]", "a whole number", column=steering.column)
-        if round(count) <= 0:
-            return self._ngc().end[row] + 1
-        self._repeats_left[row] = round(count)
-        return None
+        self._repeats[len(self._levels), row] = round(count)
+        return self._again(row)
 
     def _end_repeat(self, row: int, steering: Steering) -> int | None:
-        start, counts = self._ngc().start[row], self._repeats_left
-        counts[start] = counts.get(start, 1) - 1
-        return start + 1 if counts[start] > 0 else None
+        return self._again(self._structure.start[row])
 
-    @property
-    def _repeats_left(self) -> dict[int, int]:
-        return self._levels[-1].counts if self._levels else self._counts
+    def _again(self, start: int) -> int:
+        """Where a repeat goes on, from its beginning and from its end."""
+        left = self._repeats.get((len(self._levels), start), 0)
+        self._repeats[len(self._levels), start] = left - 1
+        if left > 0:
+            return start + 1
+        self._refuse_after("CONTINUE", start, "would run this repeat once more, all of it")
+        return self._structure.end[start] + 1
 
     def _break(self, row: int, steering: Steering) -> int | None:
-        structure = self._ngc()
-        return structure.end[structure.inside[row]] + 1
+        start = self._structure.start[row]
+        if self._kind(start) == "WHILE":
+            self._refuse_after("CONTINUE", row, "would go on with this loop")
+            self._marks["BREAK"] = row
+        return self._structure.end[start] + 1
 
     def _continue(self, row: int, steering: Steering) -> int | None:
-        structure = self._ngc()
-        start = structure.inside[row]
-        opener = self._statement(start).steering
-        assert opener is not None
-        return start if opener.kind == "WHILE" else structure.end[start]
+        start = self._structure.start[row]
+        if self._kind(start) == "WHILE":
+            self._marks.pop("CONTINUE", None)
+            return start
+        self._marks["CONTINUE"] = row
+        return self._structure.end[start]
+
+    def _kind(self, row: int) -> str:
+        steering = self._statement(row).steering
+        return steering.kind if steering is not None else ""
+
+    def _refuse_after(self, leave: str, row: int, what: str) -> None:
+        """Refuse what LinuxCNC's interpreter does otherwise after a `break` or `continue`, whose mark it keeps.
+
+        interp_o_word.cc: only the end of a do forgets a break, only that of a while or a repeat a continue, whatever
+        loop they were for.
+        """
+        if leave in self._marks:
+            line = self._place(self._marks[leave]).line
+            problem = f"after the {leave.lower()} in line {line} LinuxCNC's interpreter {what}"
+            raise self._fail(row, problem, "if and endif in place of it")
 
     def _sub(self, row: int, steering: Steering) -> int | None:
-        return self._ngc().end[row] + 1
+        return self._structure.end[row] + 1
 
     def _return_sub(self, row: int, steering: Steering) -> int | None:
         if not self._levels:
             raise self._fail(row, f"{steering.kind.lower()} outside any subprogram", column=steering.column)
-        self.variables.named["_VALUE_RETURNED"] = float(bool(steering.values))
-        self.variables.named["_VALUE"] = self._value(steering) if steering.values else 0.0
+        self.variables.common["_VALUE_RETURNED"] = float(bool(steering.values))
+        self.variables.common["_VALUE"] = self._value(steering) if steering.values else 0.0
         return self._leave(row)
 
     def _call_sub(self, row: int, steering: Steering) -> int | None:
-        label = steering.label
-        structure = self._ngc()
-        name = label.strip("<>")
-        if label not in structure.subs and self.folder is not None and Path(name).name == name:
+        label, name = steering.label, steering.label.strip("<>")
+        if label not in self._structure.subs and Path(name).name == name:
             self._load((name.lower(), name, *(() if label.startswith("<") else (f"o{name}",))))
-            structure = self._ngc()
-        if label not in structure.subs:
-            problem = f"{shown(steering)}: the program, or the folder of its subprograms, has no such sub"
+        first = self._structure.subs.get(label, -1) + 1
+        if not first:
+            problem = f"{steering.shown}: the program, or the folder of its subprograms, has no such sub"
             raise self._fail(row, problem, "--subprograms FOLDER, with that name", column=steering.column)
-        first = structure.subs[label] + 1
         values = {place: number(value(self.variables)) for place, value in enumerate(steering.values, 1)}
-        self._begin(Subprogram(f"o{name.lower()}", first, row + 1, 0, dict(values)), row, steering.column)
+        self._begin(Subprogram(f"o{name.lower()}", first, row + 1, 0, {**values}), row, steering.column)
         return first
 
     def _goto(self, row: int, steering: Steering) -> int | None:
         return self._go_on(row, self._value(steering, -1), steering.column)
 
     def _if_goto(self, row: int, steering: Steering) -> int | None:
-        return self._goto(row, steering) if self._true(steering) else None
+        return self._goto(row, steering) if self._value(steering) else None
 
-    def _then(self, row: int, steering: Steering) -> int | None:
-        if self._true(steering):
-            self._assign(steering.then, row)
+    def _if_then(self, row: int, steering: Steering) -> int | None:
+        if self._value(steering):
+            self._assign(steering.then)
         return None
-
-    def _while_do(self, row: int, steering: Steering) -> int | None:
-        return None if self._true(steering) else self._macro_loops()[row] + 1
-
-    def _do(self, row: int, steering: Steering) -> int | None:
-        self._macro_loops()
-        return None
-
-    def _end_do(self, row: int, steering: Steering) -> int | None:
-        loops = self._macro_loops()
-        if row not in loops:
-            raise self._fail(row, f"END{steering.label} without DO{steering.label}", column=steering.column)
-        return loops[row]
 
     def _numbered(self, row: int, number: float) -> list[int]:
         program = self._program_of(row)
@@ -208,7 +355,7 @@ class ParametricRun(ValuesRun):
     def _go_on(self, row: int, number: float, column: int) -> int:
         """The block with an N number in the program that runs. Raises `InputError` for a jump into a loop."""
         to = self._block_numbered(row, "the run goes on at", number, column)
-        for start, end in self._macro_loops().items():
+        for start, end in self._structure.end.items():
             if start < to < end and not start < row < end:
                 problem = f"a jump into the loop that begins in line {self._place(start).line}"
                 raise self._fail(row, problem, "a block outside of loops", column=column)
@@ -219,54 +366,40 @@ class ParametricRun(ValuesRun):
         begins = sorted({0, *self._heads().values(), *(first for first, *_ in self._files)})
         return begins[bisect_right(begins, row) - 1]
 
-    def _macro_loops(self) -> dict[int, int]:
-        if self._loops is None:
-            self._loops = loops_of(self._steerings(), self._fail)
-        return self._loops
-
-    def _steerings(self) -> list[tuple[int, Steering]]:
-        """The lines that steer; one that cannot be read is an error where it runs, if it does."""
-        steerings = []
-        for row in range(len(self.lines)):
-            try:
-                steering = self._statement(row).steering
-            except InputError:
-                continue
-            if steering is not None:
-                steerings.append((row, steering))
-        return steerings
-
-    def _ngc(self) -> Structure:
-        if self._structure is None:
-            self._structure = structure_of(self._steerings(), {first for first, *_ in self._files}, self._fail)
-        return self._structure
+    @property
+    def _structure(self) -> Structure:
+        if self._structure_known is None:
+            steerings = []
+            for row in range(len(self.lines)):
+                with suppress(InputError):  # what cannot be read is an error where it runs, if it does
+                    steering = self._statement(row).steering
+                    if steering is not None:
+                        steerings.append((row, steering))
+            self._structure_known = structure_of(steerings, {first for first, *_ in self._files}, self._fail)
+        return self._structure_known
 
     def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
         if self._levels and not ended:
             raise self._unended(self._at)
         if row >= self._main_lines:
             return []
-        subs = self._ngc() if self.family == NGC else Structure()
-        ends = [(start, subs.end[start]) for start in subs.subs.values() if start in subs.end]
+        subs = [(start, self._structure.end.get(start, start)) for start in self._structure.subs.values()]
         heads = [index for index in range(row + 1, self._main_lines) if HEAD.match(self.lines[index])]
         rest = [
             index
             for index in range(row + 1, min([*heads, self._main_lines]))
-            if self.lines[index].strip() not in ("", "%") and not any(a <= index <= b for a, b in ends)
+            if self.lines[index].strip() not in ("", "%") and not any(a <= index <= b for a, b in subs)
         ]
         return beyond_the_end(what, row, len(rest))
 
 
-NGC_STEPS = {
+STEPS = {
     "IF": ParametricRun._if, "ELSEIF": ParametricRun._else, "ELSE": ParametricRun._else,
-    "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._end_while,
-    "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat, "BREAK": ParametricRun._break,
-    "CONTINUE": ParametricRun._continue, "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return_sub,
-    "RETURN": ParametricRun._return_sub, "CALL": ParametricRun._call_sub,
-}  # fmt: skip
-
-
-MACRO_STEPS = {
-    "IF": ParametricRun._if_goto, "THEN": ParametricRun._then, "GOTO": ParametricRun._goto,
-    "WHILE": ParametricRun._while_do, "DO": ParametricRun._do, "END": ParametricRun._end_do,
+    "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._back,
+    "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat,
+    "BREAK": ParametricRun._break, "CONTINUE": ParametricRun._continue,
+    "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return_sub, "RETURN": ParametricRun._return_sub,
+    "CALL": ParametricRun._call_sub,
+    "IF GOTO": ParametricRun._if_goto, "IF THEN": ParametricRun._if_then, "GOTO": ParametricRun._goto,
+    "WHILE LOOP": ParametricRun._while, "END": ParametricRun._back,
 }  # fmt: skip

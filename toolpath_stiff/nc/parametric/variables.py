@@ -15,7 +15,7 @@ from toolpath_stiff.nc.codes.unsettled import know_place
 from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, ToolEntry, tool_of
+from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
 
 # What a program may set: NGC's numbered parameters below those of the control; Macro B's locals and commons.
@@ -29,13 +29,8 @@ TOOL_LENGTHS = range(2001, 2201)  # Fanuc's memory A and Haas: geometry of the l
 LAST_WORK_OFFSET = 6  # G54 to G59 in Macro B's numbers, which are those of LinuxCNC's parameters
 MODAL = range(4001, 4121)
 
-
-@dataclass
-class Level:
-    """The variables of one call: numbered from 1, and named ones."""
-
-    numbered: dict[int, float | None] = field(default_factory=dict)
-    named: dict[str, float] = field(default_factory=dict)
+Which = str | int  # a variable: its name or its number
+Values = dict[Which, float | None]
 
 
 @dataclass
@@ -45,12 +40,12 @@ class Variables:
     Attributes
     ----------
     family
-        `expressions.NGC`, `MACRO_B`, or `EITHER` where the program shows no sign of one.
+        `NGC`, `MACRO_B`, or `EITHER` where the program shows no sign of one.
     state
         Of the control.
     levels
         Local variables, the running call's last.
-    common, named
+    common
         Those of all calls.
     line
         Of the block that runs, for `#<_line>`.
@@ -58,57 +53,55 @@ class Variables:
 
     family: str
     state: State
-    levels: list[Level] = field(default_factory=lambda: [Level()])
-    common: dict[int, float | None] = field(default_factory=dict)
-    named: dict[str, float] = field(default_factory=dict)
+    levels: list[Values] = field(default_factory=lambda: [{}])
+    common: Values = field(default_factory=dict)
     line: int = 0
 
-    def get(self, which: str | int, place: Place) -> float | None:
+    def get(self, which: Which, place: Place) -> float | None:
         """The value of a variable; None: empty. Raises `InputError` for one that is not known."""
+        scope = self._scope(which)
+        if scope is not None and which in scope:
+            return scope[which]
         if isinstance(which, int):
-            return self._numbered(which, place)
-        value = self._named(which)
-        if value is None:
-            problem = f"the variable #<{which.lower()}> is read before it is set"
-            raise place.fail(problem, "it in the same subprogram before; not #<_task>, which a preview has otherwise")
-        return value
+            kept = scope is not None or (which == 0 and self.family != NGC)
+            return self._unset(which, place) if kept else self._system(which, place)
+        if which in PREDEFINED:
+            return PREDEFINED[which](self)
+        problem = f"the variable #<{which.lower()}> is read before it is set"
+        raise place.fail(problem, "it in the same subprogram before; not #<_task>, which a preview has otherwise")
 
     def exists(self, name: str) -> bool:
         """Whether a named variable has a value."""
-        return self._named(name) is not None
+        return name in PREDEFINED or name in (self._scope(name) or ())
 
-    def _named(self, name: str) -> float | None:
-        scope = self.named if name.startswith("_") else self.levels[-1].named
-        return PREDEFINED[name](self) if name in PREDEFINED and name not in scope else scope.get(name)
+    def _scope(self, which: Which) -> Values | None:
+        """Where a variable is kept that a program may set; None for one of the control's."""
+        if isinstance(which, str):
+            return self.common if which.startswith("_") else self.levels[-1]
+        if 1 <= which <= LOCALS[self.family]:
+            return self.levels[-1]
+        return self.common if self._settable(which) else None
 
-    def _numbered(self, number: int, place: Place) -> float | None:
-        if number == 0 and self.family != NGC:
-            return None
-        if 1 <= number <= LOCALS[self.family]:
-            values = self.levels[-1].numbered
-        elif self._settable(number):
-            values = self.common
-        elif self.family == EITHER:
-            problem = f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls"
-            raise place.fail(problem, hint="name it with --dialect")
-        else:
-            value = (self._ngc_system if self.family == NGC else self._macro_system)(number, place)
-            if value is None:
-                problem = (
-                    f"#{number} is a parameter of the control that is not known here, or in a unit of the machine's"
-                )
-                raise place.fail(problem, hint="put the number into the program")
-            return value
-        if number in values:
-            return values[number]
+    def _unset(self, number: int, place: Place) -> float | None:
         if self.family == NGC:
             if number > LOCALS[NGC]:
                 self.state.assume(f"#{number} is read before it is set: 0, as in an empty parameter file")
             return 0.0
-        if self.family == EITHER or number in COMMON[1]:  # beyond #500 a control keeps values from earlier programs
+        if number and (self.family == EITHER or number in COMMON[1]):  # a control keeps those from earlier programs
             reason = "0 on LinuxCNC and empty on Fanuc's and Haas' controls, which keep those from #500 on"
             raise place.fail(f"#{number} is read before it is set: {reason}", f"#{number}=... before, or --dialect")
         return None
+
+    def _system(self, number: int, place: Place) -> float:
+        """The value of a variable in which the control keeps something."""
+        if self.family == EITHER:
+            problem = f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls"
+            raise place.fail(problem, hint="name it with --dialect")
+        value = (self._ngc_system if self.family == NGC else self._macro_system)(number, place)
+        if value is None:
+            problem = f"#{number} is a parameter of the control that is not known here, or in a unit of the machine's"
+            raise place.fail(problem, hint="put the number into the program")
+        return value
 
     def _settable(self, number: int) -> bool:
         """Whether a program may set a numbered variable beyond the local ones."""
@@ -118,18 +111,14 @@ class Variables:
             return (ngc and macro) or number == DEBUG_SWITCH
         return ngc if self.family == NGC else macro
 
-    def set(self, which: str | int, value: float | None, place: Place) -> None:
+    def set(self, which: Which, value: float | None, place: Place) -> None:
         """Set a variable. Raises `InputError` for one that a program cannot set."""
-        if isinstance(which, str):
-            assert value is not None
-            if which in PREDEFINED:
-                raise place.fail(f"#<{which.lower()}> is the control's own", "another name")
-            (self.named if which.startswith("_") else self.levels[-1].named)[which] = value
-        elif 1 <= which <= LOCALS[self.family]:
-            self.levels[-1].numbered[which] = value
-        elif self._settable(which):
-            self.common[which] = value
-        elif self.family != MACRO_B or value is None or not self._set_macro_system(which, value, place):
+        if which in PREDEFINED:
+            raise place.fail(f"#<{str(which).lower()}> is the control's own", "another name")
+        scope = self._scope(which)
+        if scope is not None:
+            scope[which] = value
+        elif self.family != MACRO_B or value is None or not self._set_macro_system(int(which), value, place):
             known = f"#31 to #{NGC_LAST}" if self.family == NGC else "#1 to #33, #100 to #199, #500 to #999"
             raise place.fail(f"#{which} cannot be set here", known)
 
@@ -163,8 +152,6 @@ class Variables:
     def _ngc_system(self, number: int, place: Place) -> float | None:
         if NGC_POSITION <= number < NGC_POSITION + 6:
             return self.position(number - NGC_POSITION, f"#{number}", place)
-        if NGC_POSITION + 6 <= number < NGC_POSITION + 9:
-            return 0.0  # U, V, W, which this machine does not have
         return {NGC_TOOL: float(self.state.tool), NGC_OFFSET: float(self.state.frames.active + 1)}.get(number)
 
     def _macro_system(self, number: int, place: Place) -> float | None:
@@ -216,11 +203,6 @@ class Variables:
         if number in (3003, 3004, 3006):
             word = Word("#", float(number), place.column or 1, f"#{number}")
             state.note(place.line, word, "single block, feed hold or a message: the path does not depend on it")
-            return True
-        if number in TOOL_LENGTHS:
-            state.tools = {} if state.tools is None else state.tools
-            tool = number - TOOL_LENGTHS.start + 1
-            state.tools.setdefault(tool, ToolEntry(tool)).length = value * state.length_scale
             return True
         offset_place = self._offset_place(number)
         if offset_place is None:

@@ -70,7 +70,6 @@ def _headline(good: Sequence[ProgramOutcome]) -> str:
 
 
 def _about(good: Sequence[ProgramOutcome]) -> list[str]:
-    """What all programs have in common."""
     if not good:
         return []
     first = good[0].figures
@@ -146,11 +145,7 @@ def _axis(scale: StiffnessScale) -> Markup:
 def _bar(outcome: ProgramOutcome, scale: StiffnessScale) -> Markup:
     low, mean, high = (outcome.figure(f"{name}_N_per_mm") for name in ("min", "mean", "max"))
     lines = "".join(scale.line(tick, "tick") for tick in scale.ticks)
-    if low is not None and (low > scale.high or high < scale.low):  # only plunges, and these are not on the scale
-        words, above = f"{number(low)} to {number(high)}", low > scale.high
-        end, place, text = ("end", "100%", f"{words} →") if above else ("start", "0", f"← {words}")
-        lines += f'<text class="beyond {end}" x="{place}" y="15">{text}</text>'
-    elif low is not None:
+    if low is not None and low <= scale.high and high >= scale.low:  # those of plunges alone may lie beyond
         kind = "span plunge" if outcome.plunges_only else "span"
         kind += " below" if outcome.figure("lines_below_required") else ""
         x, width = scale.at(low), max(scale.at(high) - scale.at(low), 0.4)
@@ -190,13 +185,11 @@ def _figure(title: str, name: str, hint: str = "", digits: int = 0, flag: bool =
 
 
 def _sorted_by(outcome: ProgramOutcome, name: str) -> str:
-    """The figure to sort by; "" where there is none."""
     figure = outcome.figure(name)
     return "" if figure is None else repr(figure)
 
 
 def _table(good: Sequence[ProgramOutcome]) -> Document | None:
-    """What the template makes the table of; None where there is nothing to draw."""
     scale = _scale(good)
     if scale is None:
         return None
@@ -242,7 +235,6 @@ def _plunges(outcome: ProgramOutcome) -> Cell:
 
 
 def _place(outcome: ProgramOutcome) -> Cell:
-    """Number and text of the weakest line."""
     line = outcome.figure("weakest_line")
     if line is None:
         return "", "-"

@@ -1,7 +1,6 @@
 """Where model and measurements differ before and after a fit, seen from above; measured against modelled."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,35 +24,33 @@ MAPS = "maps from above, X to the right; a point: mean of its readings"
 LEFT = 0.95  # inch
 
 
-@dataclass(frozen=True)
-class Fits:
-    """Readings, and ln(measured / modelled) (n,) of the machine file as given and of the last model.
+def before_after(
+    data: Readings,
+    halves: tuple[FloatArray, FloatArray],
+    last: str,
+    held_out_percent: float | None,
+    refitted_percent: float | None,
+) -> Figure:
+    """Where model and measurements differ, seen from above, before and after, and measured against modelled.
 
-    `last` is what that is called, `held_out_percent` its error at left-out points, `refitted_percent` that of the
-    refitted strut law alone, where that is not the last model.
+    Parameters
+    ----------
+    data, halves
+        Readings, and ln(measured / modelled) (n,) of the machine file as given and of the last model.
+    last, held_out_percent
+        What the last model is called, and its error at left-out points.
+    refitted_percent
+        The error of the refitted strut law alone, where that is not the last model.
     """
-
-    data: Readings
-    before: FloatArray
-    after: FloatArray
-    last: str
-    held_out_percent: float | None
-    refitted_percent: float | None
-
-
-def before_after(fits: Fits) -> Figure:
-    """Where model and measurements differ, seen from above, before and after, and measured against modelled."""
-    data, halves = fits.data, [np.asarray(residual, dtype=float) for residual in (fits.before, fits.after)]
     limit, (rows, columns) = _limit(halves), panels(data)
     block = MAP * len(columns) + 1.1
     width, height = max(1.1 + 2 * block, 11.0), 1.35 + MAP * len(rows) + 0.4 + 4.0
-    step = "" if fits.refitted_percent is None else f"{LAW_REFITTED} alone: {percent(fits.refitted_percent, 2)}; "
+    step = "" if refitted_percent is None else f"{LAW_REFITTED} alone: {percent(refitted_percent, 2)}; "
     note = f"{step}{DEVIATION}, {MINUS_IS_SOFTER}; {MAPS}, {2.4 * _reach(data):.0f} mm wide"
     figure = new_figure(width, height, "Did the error fall, and what remains?", note)
-    held_out = (None, fits.held_out_percent)
-    for half, (name, residual) in enumerate(zip((AS_GIVEN, fits.last), halves, strict=True)):
-        title = _half_title(name, held_out[half], residual)
-        figure.text((LEFT + half * block) / width, 1.0 - 1.0 / height, title, size=10.5, weight="bold")
+    titles = _half_title(AS_GIVEN, None, halves[0]), _half_title(last, held_out_percent, halves[1])
+    for half, residual in enumerate(halves):
+        figure.text((LEFT + half * block) / width, 1.0 - 1.0 / height, titles[half], size=10.5, weight="bold")
         maps(figure, data, residual, (LEFT + half * block, height - 1.35, MAP), limit)
     _scatter_pair(figure, data, halves, directions(data))
     return figure
@@ -92,7 +89,6 @@ def maps(
 
 
 def _half_title(name: str, held_out: float | None, residual: FloatArray) -> str:
-    """Name and errors: the mean as the paper counts it, and at left-out points where it is known."""
     relative = np.expm1(-residual[np.isfinite(residual)])
     text = f"{shortened(plain(name), 44)}   mean error {100 * float(np.mean(np.abs(relative))):.2f} %"
     return text + (f" (at points left out {percent(held_out, 2)})" if held_out is not None else "")
@@ -141,7 +137,6 @@ def _spread(places: FloatArray, step: float) -> FloatArray:
 
 
 def _scatter_pair(figure: Figure, data: Readings, halves: Sequence[FloatArray], along: NDArray[np.str_]) -> None:
-    """Measured against modelled, both on the same scales, beside each other below the maps."""
     across = (figure.get_figwidth() - 1.6) / 2.0  # inches
     measured = n_per_mm_from_n_per_m(data.stiffness)
     modelled = [measured * np.exp(-residual) for residual in halves]

@@ -53,7 +53,6 @@ def regions(study: CaseStudy) -> Figure:
 
 
 def _drawn_heights(study: CaseStudy) -> list[float]:
-    """The heights of the regions, or the lowest and the highest where there are many."""
     heights = sorted({float(row["z_mm"]) for row in study.summary["regions"]})
     return heights if len(heights) <= MOST_PANELS else [heights[0], heights[-1]]
 
@@ -64,7 +63,6 @@ def _left_out(study: CaseStudy, drawn: list[float]) -> str:
 
 
 def _frame(study: CaseStudy) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Limits of X and Y in mm that hold the paths of all regions and the machine's axis, with room around them."""
     points = [mm_from_m(a.samples.position[a.counted, :2]) for a in study.regions.values()]
     points.append(np.zeros((1, 2)))
     low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)

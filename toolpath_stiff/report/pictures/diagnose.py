@@ -1,24 +1,129 @@
-"""Pictures of a diagnosis: what the missing thing looks like, what the data cannot tell apart, before and after."""
+"""Pictures of a diagnosis: the explanations, what the missing thing looks like, before and after."""
+
+import textwrap
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from toolpath_stiff.comparison.residuals import directions
+from toolpath_stiff.diagnosis.examination import HypothesisRow
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent
+from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, deviation_percent
+from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.portrait.words import term_words, variable_label
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.report.colours import BLUE, DIRECTIONS, FAINT, INK, ORANGE
-from toolpath_stiff.report.explanations import probability_text
-from toolpath_stiff.report.pictures.before_after import Fits, before_after
-from toolpath_stiff.report.pictures.ladder import ladder
-from toolpath_stiff.report.pictures.style import new_figure, open_frame, panel
-from toolpath_stiff.report.words import RESIDUAL_AXIS, plain, shortened
+from toolpath_stiff.report.colours import BLUE, CHOSEN, DIRECTIONS, FAINT, GREY, INK, MUTED, ORANGE
+from toolpath_stiff.report.explanations import floor_text, probability_text, remark_text, size_texts
+from toolpath_stiff.report.pictures.before_after import before_after
+from toolpath_stiff.report.pictures.style import Look, new_figure, open_frame, panel
+from toolpath_stiff.report.words import RESIDUAL_AXIS, counted, percent, plain, shortened
 from toolpath_stiff.units import json_number
 
 MOST_BARS = 8
+ROW = 0.47  # inch a candidate
+MOST_PAIRS = 5  # of the ladder; all are in diagnose.json
+BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and arrows stand for more
+
+
+def ladder(diagnosis: Diagnosis) -> Figure:
+    """Every explanation with its error at left-out points and its probability, best first.
+
+    As given, strut law refitted, what no effect describes (if it was weighed), then pairs and effects.
+    """
+    every, standing = diagnosis.rows, len(diagnosis.explanations)
+    rows = [every.as_given, every.refitted, *([every.outside] if every.outside.probability else [])]
+    rows += [*every.pairs[:MOST_PAIRS], *every.candidates]
+    shaded = f"shaded: {counted(standing, 'explanation')} left standing" if standing else "none left"
+    figure = new_figure(
+        14.0, 1.75 + ROW * len(rows), "Which effect explains the data, and how surely?",
+        f"verdict: {diagnosis.verdict}   ·   {shaded}   ·   bar at a dot: standard error of its fall from the refitted "
+        "strut law   ·   grey: not offered",
+    )  # fmt: skip
+    places = ((0.14, 13.79), (0.28, 4.76), (4.9, 4.34), (9.66, 1.82), (11.83, 2.1))
+    every_axes = [panel(figure, left, 0.62, width, ROW * len(rows) + 0.03) for left, width in places]
+    shade, labels, errors, chances, words = every_axes
+    for axes in (shade, labels, words):
+        axes.set_axis_off()
+        axes.set_xlim(0.0, 1.0)
+    for axes in every_axes:
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+    for axes in (errors, chances):
+        axes.patch.set_visible(False)
+        axes.set_yticks([])
+        axes.grid(visible=False, axis="y")
+        open_frame(axes, "left")
+    _labels(labels, rows)
+    _errors(errors, rows, diagnosis)
+    _chances(chances, rows)
+    for y, row in enumerate(rows):
+        lines = textwrap.wrap(remark_text(row).split(":")[0], 31, max_lines=2, placeholder=" ...")
+        words.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if row.offered else MUTED)
+        if row.standing:
+            shade.axhspan(y - 0.5, y + 0.5, color=CHOSEN, lw=0)
+    return figure
+
+
+def _labels(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
+    for y, row in enumerate(rows):
+        small = ", ".join(size_texts(row, intervals=False)) or plain(row.title)
+        weight = "bold" if row.standing else "normal"
+        name_colour, small_colour = (INK, MUTED) if row.offered else (GREY, GREY)
+        axes.text(0.0, y - 0.16, shortened(plain(row.label), 58), va="center", color=name_colour, weight=weight)
+        axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=small_colour, size=8)
+
+
+def _errors(axes: Axes, rows: Sequence[HypothesisRow], diagnosis: Diagnosis) -> None:
+    base, floor = diagnosis.rows.refitted.held_out_error_percent, json_number(diagnosis.noise.floor_percent) or 0.0
+    errors = [error for row in rows for error in (row.held_out_error_percent, row.mean_abs_error_percent)]
+    end = 1.08 * max(error for error in errors if error is not None)
+    end = max(end if base is None else min(end, BEYOND * base), 1.3 * floor, 1e-6)
+    axes.set_xlim(0.0, end)
+    lines = [(floor, f"noise floor {floor_text(diagnosis)}", ORANGE, ":")]
+    lines += [] if base is None else [(base, f"strut law refitted {percent(base)}", INK, "--")]
+    for (value, text, colour, style), side in zip(
+        sorted(lines), ("right", "left"), strict=False
+    ):  # away from each other
+        axes.axvline(value, color=colour, lw=1.3, ls=style, zorder=1)
+        place: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "size": 8.5, "ha": side}
+        axes.annotate(text, (value, 1.0), xytext=(4 if side == "left" else -4, 3), color=colour, **place)
+    for y, row in enumerate(rows):
+        colour = BLUE if row.standing else INK if row.name in (AS_GIVEN, NONE) else MUTED
+        colour = colour if row.offered else GREY
+        within, outside = row.mean_abs_error_percent, row.held_out_error_percent
+        if within is not None and within <= end:
+            axes.plot(within, y, "|", color=colour, ms=11, mew=1.6, zorder=3)
+        if outside is None:
+            continue
+        if outside > end:
+            text = f"{percent(outside)} \N{RIGHTWARDS ARROW}"
+            axes.annotate(text, (end, y), ha="right", va="center", size=9, color=colour)
+            continue
+        axes.plot(outside, y, "o", color=colour, mfc=colour if row.offered else "white", ms=8, zorder=4)
+        if base is not None and row.held_out_gain_in_se and base != outside:
+            # Of the fall of the held-out error, from the fall in standard errors.
+            error = abs((base - outside) / row.held_out_gain_in_se)
+            axes.plot([max(outside - error, 0.0), outside + error], [y, y], color=colour, lw=2.0, zorder=3)
+    axes.set_xlabel("mean |modelled - measured| / measured, %; dot: left out, tick: in sample", size=9)
+
+
+def _chances(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
+    for y, row in enumerate(rows):
+        value = row.probability or 0.0
+        axes.barh(y, value, height=0.5, color=BLUE if row.offered else GREY, zorder=2)
+        inside = value > 0.6
+        look: Look = {"ha": "right", "color": "white"} if inside else {"ha": "left", "color": INK}
+        place = value + (-0.03 if inside else 0.03), y
+        axes.text(*place, probability_text(row.probability), va="center", size=9, zorder=3, **look)
+    _probability_axis(axes, 1.0)
+    axes.set_xlabel("probability", size=9)
+
+
+def _probability_axis(axes: Axes, end: float) -> None:
+    axes.set_xlim(0.0, end)
+    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100 %"])
 
 
 def looks(diagnosis: Diagnosis) -> Figure | None:
@@ -55,7 +160,6 @@ def _points(axes: Axes, data: Readings, portrait: Portrait) -> None:
 
 
 def _bars(axes: Axes, portrait: Portrait) -> None:
-    """Probabilities of links and variables."""
     rows = [(name, weight, BLUE) for name, weight in portrait.links or (("link cannot be told", 0.0),)]
     rows += [(name, weight, ORANGE) for name, weight in portrait.variables]
     rows = [(name, json_number(weight, 3) or 0.0, colour) for name, weight, colour in rows[:MOST_BARS]]
@@ -64,8 +168,8 @@ def _bars(axes: Axes, portrait: Portrait) -> None:
         text = probability_text(value)
         axes.annotate(text, (value, y), xytext=(4, 0), textcoords="offset points", va="center", size=9)
     axes.set_yticks(range(len(rows)), [name for name, *_ in rows], color=INK)
-    axes.set(ylim=(max(len(rows), 5) - 0.5, -0.5), xlim=(0.0, 1.15))
-    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100 %"])
+    axes.set_ylim(max(len(rows), 5) - 0.5, -0.5)
+    _probability_axis(axes, 1.15)
     axes.set_title("which link (blue), what it varies with (orange)", size=9.5, loc="right", weight="normal")
     axes.grid(visible=False, axis="y")
     open_frame(axes, "left")
@@ -76,16 +180,9 @@ def fits(diagnosis: Diagnosis) -> Figure:
     """Where the model fails, and what is left with the best explanation."""
     base, best = diagnosis.rows.refitted, None if diagnosis.verdict == "adequate" else diagnosis.rows.best
     word = "best of the catalogue:" if diagnosis.verdict == "unexplained" else "with"
-    return before_after(
-        Fits(
-            diagnosis.data,
-            diagnosis.as_given.residual,
-            diagnosis.after,
-            f"{word} {plain(best.label)}" if best else LAW_REFITTED,
-            (best or base).held_out_error_percent,
-            base.mean_abs_error_percent if best else None,
-        )
-    )
+    last = f"{word} {plain(best.label)}" if best else LAW_REFITTED
+    held_out, refitted = (best or base).held_out_error_percent, base.mean_abs_error_percent if best else None
+    return before_after(diagnosis.data, (diagnosis.as_given.residual, diagnosis.after), last, held_out, refitted)
 
 
 PICTURES = {"ladder.png": ladder, "portrait.png": looks, "before_after.png": fits}

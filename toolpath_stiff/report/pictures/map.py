@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 
 from toolpath_stiff.analysis.grid import StiffnessMap
 from toolpath_stiff.arrays import FloatArray
@@ -45,13 +44,13 @@ def stiffness_map(planes: StiffnessMap) -> Figure:
         below, first = i + columns >= slices, i % columns == 0
         axes.set(xlabel="X mm" if below else "", ylabel="Y mm" if first else "")
         axes.tick_params(labelbottom=below, labelleft=first)
-    bar = panel(figure, width - 1.2, BOTTOM, 0.2, height - BOTTOM - TOP)
-    colour_scale(drawn, bar, "stiffness along the load, N/mm")
+    colour_scale(
+        drawn, panel(figure, width - 1.2, BOTTOM, 0.2, height - BOTTOM - TOP), "stiffness along the load, N/mm"
+    )
     return figure
 
 
 def _slice(axes: Axes, planes: StiffnessMap, i: int, stiffness: FloatArray, low: float, high: float) -> Any:
-    """One height: colours, contours, the edge of reach, the directions of the joints."""
     x, y = mm_from_m(planes.x), mm_from_m(planes.y)
     mesh = axes.pcolormesh(x, y, stiffness, cmap=STIFFNESS, vmin=low, vmax=high, shading="gouraud")
     if not planes.reachable[i].all() and planes.reachable[i].any():
@@ -59,32 +58,17 @@ def _slice(axes: Axes, planes: StiffnessMap, i: int, stiffness: FloatArray, low:
     axes.set(facecolor=NOWHERE, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), aspect="equal")
     axes.grid(visible=False)
     axes.set_title(f"z = {mm_from_m(planes.z[i]):g} mm", fontsize=10)
-    names = _directions(axes, mm_from_m(planes.model.machine.frame_joints[:, :2]))
+    _directions(axes, mm_from_m(planes.model.machine.frame_joints[:, :2]))
     if np.nanmax(stiffness) > np.nanmin(stiffness):
-        lines = axes.contour(x, y, stiffness, levels=CONTOURS, colors="white", linewidths=0.7, alpha=0.9)
-        _keep_apart(axes, axes.clabel(lines, fontsize=7, fmt=number), names)
+        axes.contour(x, y, stiffness, levels=CONTOURS, colors="white", linewidths=0.7, alpha=0.9)
     return mesh
 
 
-def _keep_apart(axes: Axes, figures: list[Text], names: list[Text]) -> None:
-    """Take away a contour's figure that would lie on a name, on another figure or across the frame."""
-    room = axes.get_window_extent()
-    taken = [name.get_window_extent() for name in names]
-    for figure_text in figures:
-        box = figure_text.get_window_extent()
-        inside = room.x0 < box.x0 and box.x1 < room.x1 and room.y0 < box.y0 and box.y1 < room.y1
-        if not inside or any(box.overlaps(other) for other in taken):
-            figure_text.remove()
-        else:
-            taken.append(box)
-
-
-def _directions(axes: Axes, joints: FloatArray) -> list[Text]:
+def _directions(axes: Axes, joints: FloatArray) -> None:
     """Where struts meet the frame, named at their place; those beyond the edge at the rim, with an arrow."""
     middle, half = (0.5 * np.array([b + s * a for a, b in (axes.get_xlim(), axes.get_ylim())]) for s in (1.0, -1.0))
     beyond = np.max(np.abs(joints - middle) / half, axis=1)  # above 1 outside
     places = np.where(beyond[:, None] > 1.0, middle + RIM * (joints - middle) / beyond[:, None], joints)
-    names: list[Text] = []
     near = np.all(np.abs(places[:, None] - places) < TOGETHER * half, axis=2)
     for struts in (np.flatnonzero(row) for i, row in enumerate(near) if not row[:i].any()):
         place = places[struts[0]]
@@ -95,13 +79,10 @@ def _directions(axes: Axes, joints: FloatArray) -> list[Text]:
         else:
             axes.plot(*place, "^", color=INK, ms=6)
         side, level = np.sign(np.round((place - middle) / half)) if beyond[struts[0]] > 1.0 else (-1.0, -1.0)
-        names.append(
-            axes.annotate(
-                text, place, (-4.0 * side, -4.0 * level), textcoords="offset points", fontsize=7, color=INK, bbox=LABEL,
-                ha=("left", "center", "right")[int(side) + 1], va=("bottom", "center", "top")[int(level) + 1],
-            )
+        axes.annotate(
+            text, place, (-4.0 * side, -4.0 * level), textcoords="offset points", fontsize=7, color=INK, bbox=LABEL,
+            ha=("left", "center", "right")[int(side) + 1], va=("bottom", "center", "top")[int(level) + 1],
         )  # fmt: skip
-    return names
 
 
 PICTURES = {"map.png": stiffness_map}

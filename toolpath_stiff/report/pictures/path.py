@@ -148,7 +148,6 @@ def _polyline(points: FloatArray, segments: IntArray) -> FloatArray:
 
 
 def _frame(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Middle and padded span of the views in mm, axis by axis."""
     span = (high - low) * 1.12
     return (low + high) / 2.0, np.maximum(span, max(THINNEST * float(span.max()), 1.0))
 
@@ -190,7 +189,6 @@ def _legend(
     figure: Figure, corner: tuple[float, float, float, float], analysis: Analysis, limits: tuple[float, float],
     show_plunges: bool,
 ) -> None:  # fmt: skip
-    """Colour scale, and what the other lines mean, in the free corner (x, y, width, height in inches)."""
     width, height = figure.get_size_inches()
     x, y, wide, tall = corner
     across, middle = min(wide, 5.0), y + tall / 2.0
@@ -222,6 +220,5 @@ def segment_classes(stiffness: FloatArray, limits: tuple[float, float]) -> IntAr
     """
     low, high = limits
     missing = np.isnan(stiffness)
-    part = (np.where(missing, low, stiffness) - low) / (high - low)
-    classes = np.clip((part * CLASSES).astype(np.int64), 0, CLASSES - 1)
-    return np.where(missing, UNREACHABLE, classes)
+    classes = (np.where(missing, low, stiffness) - low) / (high - low) * CLASSES
+    return np.where(missing, UNREACHABLE, np.clip(classes.astype(np.int64), 0, CLASSES - 1))

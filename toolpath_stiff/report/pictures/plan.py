@@ -81,8 +81,7 @@ def visits_drawn(
         rows, across, left=0.75 / width, right=1 - right / width, bottom=1.05 / height,
         top=1 - 1.15 / height, wspace=0.12, hspace=0.2,
     )  # fmt: skip
-    gaps = [] if gap is None else [gap.vertical.ravel(), gap.tilted.ravel()]
-    highest = float(np.nanmax(np.concatenate([[1e-6], *gaps])))
+    highest = 1e-6 if gap is None else max(1e-6, float(np.nanmax([gap.vertical, gap.tilted])))
     drawn: Any = None
     for (which, group), (leaning, words) in product(enumerate(groups), enumerate(kinds_of_panel)):
         row, column = which // across * len(kinds_of_panel) + leaning, which % across

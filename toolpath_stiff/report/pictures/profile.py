@@ -24,7 +24,6 @@ OPERATION_COLOURS = ("#ebeff4", "#d9e0e8")  # in turn
 NAME_SIZE, INSET = 8.5, 4.0  # points; pixels before a name
 CURVE_BLUE = "#2b59c3"
 MOST_LINES = 60  # where operations begin
-MOST_ARROWS = 200  # of plunges beyond the axis; more would be a row of arrowheads
 MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seven pixels
 
 
@@ -32,7 +31,7 @@ def profile(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     """Stiffness against path length; on the other machine a second curve; the required level, red below it.
 
     With `show_plunges` the axis holds the plunges beside the headline, and they belong to the curve; else they are
-    grey, and arrows say where they leave the axis.
+    grey.
     """
     strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
     figure = new_figure(WIDTH, HEIGHT)
@@ -64,7 +63,7 @@ def profile(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
 def _curve(
     axes: Axes, analysis: Analysis, columns: int, look: tuple[str, str, int], plunges: str, show_plunges: bool
 ) -> None:
-    """The curve of a machine; the plunges that it leaves out as thin lines, and arrows where they leave the axes.
+    """The curve of a machine; the plunges that it leaves out as thin lines.
 
     `look`: colour of the curve and of the plunges, order. `plunges` that begins with "_" does not enter the legend
     (matplotlib's rule).
@@ -78,19 +77,8 @@ def _curve(
         return
     k = np.where(analysis.set_aside, n_per_mm_from_n_per_m(analysis.at.stiffness), np.nan)
     keep = extremes_by_column(s, k, columns)
-    low, high = axes.get_ylim()
-    above, below = k > high, k < low
     style: Look = {"color": aside, "linewidth": 1.3, "linestyle": (0, (2, 1))}
-    axes.plot(s[keep], k[keep], zorder=order - 0.5, **style)
-    marker = "^" if above.any() else "v" if below.any() else "none"  # in the legend: of what is seen of them
-    axes.plot([], [], marker=marker, markersize=5, label=plunges, **style)
-    for beyond, edge, marker in ((above, 1.0, "^"), (below, 0.0, "v")):
-        start, stop = _runs(beyond)
-        middles = ((s[start] + s[stop]) / 2.0)[:MOST_ARROWS]
-        axes.plot(
-            middles, np.full(len(middles), edge), linestyle="none", marker=marker, markersize=7, color=aside,
-            transform=axes.get_xaxis_transform(), clip_on=False, zorder=6,
-        )  # fmt: skip
+    axes.plot(s[keep], k[keep], zorder=order - 0.5, label=plunges, **style)
 
 
 def _runs(rows: BoolArray) -> tuple[IntArray, IntArray]:
@@ -128,7 +116,6 @@ def _set_limits(axes: Axes, analysis: Analysis, band: tuple[FloatArray, FloatArr
 
 
 def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) -> None:
-    """Shade the spans of path in which `rows` holds."""
     start, stop = _runs(rows)
     if not len(start):
         return
@@ -175,7 +162,6 @@ def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
 
 
 def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
-    """Program lines above the frame, at `height` of its height, where the ticks below fall."""
     end = float(analysis.samples.s[-1])
     where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
     rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)

@@ -3,10 +3,9 @@
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance
+from toolpath_stiff.stiffness.contract import IDLE, Effect, LoadPath, Values, compliance
 
 REFERENCE_FORCE = 500.0  # N, force in the strut at which the compliance is given
-IDLE = 1e-3  # N: below, a strut adds nothing to the tip that could be measured, and the power law would diverge
 SOURCE = "Hertz: 7.5 nm/N a joint at 500 N for steel, ball in socket of effective radius 0.2 m (assumed)"
 MEANING = "secant compliance of one strut's contacts together, at 500 N in the strut"
 

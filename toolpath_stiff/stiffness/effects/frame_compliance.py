@@ -5,10 +5,10 @@ from functools import lru_cache
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, choice, compliance
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Values, choice, compliance
 from toolpath_stiff.stiffness.sizes import sizes_in_words
 
-EXPERIENCE = "engineering experience, no source: stiff machine frames are built for 100 to 500 N/um"
+BUILT = f"{EXPERIENCE}: stiff machine frames are built for 100 to 500 N/um"
 
 
 class FrameCompliance(Effect):
@@ -25,21 +25,20 @@ class FrameCompliance(Effect):
     source = "springs in series; the octahedral frame's vertices carry two struts each"
     parameters = (
         choice("vertex", (0, 3), "numbered by the lowest strut that they hold", "which vertex; 0 is all three"),
-        compliance("radial", 200.0, (2.0, 10.0), EXPERIENCE, "compliance of a vertex towards the machine's axis"),
-        compliance("vertical", 200.0, (2.0, 10.0), EXPERIENCE, "compliance of a vertex up and down"),
+        compliance("radial", 200.0, (2.0, 10.0), BUILT, "compliance of a vertex towards the machine's axis"),
+        compliance("vertical", 200.0, (2.0, 10.0), BUILT, "compliance of a vertex up and down"),
     )
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Quadratic form of the six strut forces, coupling the two of each vertex."""
         form = np.zeros((len(path), 12, 12))
         for number, (pair, radial) in enumerate(frame_vertices(path.machine.frame_joints), start=1):
-            if p["vertex"] not in (0, number):
-                continue
-            outward = path.struts.directions[:, pair] @ radial
-            upward = path.struts.directions[:, pair, 2]
-            springs = p["radial"] * _outer(outward) + p["vertical"] * _outer(upward)
-            first, last = pair
-            form[:, first : last + 1 : last - first, first : last + 1 : last - first] += springs
+            if p["vertex"] in (0, number):
+                carried = np.zeros((len(path), 2, 12))  # outward and upward pull of the two struts
+                carried[:, 0, pair] = path.struts.directions[:, pair] @ radial
+                carried[:, 1, pair] = path.struts.directions[:, pair, 2]
+                springs = np.array([p["radial"], p["vertical"]])
+                form += np.einsum("k,nki,nkj->nij", springs, carried, carried)
         return form
 
     def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:
@@ -74,15 +73,8 @@ def _vertices(joints: bytes) -> list[tuple[list[int], FloatArray]]:
     frame_joints = np.frombuffer(joints).reshape(6, 3)
     from_centre = frame_joints - frame_joints.mean(axis=0)
     order = np.argsort(np.arctan2(from_centre[:, 1], from_centre[:, 0]), kind="stable")
-    pairings = [[sorted((int(order[i]), int(order[(i + 1) % 6]))) for i in range(start, 6, 2)] for start in (0, 1)]
-    pairs = min(pairings, key=lambda ways: sum(np.linalg.norm(frame_joints[i] - frame_joints[j]) for i, j in ways))
-    vertices = []
-    for i, j in sorted(pairs):
-        radial = from_centre[i] + from_centre[j]
-        radial[2] = 0.0
-        vertices.append(([i, j], radial / np.linalg.norm(radial)))
-    return vertices
-
-
-def _outer(component: FloatArray) -> FloatArray:
-    return np.asarray(component[:, :, None] * component[:, None, :])
+    pairings = [np.roll(order, -start).reshape(3, 2) for start in (0, 1)]
+    apart = [np.linalg.norm(np.diff(frame_joints[pairs], axis=1), axis=2).sum() for pairs in pairings]
+    pairs = sorted(sorted(pair) for pair in pairings[int(np.argmin(apart))].tolist())
+    outward = [from_centre[pair].sum(axis=0) * np.array([1.0, 1.0, 0.0]) for pair in pairs]
+    return [(pair, radial / np.linalg.norm(radial)) for pair, radial in zip(pairs, outward, strict=True)]

@@ -3,11 +3,8 @@
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
+from toolpath_stiff.stiffness.contract import EXPERIENCE, IDLE, Effect, LoadPath, Parameter, Values
 
-# N: a strut under less is idle. It would add less than g times this over F^2 to the tip's compliance, some 1e-14 m/N.
-IDLE = 1e-3
-EXPERIENCE = "engineering experience, no source"
 MEANING = "motion of one strut to one side before it carries: half its total play"
 
 

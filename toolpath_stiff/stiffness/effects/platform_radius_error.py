@@ -3,9 +3,7 @@
 import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.contract import Effect, Values, length_error
-
-EXPERIENCE = "engineering experience, no source"
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, Values, length_error
 
 
 class PlatformRadiusError(Effect):

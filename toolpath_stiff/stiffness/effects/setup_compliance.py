@@ -3,10 +3,7 @@
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, compliance, setup_parameter
-from toolpath_stiff.stiffness.sizes import sizes_in_words
-
-EXPERIENCE = "engineering experience, no source"
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Values, compliance, setup_parameter
 
 
 class SetupCompliance(Effect):
@@ -18,6 +15,8 @@ class SetupCompliance(Effect):
     equation = "c += d^T diag(c_x, c_y, c_z) d where setup = s"
     source = "springs in series, base axes; the paper measured its upper plane on a riser (Figure 6)"
     needs = ("setup",)
+    clause = "set-up {setup} (riser or fixture) gives way by about {sizes}"
+    parts = tuple((axis, f"nm/N along {axis.upper()}") for axis in "xyz")
     parameters = (
         setup_parameter("name of the set-up"),
         *(
@@ -33,8 +32,3 @@ class SetupCompliance(Effect):
         form = np.zeros((len(path), 12, 12))
         form[path.setup == p["setup"], 6:9, 6:9] = np.diag([p["x"], p["y"], p["z"]])
         return form
-
-    def finding(self, p: Values) -> str:
-        """Which part gives way, by how much."""
-        sizes = sizes_in_words([(p[axis], f"nm/N along {axis.upper()}") for axis in "xyz"])
-        return f"set-up {p['setup']} (riser or fixture) gives way by about {sizes}"

@@ -4,7 +4,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values, at_the_tip, compliance
-from toolpath_stiff.stiffness.sizes import sizes_in_words
 
 RADIAL = (
     "FAG spindle bearing catalogue, pairs 7014 to 7020: 0.4 to 1.8 nm/N at the bearings; M. Tsutsumi in "
@@ -25,6 +24,8 @@ class SpindleCompliance(Effect):
     link = "tool"
     equation = "c += (R^T d)^T diag(c_r, c_r, c_a) (R^T d)"
     source = "springs in series; the load's components in platform axes"
+    clause = "spindle, holder and tool give way by about {sizes} the tool axis"
+    parts = (("radial", "nm/N across"), ("axial", "nm/N along"))
     parameters = (
         compliance("radial", 1000.0, (1.0, 30.0), RADIAL, "compliance across the tool axis"),
         compliance("axial", 1000.0, (2.6, 7.9), AXIAL, "compliance along the tool axis"),
@@ -34,8 +35,3 @@ class SpindleCompliance(Effect):
         """Quadratic form of the tip force alone."""
         on_platform = np.diag([p["radial"], p["radial"], p["axial"]])
         return at_the_tip(path, path.rotation @ on_platform @ np.swapaxes(path.rotation, 1, 2))
-
-    def finding(self, p: Values) -> str:
-        """Which part gives way, by how much."""
-        sizes = sizes_in_words([(p["radial"], "nm/N across"), (p["axial"], "nm/N along")])
-        return f"spindle, holder and tool give way by about {sizes} the tool axis"

@@ -3,11 +3,10 @@
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, at_the_tip, compliance
-from toolpath_stiff.stiffness.sizes import sizes_in_words
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Parameter, Values, at_the_tip, compliance
 
-EXPERIENCE = "engineering experience, no source: machine beds are built for 100 to 500 N/um"
-LEVER = EXPERIENCE + " at a lever of about 1 m"
+BUILT = f"{EXPERIENCE}: machine beds are built for 100 to 500 N/um"
+LEVER = f"{BUILT} at a lever of about 1 m"
 
 
 class TableCompliance(Effect):
@@ -22,9 +21,11 @@ class TableCompliance(Effect):
     link = "table"
     equation = "c += d^T diag(c_x, c_y, c_z) d + c_t ((p x d)_x^2 + (p x d)_y^2)"
     source = "springs in series, base axes"
+    clause = "the table gives way by about {sizes}"
+    parts = (*((axis, f"nm/N along {axis.upper()}") for axis in "xyz"), ("rocking", "nrad/(N m) in rocking"))
     parameters = (
         *(
-            compliance(axis, 200.0, (2.0, 10.0), EXPERIENCE, f"compliance of the table along {axis.upper()}")
+            compliance(axis, 200.0, (2.0, 10.0), BUILT, f"compliance of the table along {axis.upper()}")
             for axis in "xyz"
         ),
         Parameter(
@@ -40,10 +41,3 @@ class TableCompliance(Effect):
         moment[:, 1, 0], moment[:, 1, 2] = z, -x
         shift = np.diag([p["x"], p["y"], p["z"]])
         return at_the_tip(path, shift + p["rocking"] * np.swapaxes(moment, 1, 2) @ moment)
-
-    def finding(self, p: Values) -> str:
-        """Which part gives way, by how much."""
-        sizes = sizes_in_words(
-            [*((p[axis], f"nm/N along {axis.upper()}") for axis in "xyz"), (p["rocking"], "nrad/(N m) in rocking")]
-        )
-        return f"the table gives way by about {sizes}"

@@ -3,9 +3,9 @@
 import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.contract import Effect, Values, length_error
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, Values, length_error
 
-EXPERIENCE = "engineering experience, no source: the tool of the neighbouring pocket"
+POCKET = f"{EXPERIENCE}: the tool of the neighbouring pocket"
 
 
 class ToolLengthError(Effect):
@@ -18,7 +18,7 @@ class ToolLengthError(Effect):
     source = "geometry"
     unknown_to_control = True
     clause = "the tool is about {error} mm {error:longer/shorter} than the length that was entered"
-    parameters = (length_error((-10.0, 10.0), EXPERIENCE, "true tool length less the entered one"),)
+    parameters = (length_error((-10.0, 10.0), POCKET, "true tool length less the entered one"),)
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Platform joints further above the tip."""

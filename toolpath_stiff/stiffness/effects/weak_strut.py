@@ -3,10 +3,9 @@
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, choice
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Parameter, Values, choice
 from toolpath_stiff.stiffness.sizes import about
 
-EXPERIENCE = "engineering experience, no source"
 MEANING = "stiffness of this strut over that of the others"
 
 
@@ -31,6 +30,5 @@ class WeakStrut(Effect):
         return more
 
     def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
-        change = 100.0 * (p["factor"] - 1.0)
-        return f"strut {p['strut']} is about {about(change)} % too {'soft' if change < 0.0 else 'stiff'}"
+        """Which strut, by how much."""
+        return f"strut {p['strut']} is about {about(100.0 * (1.0 - p['factor']))} % too soft"

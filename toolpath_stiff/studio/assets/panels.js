@@ -90,7 +90,7 @@ function portrait(p, act) {
       { id: "draft" }), h("span", { class: "muted" },
       "a commented file that competes with the others; new readings must confirm it")) : null);
 }
-// Effects of one's own: the working copy is edited here or in an editor; each save is loaded, a fault stands below.
+// Effects of one's own, edited here: each save is loaded, a fault stands below.
 function ownEffects(state, act) {
   if (!state.own_effects.length) return h("p", { class: "muted live" },
     "Drop a Python file with an effect of your own on the page: it joins these.");
@@ -99,13 +99,12 @@ function ownEffects(state, act) {
       "aria-describedby": `own-fault-${k}` });
     area.value = drafts.get(own.file) ?? own.text;
     area.addEventListener("input", () => drafts.set(own.file, area.value));
+    const edit = () => { drafts.set(own.file, own.text); act.redraw(); };
     const save = () => { drafts.delete(own.file); act({ do: "save_effect", file: own.file, text: area.value }); };
-    return h("div", { class: "own" }, h("code", {}, own.file), own.copy
-      ? [h("p", { class: "muted" }, "Edit it here, or in an editor: ", h("code", {}, own.copy),
-        ". Its code is run each time it is saved."), area,
+    return h("div", { class: "own" }, h("code", {}, own.file), drafts.has(own.file) || own.fault
+      ? [h("p", { class: "muted" }, "Its code is run each time it is saved."), area,
         h("div", { class: "actions" }, button("Save and load", save, { id: `own-save-${k}`, class: "main live" }))]
-      : h("div", { class: "actions" }, button("Edit", () => act({ do: "edit", file: own.file }),
-        { id: `own-edit-${k}` })),
+      : h("div", { class: "actions" }, button("Edit", edit, { id: `own-edit-${k}` })),
       own.fault ? h("p", { class: "warning", id: `own-fault-${k}`, role: "alert" }, own.fault) : null);
   })];
 }
@@ -209,8 +208,8 @@ function nextPanel(state, act) {
     p ? [list(p.text),
       h("p", {}, `${p.poses} poses, ${p.readings} readings, about ${Math.round(p.minutes)} minutes. `
         + `Diamonds in the machine.`),
-      h("div", { class: "actions live" }, h("a", { class: "button", id: "plan-file", href: `/case/${p.file}` },
-        "Download plan.csv"), button("Print", () => print()),
+      h("div", { class: "actions live" }, h("a", { class: "button", id: "plan-file",
+        href: `/case/${p.result}/plan.csv` }, "Download plan.csv"), button("Print", () => print()),
         state.exercise.folder ? button("Measure on the exercise's machine", () => act({ do: "measure" }),
           { id: "measure", class: "main live" }) : h("span", { class: "muted" },
           "fill in the stiffness and drop the file on the page")),
@@ -292,9 +291,10 @@ function setUp(p, state, act) {
       : "move the work first")),
     made ? h("div", { id: "set-up-files" }, made.warnings.map((text) => h("p", { class: "warning" }, text)),
       offsets(made.offset_blocks),
-      h("p", { class: "actions live" }, [["sheet", "Set-up sheet"], ["written", made.written.endsWith("not_written.txt")
-        ? "Why the program was not written" : "Program for this placement"], ["page", "Report"]]
-        .map(([key, label]) => h("a", { class: "button", id: `set-up-${key}`, href: `/case/${made[key]}`,
+      h("p", { class: "actions live" }, [["sheet", "Set-up sheet", `${made.result}/setup.pdf`],
+        ["written", made.written.endsWith("not_written.txt") ? "Why the program was not written"
+          : "Program for this placement", made.written], ["page", "Report", `${made.result}/report.html`]]
+        .map(([key, label, file]) => h("a", { class: "button", id: `set-up-${key}`, href: `/case/${file}`,
           target: key === "page" ? "_blank" : null, rel: "noreferrer" }, label)))) : null,
   ];
 }
@@ -397,11 +397,10 @@ function historyPanel(state, act) {
   // broken between words alone
   const words = (text) => text.split(" ").flatMap((word, k) => [k ? " " : "", h("span", {}, word)]);
   const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, words(text)), copy(text)) : null);
-  const step = (one, undone) => h("div", { class: undone ? "step undone" : "step" }, h("b", {}, one.text), undone
-    ? " (undone)" : null, line(one.command), line(one.python));
+  const step = (one) => h("div", { class: "step" }, h("b", {}, one.text), line(one.command), line(one.python));
   return [h("h2", {}, "What was done"), h("p", { class: "muted" },
-    "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."), [...state.history].reverse()
-    .map((one) => step(one, false)), state.undone.map((one) => step(one, true))];
+    "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."),
+    [...state.history].reverse().map(step)];
 }
 const PANELS = [["effects", "Effects", effectsPanel], ["why", "Why believe it?", whyPanel], ["next", "Next", nextPanel],
   ["program", "Program", programPanel], ["placement", "Placement", placementPanel], ["exercise", "Exercise",

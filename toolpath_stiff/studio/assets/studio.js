@@ -284,7 +284,7 @@ function draw() {
   $("sentence").replaceChildren(...(waiting ? [waiting] : [`${v.sentence}.`,
     h("small", {}, v.text.slice(v.sentence.length + 2))]));
   $("gauge").replaceChildren(gaugeOf(state));
-  for (const [id, many] of [["undo", state.history[1]], ["redo", state.undone[0]]]) if ($(id)) $(id).disabled = !many;
+  if ($("undo")) $("undo").disabled = !state.history[1];
   scene.paths = [];
   if (state.program?.path && here >= state.program.path.s_mm.length) here = scene.sample = -1;
   classify();
@@ -356,7 +356,7 @@ async function take(file, run = false) {
 window.tpsStudio = { spots: () => scene.spots.map((spot) => [...spot]) };  // where readings stand on the screen
 if (readonly) draw();
 else {
-  for (const name of ["undo", "redo", "cancel"]) $(name).addEventListener("click", () => act({ do: name }));
+  for (const name of ["undo", "cancel"]) $(name).addEventListener("click", () => act({ do: name }));
   $("open").addEventListener("click", () => $("file").click());
   $("file").addEventListener("change", async (e) => { for (const file of ordered(e.target.files)) await take(file);
     e.target.value = ""; });
@@ -366,8 +366,7 @@ else {
     for (const file of ordered(e.dataTransfer.files)) await take(file); });
   addEventListener("keydown", (e) => {
     if (!(e.ctrlKey || e.metaKey) || e.target.matches("textarea, input[type=number], input[type=text]")) return;
-    const name = { z: "undo", y: "redo" }[e.key.toLowerCase()];
-    if (name) { e.preventDefault(); act({ do: name }); }
+    if (e.key.toLowerCase() === "z") { e.preventDefault(); act({ do: "undo" }); }
   });
   const news = new EventSource("/events");
   news.onmessage = (e) => {

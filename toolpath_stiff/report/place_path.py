@@ -1,10 +1,10 @@
-"""The page of a search for placements, and the path as it draws it.
+"""The path as the page of a search for placements draws it.
 
 A page cannot hold every sample of a long program at sixty placements. The ends of every cut and its corners are kept
 first, then samples evenly along the path; the stiffness is evaluated at just these.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.placement.paths import placed_path
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.rows import PlacementRow
-from toolpath_stiff.report.colours import page_colours
-from toolpath_stiff.report.pages import render
-from toolpath_stiff.report.words import machine_text, plain
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number, rad_from_deg
 
@@ -27,43 +24,6 @@ VALUES = 48_000  # points times placements that the page holds, some 300 kB
 ENDS = (0.05, 0.95)  # of the path's length, all placements together, between which the colours run
 CORNER = rad_from_deg(10.0)  # a sharper one is kept before samples along straight cuts are
 SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
-
-
-def page_pieces(placed: Placement) -> Iterator[str]:
-    """The page, in pieces."""
-    best, present = placed.best, placed.present
-    path, note = drawn_path(placed, [*placed.front, *([present] if present else [])])
-    data = {
-        "front": [vars(row) for row in placed.front],
-        "chosen": (placed.chosen.number or 0) - 1,
-        "recommended": placed.search.recommended - 1,
-        "before": vars(present) if present else None,
-        "before_reason": plain(placed.present_reason),
-        "force": best.force,
-        "keepouts": [
-            {"name": plain(box.name), "box": _corners(mm_from_m(box.corners))} for box in placed.task.rules.keepouts
-        ],
-        "workspace": _corners(mm_from_m(best.machine.limits.workspace)),
-        **path,
-        **page_colours(),
-    }
-    return render(
-        "place.html",
-        styles=["viewer.css", "place.css"],
-        scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
-        data=data,
-        title=f"Placements of {placed.best.program.name}",
-        about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
-        objective=placed.task.rules.objective,
-        load=str(best.load),
-        note=note,
-        warnings=placed.warnings,
-    )
-
-
-def _corners(corners: FloatArray) -> list[list[float | None]]:
-    """Lower and upper corner in mm; None where the machine file sets no bound."""
-    return [[round(v, 3) if np.isfinite(v) else None for v in corner] for corner in corners.tolist()]
 
 
 def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Document, str]:
@@ -140,8 +100,7 @@ def thinned_rows(samples: Samples, cut: IntArray, points: int) -> IntArray:
     corners = np.flatnonzero((np.diff(cut) == 0) & (np.diff(samples.move) != 0) & (cosine < np.cos(CORNER)))
     corners = _evenly(corners, max(0, int(SHARE_OF_CORNERS * points) - len(kept)) // 2)
     kept = np.unique(np.concatenate([kept, corners, corners + 1]))  # both of a corner's samples: the tangent jumps
-    others = np.setdiff1d(np.arange(n), kept)
-    return np.sort(np.concatenate([kept, _evenly(others, points - len(kept))]))
+    return np.sort(np.concatenate([kept, _evenly(np.setdiff1d(np.arange(n), kept), points - len(kept))]))
 
 
 def _evenly(rows: IntArray, count: int) -> IntArray:
