@@ -236,7 +236,7 @@ def test_between_two_effects_before_any_data(tmp_path, capsys):
         (["--loads", "0,500"], "loads of 0, 500 N"),
         (["--max-tilt", "95"], "less than 90"),
         (["--noise", "0"], "more than 0"),
-        (["--seed", "-1"], "0 or more"),
+        (["--seed", "-1"], "at least 0"),
         (["no_such_file.csv"], "no_such_file.csv"),
     ],
 )
