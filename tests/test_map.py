@@ -80,7 +80,7 @@ def test_out_of_reach_is_marked(tmp_path, monkeypatch, capsys):
         (["--z", "nan"], "expected finite numbers"),
         (["--z", "9000"], "nothing of the map is within reach"),
         (["--slices", "400,400"], "each height once"),
-        (["--points", "1"], "2 to 2001"),
+        (["--points", "1"], "at most 2001"),
         (["--tilt", "10,0"], "A,B,C"),
         (["--x", "-1e9:1e9"], "100 m"),
     ],

@@ -14,6 +14,7 @@ from toolpath_stiff.analysis.loads import PLUNGES_ONLY
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import FIGURES, weighted_figures
 from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 
@@ -155,7 +156,7 @@ def test_a_tool_of_two_lengths_has_two_rows() -> None:
 
 def test_the_approach_before_a_tools_length_is_in_force_is_the_tools_time() -> None:
     text = "T3 M6\nG0 X100\nG43 H3 Z20\nG1 Z0 F600\nX90\n"
-    program = parse_program(text, "part.nc", tools={3: ToolEntry(3, length=100.0)})
+    program = parse_program(text, "part.nc", controller=Controller(tools={3: ToolEntry(3, length=100.0)}))
     analysis = analyze(load_machine("nist"), program)
     (row,) = analysis.to_dict()["per_tool"]
     assert row["length_mm"] == pytest.approx(100.0)

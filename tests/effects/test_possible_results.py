@@ -25,8 +25,8 @@ from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.core import compliance_along
 from toolpath_stiff.stiffness.effects.frame_compliance import FrameCompliance
 from toolpath_stiff.stiffness.effects.joint_compliance import JointCompliance
+from toolpath_stiff.stiffness.exact import is_compliance
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.stiffness.possible import is_compliance
 
 PART = "G21 G90\nG0 X0 Y0 Z0\nG1 X10 F100\nM2\n"
 TIP = np.linspace([0.0, 0.0, 0.8], [0.2, 0.1, 0.9], 3)

@@ -16,6 +16,7 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.checking import check
+from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry
@@ -31,7 +32,7 @@ def checked(text: str, **options):
 @pytest.mark.parametrize("seed", range(12))
 def test_extents_hold_the_sampled_path_and_no_more(seed):
     text = Writer(seed).program() if seed < 8 else cycle_program(seed)
-    moves = parse_program(text, tools={n: ToolEntry(n, z, 6.0) for n, z in TOOLS.items()}).moves
+    moves = parse_program(text, controller=Controller(tools={n: ToolEntry(n, z, 6.0) for n, z in TOOLS.items()})).moves
     found = extents(moves)
     samples = sample_moves(moves, step=1e-4)
     for axis, name in enumerate("xyz"):

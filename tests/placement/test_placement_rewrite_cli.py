@@ -83,7 +83,7 @@ def test_nothing_asked_nothing_written():
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("pocket.nc", ["--decimals", "5"], "--decimals without --write"),
+        ("pocket.nc", ["--decimals", "5"], "--decimals or --linearise without --write"),
         ("pocket.nc", ["--linearise", "0.01"], "--linearise without --write"),
         ("pocket.nc", ["--write", "placed.nc", "--decimals", "0"], "--decimals 0"),
         ("pocket.nc", ["--write", str(PROGRAMS / "pocket.nc")], "is read here and would be written over"),

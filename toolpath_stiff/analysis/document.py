@@ -15,8 +15,9 @@ from toolpath_stiff.analysis.statistics import (
 from toolpath_stiff.analysis.uncertainty import band_figures
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.stiffness.model import acting_effects, conditions_stated, effects_stated
-from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m, pose_in_mm
+from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
 
 
 def assumptions(analysis: EvaluatedPath) -> list[str]:

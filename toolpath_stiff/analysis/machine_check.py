@@ -1,4 +1,4 @@
-"""Slips in a machine file: whether struts, neutral pose and joints are plausible, each joint against the others."""
+"""Slips in a machine file: whether struts, neutral pose and joints are plausible."""
 
 from __future__ import annotations
 
@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate_poses
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
-from toolpath_stiff.units import Pose, mm_from_m, n_per_um_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
 
 # N/um of a strut: screws, bearings and joints in series. Below, it is no machine's; above, no screw's.
 STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
+ODD_STRUT, MOST_ODD = 0.005, 2  # of the usual length: no other strut is nearer to one that a slip has moved
 # N/um at the tool: "usually less than 1" for articulated robots, "very often greater than 50" for machining centres
 # (Pan, Zhang, Zhu, Wang 2006, J. Mater. Process. Technol. 173, 301).
 ROBOT, MACHINING_CENTRE, BEYOND = 1.0, 50.0, 1000.0
@@ -39,8 +41,6 @@ class MachineCheck(Result):
         What may be meant but should be looked at.
     neutral, origin
         Stiffness and reach at the neutral pose and at the default origin.
-    symmetry
-        Of the joints.
 
     Examples
     --------
@@ -48,8 +48,8 @@ class MachineCheck(Result):
     >>> found = tps.Machine.load("nist").check()
     >>> found.good, found.to_dict()["wrong"], found.warnings, len(found.to_frame())
     (True, [], [], 0)
-    >>> found.file, found.symmetry.kind
-    ('nist', 'three-fold')
+    >>> found.file
+    'nist'
     >>> type(found.plot()).__name__
     'Figure'
     """
@@ -63,7 +63,6 @@ class MachineCheck(Result):
     doubtful: list[str]
     neutral: PoseStiffness
     origin: PoseStiffness
-    symmetry: Symmetry
 
     @property
     def good(self) -> bool:
@@ -111,12 +110,11 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
     """
     machine = model.given or model.machine
     neutral, origin = (_at(model, pose) for pose in (machine.limits.neutral_pose, machine.default_origin))
-    symmetry = find_symmetry(machine)
     wrong = _struts(machine)
     for name, report in (("neutral pose", neutral), ("default origin", origin)):
         if not report.reach.reachable[0]:
             wrong.append(f"the {name} is out of reach: {report.reach.describe(0)}")
-    doubtful = [describe_stray(stray, symmetry.kind) for stray in symmetry.strays]
+    doubtful = _odd_struts(neutral.strut_lengths[0])
     if neutral.reach.reachable[0]:
         doubtful += _stiffness(neutral)
     if neutral.extrapolated[0]:
@@ -126,7 +124,7 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
     if same:
         sections = ", ".join(f"[{section}]" for section in same)
         doubtful.append(f"the remark of {sections} still says {TEMPLATE_REMARK!r}: say where its figures are from")
-    return MachineCheck(file, model, wrong, doubtful, neutral, origin, symmetry)
+    return MachineCheck(file, model, wrong, doubtful, neutral, origin)
 
 
 def _at(model: StiffnessModel, pose: Pose) -> PoseStiffness:
@@ -139,6 +137,18 @@ def _struts(machine: Hexapod) -> list[str]:
     law = machine.strut_law
     ends = [(x, float(law.stiffness(np.array(x)))) for x in machine.limits.strut_length if np.isfinite(x)]
     return _implausible("[strut_law]", law.points) or _implausible("the strut law at an end of the travel", ends)
+
+
+def _odd_struts(lengths: FloatArray) -> list[str]:
+    """Struts whose length m no other one comes near: machines have a few lengths, alike by threes or sixes."""
+    apart = np.abs(lengths[:, None] - lengths) + np.diag(np.full(len(lengths), np.inf))
+    usual = float(np.median(lengths))
+    odd = np.flatnonzero(apart.min(axis=1) > ODD_STRUT * usual)
+    return [
+        f"strut {i + 1} is {mm_from_m(float(lengths[i])):.0f} mm long at the neutral pose, most are about "
+        f"{mm_from_m(usual):.0f} mm: is a sign of one of its joints flipped, or are two numbers exchanged?"
+        for i in (odd if len(odd) <= MOST_ODD else [])
+    ]
 
 
 def _implausible(where: str, struts: list[tuple[float, float]]) -> list[str]:

@@ -17,9 +17,8 @@ from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.nc.checking import check
+from toolpath_stiff.nc.checking import ERROR, WARNING, Finding, UsedCode, check, in_order
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
-from toolpath_stiff.nc.findings import ERROR, WARNING, Finding, UsedCode, in_order
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.request import Request

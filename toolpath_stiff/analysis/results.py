@@ -20,16 +20,17 @@ from toolpath_stiff.analysis.evaluation import Evaluation, Progress, evaluate
 from toolpath_stiff.analysis.loads import Load, parse_load
 from toolpath_stiff.analysis.statistics import EvaluatedPath, sample_columns
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import without_nan
+from toolpath_stiff.documents import number, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import Samples, sample_moves
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model, condition_warnings
-from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,8 +18,9 @@ from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.operations import Operation, Operations, operations
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
 # Of `samples.csv`, Parquet and the DataFrame, with their decimals.

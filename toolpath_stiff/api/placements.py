@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from toolpath_stiff.api.inputs import (
 )
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import ReadProgram
@@ -35,8 +36,10 @@ from toolpath_stiff.placement.paths import work_path
 from toolpath_stiff.placement.placing import place_again, place_program
 from toolpath_stiff.placement.result import Placement
 from toolpath_stiff.placement.task import PlacementTask, Rewriting
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
+from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
 FARTHEST_TURN_DEG = 720.0
@@ -65,7 +68,7 @@ def place(
     points: Annotated[int, Option("--points", at_least=2, at_most=MOST_FRONT_POINTS)] = 60,
     seed: Annotated[int, Option("--seed", at_least=0)] = 1,
     pick: Annotated[int | None, Option("--pick")] = None,
-    earlier: Placement | str | Path | Mapping[str, Any] | None = None,
+    earlier: Placement | str | Path | Document | None = None,
     origin_mm_deg: Origin = None,
     load: LoadDirection = LOAD,
     step_mm: Step = 1.0,
@@ -138,15 +141,13 @@ def place(
     []
     """
     on, part = machine_from(machine), program_from(program)
-    model = on.running(part)
-    default = model.machine.default_origin
-    origin = origin_si(origin_mm_deg)
-    read = part.moves(origin, default)
+    model, origin = on.running(part), origin_si(origin_mm_deg)
+    read, present, again = _read(part, model, origin)
     task = PlacementTask(
         model=model,
         program=read,
-        present=origin or (read.origin if read.origin_source == "program" else default),
-        read=lambda origin: part.moves(origin, default),
+        present=present,
+        read=again,
         bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
@@ -161,16 +162,24 @@ def place(
     return replace(placed, inputs=(*part.inputs, *on.inputs))
 
 
+def _read(
+    part: Program, model: StiffnessModel, origin: Pose | None
+) -> tuple[ReadProgram, Pose, Callable[[Pose], ReadProgram]]:
+    """A program where it is now, where that is, and what reads it for another placement."""
+    default = model.machine.default_origin
+    read = part.moves(origin, default)
+    present = origin or (read.origin if read.origin_source == "program" else default)
+    return read, present, lambda other: part.moves(other, default)
+
+
 def _rewriting(
     part: Program, write: str | Path | None, decimals: int | None, linearise_mm: float | None
 ) -> Rewriting | None:
-
+    chord = None if linearise_mm is None else m_from_mm(linearise_mm)
     if write is not None:
-        chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-        return Rewriting(str(write), decimals, chord, part.read_as)
-    if decimals is not None or linearise_mm is not None:
-        option = "decimals" if decimals is not None else "linearise"
-        raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
+        return Rewriting(str(write), decimals, chord, part.request.controller)
+    if decimals is not None or chord is not None:
+        raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     return None
 
 
@@ -188,19 +197,15 @@ def _bounds(
 ) -> Bounds:
     """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     heights = sorted(set(map(float, heights_mm)))
-    sides = [None if side is None else _pair(side) for side in box]
-    if heights:
-        sides[2] = (heights[0], heights[-1])
+    sides = [*box[:2], (heights[0], heights[-1]) if heights else box[2]]
     workspace = mm_from_m(machine.limits.workspace).T.tolist()
-    for i, (low, high) in enumerate(workspace):
-        if sides[i] is None and not np.isfinite(high - low):
-            raise InputError(f"the machine file bounds no workspace in {'xyz'[i]}", hint=f"give --{'xyz'[i]} LO:HI")
-    lengths = np.array([side or reach for side, reach in zip(sides, workspace, strict=True)])
+    for axis, side, reach in zip("xyz", sides, workspace, strict=True):
+        if side is None and not np.isfinite(reach).all():
+            raise InputError(f"the machine file bounds no workspace in {axis}", hint=f"give --{axis} LO:HI")
+    lengths = np.array([_pair(reach if side is None else side) for side, reach in zip(sides, workspace, strict=True)])
     angles = np.array([_pair(turn) for turn in turns])
-    if not np.abs(lengths).max() <= FARTHEST_MM:
-        raise InputError("bounds beyond 100 m", expected="mm")
-    if not np.abs(angles).max() <= FARTHEST_TURN_DEG:
-        raise InputError(f"a turn or tilt beyond {FARTHEST_TURN_DEG:g} degrees", expected="at most two whole turns")
+    if not np.abs(lengths).max() <= FARTHEST_MM or not np.abs(angles).max() <= FARTHEST_TURN_DEG:
+        raise InputError("bounds beyond reason", expected=f"within 100 m and {FARTHEST_TURN_DEG:g} degrees")
     low, high = np.concatenate([m_from_mm(lengths), rad_from_deg(angles)]).T
     return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
 
@@ -233,10 +238,10 @@ class PlacementTrial:
     def at(self, origin_mm_deg: Sequence[float]) -> dict[str, float | None]:
         """Mean, range and weakest in N/mm, margins as shares of a limit's span; None where a cut is out of reach."""
         figures = self._evaluator.figures(np.array([pose_si("origin", origin_mm_deg)]))
-        names = {"mean_N_per_mm": figures.mean, "range_N_per_mm": figures.spread, "min_N_per_mm": figures.lowest}
-        values = {name: float(n_per_mm_from_n_per_m(value[0])) for name, value in names.items()}
-        values |= {"margin": float(figures.margin[0]), "rapid_margin": float(figures.rapid_margin[0])}
-        return {name: value if np.isfinite(value) else None for name, value in values.items()}
+        sizes = {"mean_N_per_mm": figures.mean, "range_N_per_mm": figures.spread, "min_N_per_mm": figures.lowest}
+        values = {name: n_per_mm_from_n_per_m(size) for name, size in sizes.items()}
+        values |= {"margin": figures.margin, "rapid_margin": figures.rapid_margin}
+        return {name: float(value[0]) if np.isfinite(value[0]) else None for name, value in values.items()}
 
 
 @checked
@@ -261,10 +266,8 @@ def try_placement(
     """
     on, part = machine_from(machine), program_from(program)
     model, direction = on.running(part), parse_load(load)
-    default = model.machine.default_origin
-    read = part.moves(None, default)
-    present = read.origin if read.origin_source == "program" else default
-    path = work_path(read, m_from_mm(step_mm), direction, present, lambda origin: part.moves(origin, default))
+    read, present, again = _read(part, model, None)
+    path = work_path(read, m_from_mm(step_mm), direction, present, again)
     return PlacementTrial(read, Evaluator(model, path, direction, force_N))
 
 
@@ -309,4 +312,6 @@ def rewrite(
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
+    return rewrite_program(
+        part.moves(new), new, old, decimals=decimals, linearise=chord, control=part.request.controller
+    )

@@ -17,7 +17,7 @@ from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.strut_law import BarCurve, StrutLawSearch
 from toolpath_stiff.correction.task import LIKELIHOOD, UpdateTask
 from toolpath_stiff.diagnosis.examination import percent_of, rounded_errors
-from toolpath_stiff.documents import Document, to_dict
+from toolpath_stiff.documents import Document, json_number, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.inference.doubts import question
@@ -28,7 +28,7 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.sizes import joined
-from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd

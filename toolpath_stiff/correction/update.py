@@ -30,6 +30,7 @@ from toolpath_stiff.correction.strut_law import bar_curve, leave_points_out, min
 from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
 from toolpath_stiff.diagnosis.diagnose import check_measured
 from toolpath_stiff.diagnosis.examination import percent_of
+from toolpath_stiff.documents import json_number
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import Candidate, testable_effects
@@ -42,7 +43,6 @@ from toolpath_stiff.inference.hypotheses import score_families, signatures, tabl
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.units import json_number
 
 TRIED = 4  # candidates a step of `--auto`, the most likely first
 MOST_EFFECTS = 4  # that `--auto` adds

@@ -34,10 +34,10 @@ from toolpath_stiff.planning.plan import RivalPlan
 from toolpath_stiff.planning.result import plan
 from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.units import Pose
 
 Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise model; the one that is written out
 PATH_STEP = 5e-3  # m between samples: the mean of a path needs no more

@@ -9,7 +9,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.loop_readings import BesideTip
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import DIGITS, Document, json_number
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.confounding import Confounding
@@ -30,7 +30,6 @@ from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.sizes import joined
-from toolpath_stiff.units import DIGITS, json_number
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"

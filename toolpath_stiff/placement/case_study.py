@@ -20,14 +20,15 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.errors import InputError, ProgramError, UnreachableError
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.poses import Pose, pose_in_si
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.tables import Columns, read_table
-from toolpath_stiff.units import Pose, mm_from_m, number, pose_in_si
+from toolpath_stiff.units import mm_from_m
 
 if TYPE_CHECKING:
     import pandas as pd

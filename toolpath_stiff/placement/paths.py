@@ -18,8 +18,8 @@ from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
 from toolpath_stiff.path.placing import place, place_orientations
 from toolpath_stiff.path.sampling import Samples, sample_moves
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import Pose
 
 Read = Callable[[Pose], ReadProgram]  # the program as it is read where its zero sits there
 SHIFT = np.array([0.011, 0.017, 0.023, 0.0, 0.0, 0.0])  # m; tells the axes of a point that follow the work from others

@@ -14,6 +14,7 @@ import numpy as np
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.paths import work_path
@@ -29,8 +30,8 @@ from toolpath_stiff.placement.rows import (
 from toolpath_stiff.placement.search import search_placements
 from toolpath_stiff.placement.task import PlacementTask, Rewriting, SearchRecord
 from toolpath_stiff.placement.working import Search
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
-from toolpath_stiff.units import Pose
 
 AGAIN = "search again, without --pick"
 
@@ -161,9 +162,9 @@ def _rewritten(writing: Rewriting, best: Analysis, present: Pose) -> tuple[bytes
             present,
             decimals=writing.decimals,
             linearise=writing.linearise,
-            **writing.reading,
+            control=writing.control,
         )
-        differences = rewriting_differences(best, rewritten, present, **writing.reading)
+        differences = rewriting_differences(best, rewritten, present, writing.control)
     except InputError as error:
         return None, Written(writing.file, refused=str(error))
     zero = dict(zip(PLACEMENT, placement_mm_deg(present), strict=True))
@@ -171,7 +172,7 @@ def _rewritten(writing: Rewriting, best: Analysis, present: Pose) -> tuple[bytes
 
 
 def rewriting_differences(
-    placed: Analysis, rewritten: RewrittenProgram, original_origin: Pose, **reading: Any
+    placed: Analysis, rewritten: RewrittenProgram, original_origin: Pose, control: Controller = UNKNOWN_CONTROL
 ) -> dict[str, float]:
     """Relative differences of mean, range and smallest stiffness: the rewritten program against the placed one.
 
@@ -183,10 +184,10 @@ def rewriting_differences(
         Is read and analyzed at the original origin with the same load, force and step.
     original_origin
         m and rad, as it was given to `rewrite_program`.
-    **reading
-        `offsets`, `tools`, `block_delete`, as for `parse_program`.
+    control
+        Offsets, tools and block-delete switches that the program was read with.
     """
-    program = parse_program(rewritten.text, placed.program.name, origin=original_origin, **reading)
+    program = parse_program(rewritten.text, placed.program.name, origin=original_origin, controller=control)
     again = analyze(
         placed.model, program, origin=original_origin, load=placed.load, step=placed.step, force=placed.force
     )

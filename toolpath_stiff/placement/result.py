@@ -11,15 +11,16 @@ import numpy as np
 
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import to_dict
+from toolpath_stiff.documents import number, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.placement.goals import Bounds
 from toolpath_stiff.placement.rows import FIGURES, PlacementRow
 from toolpath_stiff.placement.task import VARIED, PlacementTask, SearchRecord
+from toolpath_stiff.poses import ShopPose, pose_in_mm
 from toolpath_stiff.results import FolderResult
 from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
 from toolpath_stiff.stiffness.model import effects_stated
-from toolpath_stiff.units import ShopPose, mm_from_m, number, pose_in_mm
+from toolpath_stiff.units import mm_from_m
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,8 +12,9 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.placement.search import PlacementResult
+from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm, pose_in_si
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose, ShopPose, n_per_mm_from_n_per_m, pose_in_mm, pose_in_si, um_from_m
+from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
 # The three objectives and where their values stand.
 FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "weakest": "min_N_per_mm"}

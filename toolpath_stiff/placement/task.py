@@ -3,17 +3,18 @@
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
 
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.paths import Read
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.rewriting.program import check_rewritable
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose, mm_from_m
+from toolpath_stiff.units import mm_from_m
 
 VARIED = ("--x", "--y", "--z", "--tilt-a", "--tilt-b", "--rotate")  # options of the columns of a placement
 
@@ -25,7 +26,7 @@ class Rewriting:
     file: str
     decimals: int | None
     linearise: float | None
-    reading: Mapping[str, Any]
+    control: Controller
 
 
 @dataclass(frozen=True)

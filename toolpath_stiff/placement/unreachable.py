@@ -12,8 +12,9 @@ from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.paths import placed_path
 from toolpath_stiff.placement.working import Search
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import mm_from_m, pose_in_mm
+from toolpath_stiff.units import mm_from_m
 
 SCOUTS_AT_A_TIME = 50  # until one keeps an anchored rapid within reach
 

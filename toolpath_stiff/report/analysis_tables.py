@@ -6,11 +6,10 @@ from toolpath_stiff.analysis.document import compare_summaries
 from toolpath_stiff.analysis.loads import PLUNGES_ONLY
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import FIGURES
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.report.pages import markup
 from toolpath_stiff.report.tables import LABEL, ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, duration, machine_text, shortened
-from toolpath_stiff.units import number
 
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from toolpath_stiff.analysis.program_check import Figures, OperationRow, ProgramCheck, ToolRow
+from toolpath_stiff.documents import number
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import duration
-from toolpath_stiff.units import number
 
 MOST_ROWS = 40  # all are in --json
 FIGURES = (">cutting mm", ">time", ">X", ">Y", ">Z")

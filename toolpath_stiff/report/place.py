@@ -6,13 +6,14 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.documents import number
 from toolpath_stiff.placement.result import Placement, Written
 from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
 from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.place_path import drawn_path
 from toolpath_stiff.report.words import machine_text, plain
-from toolpath_stiff.units import mm_from_m, number
+from toolpath_stiff.units import mm_from_m
 
 COSTS = ("best_on_front_N_per_mm", "chosen_N_per_mm")
 

@@ -13,7 +13,8 @@ import numpy as np
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
-from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m
+from toolpath_stiff.poses import Pose
+from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
 G_WORD, COMMENTS = re.compile(r"[Gg]\+?(0*1\d{1,2}|0*5\d(?:\.\d)?)"), re.compile(r"\([^)]*\)|;.*")

@@ -21,11 +21,10 @@ from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
-from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.active import ActiveEffect, read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
-from toolpath_stiff.stiffness.parameters import read_parameters
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
 WORDS = {
@@ -107,7 +106,7 @@ def build_model(
     >>> import numpy as np
     >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.stiffness import core
-    >>> from toolpath_stiff.stiffness.active import ActiveEffect
+    >>> from toolpath_stiff.stiffness.active import ActiveEffect, read_parameters
     >>> from toolpath_stiff.stiffness.catalogue import find_effect
     >>> machine = load_machine("nist")
     >>> weak = ActiveEffect(find_effect("weak_strut"), {"strut": 1, "factor": 0.7})

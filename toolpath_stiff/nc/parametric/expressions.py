@@ -121,9 +121,12 @@ class Scanner:
 
         def value(variables: Variables) -> float:
             try:
-                return finite(work(variables))
+                result = work(variables)
+                if not math.isfinite(result):
+                    raise ValueError("the result is no finite number")
             except (ArithmeticError, ValueError) as error:
                 raise self.fail(f"{name} cannot be worked out: {error}", column=column) from None
+            return result
 
         return value
 
@@ -255,13 +258,6 @@ class Scanner:
 def number(value: float | None) -> float:
     """A value as operators take it: an empty variable counts as 0."""
     return 0.0 if value is None else value
-
-
-def finite(value: float) -> float:
-    """The value. Raises `ValueError` unless it is a finite real number."""
-    if isinstance(value, complex) or not math.isfinite(value):
-        raise ValueError("the result is no finite number")
-    return float(value)
 
 
 def operate(operator: str, left: float | None, right: float | None, family: str) -> float:

@@ -30,7 +30,6 @@ from toolpath_stiff.nc.words import Block, Word
 MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
 MOST_IDLE = 100_000  # blocks of loops that run without a move between; a program that works out values needs far fewer
 SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
-SHOWN = 40  # characters of the program in a message
 LARGEST_NUMBER = 99_999_999  # of a program, or of repeats
 WHOLE_WORDS = frozenset("GMTL")  # codes and numbers, which a value must be
 MACRO_CALLS = ("G65", "G66", "G67")
@@ -109,7 +108,7 @@ class ParametricRun(ProgramRun):
         return next((level.back for level in reversed(self._levels) if level.back <= self._main_lines), 1)
 
     def _word_fault(self, word: Word, problem: str, expected: str) -> InputError:
-        return self._fail(self._at, f"{word.text[:SHOWN]} {problem}", expected, column=word.column)
+        return self._fail(self._at, f"{word.text} {problem}", expected, column=word.column)
 
     def _execute(self, block: Block) -> Then:
         codes = [code_name("G", word.value) if word.letter == "G" else "" for word in block.words]

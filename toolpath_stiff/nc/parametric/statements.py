@@ -20,8 +20,8 @@ from toolpath_stiff.nc.words import (
     Block,
     Word,
     block_delete,
+    check_numbers,
     program_number,
-    through_pygcode,
     without_comments,
 )
 
@@ -30,7 +30,6 @@ _O_LABEL = re.compile(r"\d+|<[^>]*>", re.ASCII)
 _N_WORD = re.compile(r"N\d+(?:\.\d+)?", re.ASCII)
 _LOOP = re.compile(r"(?:DO|END)\d+", re.ASCII)
 LONGEST_BLOCK = 255  # characters without comments and blanks: what LinuxCNC reads
-LONGEST_LABEL = 40  # characters of it in a message
 MOST_VALUES = 30  # of a call
 
 # `#which = value`: works both out; what that gives sets the variable. In a block all are worked out before any is set.
@@ -122,7 +121,7 @@ def read_statement(text: str, place: Place, family: str, dialect: Dialect) -> St
             computed[len(words)] = value
         words.append(word)
     # The numbers that codes and tools may have, as in any other program.
-    through_pygcode([word for index, word in enumerate(words) if index not in computed], place)
+    check_numbers([word for index, word in enumerate(words) if index not in computed], place)
     block = Block(place.line, tuple(words), optional=start > 0, switch=switch)
     return Statement(block, computed, tuple(assignments), steering)
 
@@ -186,7 +185,7 @@ def _o_word(scanner: Scanner) -> Steering:
     )
     if kind in ("IF", "ELSEIF", "WHILE", "REPEAT") or (kind in ("ENDSUB", "RETURN") and not scanner.done):
         values.append(scanner.bracket())
-    return Steering(kind, label, f"o{label[:LONGEST_LABEL]} {kind}".lower(), column, tuple(values))
+    return Steering(kind, label, f"o{label} {kind}".lower(), column, tuple(values))
 
 
 def _word(scanner: Scanner, text: str) -> tuple[Word, Value | None]:
